@@ -224,16 +224,45 @@ Rational squaredDistance(const Vector<Integer>& p, const Vector<Integer>* corner
   return {height * height, dot(normal, normal)};
 }
 
-/// The radius at the point of that feature that is closest to p. radii: of the corners.
-Rational radiusAt(const Vector<Integer>& p, const Vector<Integer>* corners, TriangleFeature feature,
-                  const Vector<Integer>& radii) {
+/// A distance as the root of `square` less `radius`.
+struct RoundDistance {
+  Rational square, radius;
+};
+
+/// Sign of a + b times the root of c / d, for c >= 0 and d > 0.
+int signOfSum(const Integer& a, const Integer& b, const Integer& c, const Integer& d) {
+  const int root = sgn(c) == 0 ? 0 : sgn(b);
+  if (root == 0 || sgn(a) == root) return sgn(a);
+  return root * sgn(Integer(b * b * c - a * a * d));
+}
+
+/// p's distance from the hull of two balls: from the nearest of the balls on the segment between
+/// their centres (Math/RoundSegment.h).
+RoundDistance distanceFromBalls(const Vector<Integer>& p, const Vector<Integer>& a,
+                                const Vector<Integer>& b, const Integer& radiusA,
+                                const Integer& radiusB) {
+  const Vector<Integer> from = p - a, edge = b - a, normal = cross(from, edge);
+  const Integer along = dot(from, edge), square = dot(edge, edge), height = dot(normal, normal),
+                change = radiusB - radiusA, room = square - change * change;
+  // The nearest ball's centre is at (along + change sqrt(height / room)) / square.
+  if (room <= 0 ? change <= 0 : signOfSum(along, change, height, room) <= 0)
+    return {{dot(from, from), 1}, {radiusA, 1}};
+  if (room <= 0 || signOfSum(along - square, change, height, room) >= 0)
+    return {{dot(p - b, p - b), 1}, {radiusB, 1}};
+  return {{height * room, square * square}, {radiusA * square + change * along, square}};
+}
+
+/// p's distance from a feature. radii: of the corners.
+RoundDistance distanceFrom(const Vector<Integer>& p, const Vector<Integer>* corners,
+                           TriangleFeature feature, const Vector<Integer>& radii) {
   const auto index = static_cast<std::size_t>(feature);
-  if (index > 5) return {0, 1};
-  if (index < 3) return {radii[index], 1};
-  const std::size_t i = index - 3, j = (index - 2) % 3;
-  const Vector<Integer> edge = corners[j] - corners[i];
-  const Integer square = dot(edge, edge), along = dot(p - corners[i], edge);
-  return {radii[i] * (square - along) + radii[j] * along, square};
+  if (index > 2 && index < 6) {
+    const std::size_t i = index - 3, j = (index - 2) % 3;
+    if (radii[i] != radii[j])
+      return distanceFromBalls(p, corners[i], corners[j], radii[i], radii[j]);
+  }
+  const Integer radius = index > 5 ? Integer(0) : radii[index % 3];
+  return {squaredDistance(p, corners, feature), {radius, 1}};
 }
 
 Rational difference(const Rational& a, const Rational& b) {
@@ -258,19 +287,18 @@ int compareDistances(const Vector3d& p, const ClosestFeature& first, const Close
   const auto at = Integers(p, first.a, first.b, first.c, second.a, second.b, second.c, first.radii,
                            second.radii)
                       .at;
-  const Rational one = squaredDistance(at[0], &at[1], first.feature),
-                 two = squaredDistance(at[0], &at[4], second.feature);
-  return compareRoots(one, two,
-                      difference(radiusAt(at[0], &at[1], first.feature, at[7]),
-                                 radiusAt(at[0], &at[4], second.feature, at[8])));
+  const RoundDistance one = distanceFrom(at[0], &at[1], first.feature, at[7]),
+                      two = distanceFrom(at[0], &at[4], second.feature, at[8]);
+  return compareRoots(one.square, two.square, difference(one.radius, two.radius));
 }
 
 int compareDistance(const Vector3d& p, const ClosestFeature& feature, double length) {
   const Vector3d lengths(length, 0.0, 0.0);
   const auto at = Integers(p, feature.a, feature.b, feature.c, feature.radii, lengths).at;
-  const Rational radius = radiusAt(at[0], &at[1], feature.feature, at[4]);
-  return compareRoots(squaredDistance(at[0], &at[1], feature.feature), {0, 1},
-                      difference({at[5][0], 1}, {-radius.numerator, radius.denominator}));
+  const RoundDistance found = distanceFrom(at[0], &at[1], feature.feature, at[4]);
+  return compareRoots(
+      found.square, {0, 1},
+      difference({at[5][0], 1}, {-found.radius.numerator, found.radius.denominator}));
 }
 
 int nearestEnd(const Vector3d& p0, const Vector3d& p1, const Vector3d& q0, const Vector3d& q1) {

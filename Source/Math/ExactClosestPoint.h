@@ -56,8 +56,8 @@ int nearestEnd(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, const Eigen
 struct ClosestFeature {
   const Eigen::Vector3d &a, &b, &c;
   TriangleFeature feature;
-  /// Of the corners, linear along edges. A face has none. A distance is less the radius at the
-  /// closest point.
+  /// Of the corners. A face has none. An edge with radii is the hull of the balls at its ends; if
+  /// they differ, the nearest ball may be at an end of it.
   Eigen::Vector3d radii = Eigen::Vector3d::Zero();
 };
 /// Sign of p's distance from one triangle less its distance from another.

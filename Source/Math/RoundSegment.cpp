@@ -53,8 +53,22 @@ void forEachBelow(double a, double b, double c, const Range& within, F&& f) {
 
 }  // namespace
 
-RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
-                            const Eigen::Vector3d& q, double radiusP, double radiusQ) {
+double nearestBall(const Eigen::Vector3d& x, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                   double radiusP, double radiusQ) {
+  const double scale =
+      scaleTowardsOne(std::max({largest(x - p), largest(q - p), radiusP, radiusQ}));
+  const Eigen::Vector3d m = scale * (x - p), u = scale * (q - p);
+  const double length = u.norm(), change = scale * (radiusQ - radiusP);
+  const double room = (length - change) * (length + change);
+  if (!(room > 0.0)) return change > 0.0 ? 1.0 : 0.0;
+  // The nearest ball's centre is a multiple of the height beyond the foot of x, towards the larger
+  // end: the line from it to x is perpendicular to the cone.
+  const double height = m.cross(u).norm() / length;
+  return std::clamp((m.dot(u) / length + height * (change / std::sqrt(room))) / length, 0.0, 1.0);
+}
+
+std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
+                                        const Eigen::Vector3d& q, double radiusP, double radiusQ) {
   // The direction has length 1 here, and s = 0 where the ray is nearest to the segment's middle.
   const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length, middle = 0.5 * p + 0.5 * q;
@@ -66,63 +80,53 @@ RoundIntervals intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
   const Eigen::Vector3d m = scale * (nearest - p), n = scale * (nearest - q), u = scale * (q - p);
   radiusP *= scale;
   radiusQ *= scale;
-  const double square = u.squaredNorm();
+  const double axis = u.norm(), change = radiusQ - radiusP;
 
-  std::array<Range, 6> parts;
-  std::size_t count = 0;
+  // The body is convex: one interval, from the parts in both balls and in the cone between them.
+  Range all{kInfinite, -kInfinite};
   const auto add = [&](const Range& part) {
-    parts[count++] = {unit * part.first, unit * part.last};
+    all.first = std::min(all.first, part.first);
+    all.last = std::max(all.last, part.last);
   };
-  const auto addBall = [&](const Eigen::Vector3d& from, double radius, const Range& within) {
+  const Range line{-kInfinite, kInfinite};
+  const auto addBall = [&](const Eigen::Vector3d& from, double radius) {
     const double along = from.dot(d);
     // |from|² - along² without cancellation
     forEachBelow(1.0, along, along * along + (from - along * d).squaredNorm() - radius * radius,
-                 within, add);
+                 line, add);
   };
-  const Range all{-kInfinite, kInfinite};
-  if (!(square > 0.0)) {
-    addBall(m, std::max(radiusP, radiusQ), all);
-  } else {
-    // w = (m . u + s d . u) / |u|² is the place along the segment.
-    const double slope = d.dot(u), start = m.dot(u), taper = (radiusQ - radiusP) / square;
-    Range before = all, between = all, after = all;
-    const double atP = -start / slope, atQ = (square - start) / slope;
-    if (slope > 0.0) {
-      before.last = between.first = atP;
-      after.first = between.last = atQ;
-    } else if (slope < 0.0) {
-      before.first = between.last = atP;
-      after.last = between.first = atQ;
+  const double room = (axis - change) * (axis + change);
+  const bool hasCone = room > 0.0;
+  if (hasCone || change <= 0.0) addBall(m, radiusP);
+  if (hasCone || change > 0.0) addBall(n, radiusQ);
+  if (hasCone) {
+    // At the place w along the axis the cone's radius is (radiusP + taper w) / cosine. It touches
+    // the balls where w is -taper times their radii from their centres.
+    const Eigen::Vector3d e = u / axis;
+    const double taper = change / axis, squareOfCosine = room / (axis * axis);
+    const double slope = d.dot(e), start = m.dot(e);
+    const double lowest = -taper * radiusP, highest = axis - taper * radiusQ;
+    Range between = line;
+    if (slope != 0.0) {
+      between = {(lowest - start) / slope, (highest - start) / slope};
+      if (slope < 0.0) std::swap(between.first, between.last);
     }
-    const bool isParallel = !(slope > 0.0 || slope < 0.0);
-    if (!isParallel || start <= 0.0) addBall(m, radiusP, before);
-    if (!isParallel || start >= square) addBall(n, radiusQ, after);
-    if (!isParallel || (start > 0.0 && start < square)) {
-      const Eigen::Vector3d across = d - slope / square * u, from = m - start / square * u;
-      const double radius = radiusP + taper * start, change = taper * slope;
-      forEachBelow(across.squaredNorm() - change * change, across.dot(from) - radius * change,
-                   from.squaredNorm() - radius * radius, between, add);
+    if (slope != 0.0 || (start >= lowest && start <= highest)) {
+      const Eigen::Vector3d across = d - slope * e, from = m - start * e;
+      const double radius = radiusP + taper * start, growth = taper * slope;
+      forEachBelow(squareOfCosine * across.squaredNorm() - growth * growth,
+                   squareOfCosine * across.dot(from) - radius * growth,
+                   squareOfCosine * from.squaredNorm() - radius * radius, between, add);
     }
   }
 
-  for (std::size_t i = 1; i < count; ++i)
-    for (std::size_t at = i; at > 0 && parts[at].first < parts[at - 1].first; --at)
-      std::swap(parts[at], parts[at - 1]);
-  RoundIntervals result;
-  const double size =
-      std::abs(shift) + unit * std::sqrt(square) + unit * std::max(radiusP, radiusQ);
-  const double slack = kRoundRayError * size;
-  for (std::size_t i = 0; i < count;) {
-    Range part = parts[i++];
-    for (; i < count && parts[i].first <= part.last + slack; ++i)
-      part.last = std::max(part.last, parts[i].last);
-    const double first = (shift + part.first) / length, last = (shift + part.last) / length;
-    if (last < ray.tMin || first > ray.tMax || result.size == result.intervals.size()) continue;
-    result.intervals[result.size++] = {std::max(first, ray.tMin), std::min(last, ray.tMax),
-                                       slack / length, std::int8_t{last <= ray.tMax},
-                                       first >= ray.tMin};
-  }
-  return result;
+  const double size = std::abs(shift) + unit * axis + unit * std::max(radiusP, radiusQ);
+  const double first = (shift + unit * all.first) / length,
+               last = (shift + unit * all.last) / length;
+  if (!(first <= last) || last < ray.tMin || first > ray.tMax) return {};
+  return RayInterval{std::max(first, ray.tMin), std::min(last, ray.tMax),
+                     kRoundRayError * size / length, std::int8_t{last <= ray.tMax},
+                     first >= ray.tMin};
 }
 
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
@@ -146,8 +150,7 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const Eigen::Vector3d* const corners[] = {&a, &b, &c};
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
-    const RoundIntervals capsule = intersectRay(ray, p, q, radius, radius);
-    for (std::size_t k = 0; k < capsule.size; ++k) add(capsule.intervals[k]);
+    if (const auto capsule = intersectRay(ray, p, q, radius, radius)) add(*capsule);
   }
   const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length;

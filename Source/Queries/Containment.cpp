@@ -113,8 +113,13 @@ class InsideQuery {
   }
 
   WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
-    if (m_settings.rule == InsideRule::WindingNumber)
-      return m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
+    if (m_settings.rule == InsideRule::WindingNumber) {
+      const WindingNumbers::Result found =
+          m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
+      // That of a closed surface is an integer, which is exact where rounding leaves the sum open.
+      if (found.decided || m_body.mesh.topology.closed != true) return found;
+      return {m_surface.windingNumber(p) != 0, true};
+    }
     if (m_solid) return {m_solid->lowest(p).has_value(), true};
     return {m_surface.windingNumber(p) != 0, true};
   }
@@ -193,7 +198,11 @@ void checkInside(SearchableGeometry& body, InsideRule rule) {
     throw Error(ErrorCode::NotClosed,
                 nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
                 body.id);
-  if (rule == InsideRule::WindingNumber || isClosed(body)) return;
+  if (rule == InsideRule::WindingNumber) {
+    hasClosedSurface(body);  // remembered for evaluate()
+    return;
+  }
+  if (isClosed(body)) return;
   const MeshDefects defects = findMeshDefects(topology.triangles);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();

@@ -2,8 +2,11 @@
 
 #include <palpate/Intersection.h>
 
+#include "Exact/Compensated.h"
 #include "Math/ClosestPoint.h"
+#include "Math/ConvexMinimum.h"
 #include "Math/RayTriangle.h"
+#include "Math/RoundSegment.h"
 #include "Math/StableLength.h"
 
 #include <algorithm>
@@ -53,6 +56,56 @@ ElementDistance featureDistance(const Element& a, const Element& b) {
   return best;
 }
 
+/// The nearest of all pairs of a ball of a tapered segment and a point of another element. The gap
+/// between a ball and an element is convex along the segment.
+ElementDistance taperedDistance(const Element& tapered, const Element& other) {
+  double size = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    size = std::max({size, tapered[i].cwiseAbs().maxCoeff(), other[i].cwiseAbs().maxCoeff(),
+                     tapered.radius(i), other.radius(i)});
+  // From the segment's start, so that differences of positions are rounded, not positions.
+  const double scale = scaleTowardsOne(size);
+  const auto place = [&](const Vector3d& p) -> Vector3d { return scale * p - scale * tapered[0]; };
+  const Vector3d along = place(tapered[1]), a = place(other[0]), b = place(other[1]),
+                 c = place(other[2]);
+  const double start = scale * tapered.radius(std::size_t{0}),
+               change = scale * tapered.radius(std::size_t{1}) - start;
+  Vector3d weights;  // on the other element, of the last gap
+  const auto gapAt = [&](double t) -> Tangent {
+    const Vector3d centre = t * along;
+    if (other.isTapered()) {
+      const double at = nearestBall(centre, a, b, scale * other.radius(std::size_t{0}),
+                                    scale * other.radius(std::size_t{1}));
+      weights = edgeWeights(0, at);
+    } else {
+      weights = finiteVertexTriangleDistance(centre, a, b, c).barycentric;
+    }
+    const Vector3d difference =
+        (weights[0] * (centre - a) + weights[1] * (centre - b)) + weights[2] * (centre - c);
+    const double length = stableLength(difference);
+    return {t, length - scale * other.radius(weights) - (start + t * change),
+            (length > 0.0 ? difference.dot(along) / length : 0.0) - change};
+  };
+  const Tangent nearest = leastTangent(gapAt);
+  const double gap = gapAt(nearest.at).value;
+  return {std::max(0.0, gap / scale), edgeWeights(0, nearest.at), weights};
+}
+
+/// The nearest points where one of the elements is tapered.
+ElementDistance taperedPair(const Element& a, const Element& b) {
+  // Of two tapered segments, that with the lower coordinates is followed.
+  const auto precedes = [&] {
+    for (const std::size_t i : {0u, 1u})
+      for (int k = 0; k < 3; ++k)
+        if (a[i][k] != b[i][k]) return a[i][k] < b[i][k];
+    return a.radius(std::size_t{0}) <= b.radius(std::size_t{0});
+  };
+  if (a.isTapered() && (!b.isTapered() || precedes())) return taperedDistance(a, b);
+  ElementDistance found = taperedDistance(b, a);
+  std::swap(found.weightsA, found.weightsB);
+  return found;
+}
+
 bool boxesMeet(const Element& a, const Element& b) {
   for (int k = 0; k < 3; ++k)
     if (std::min({a[0][k], a[1][k], a[2][k]}) > std::max({b[0][k], b[1][k], b[2][k]}) ||
@@ -87,7 +140,8 @@ void moveToCrossing(const Element& a, const Element& b, ElementDistance& found) 
 }  // namespace
 
 ElementDistance elementDistance(const Element& a, const Element& b) {
-  ElementDistance found = featureDistance(a, b);
+  ElementDistance found =
+      a.isTapered() || b.isTapered() ? taperedPair(a, b) : featureDistance(a, b);
   if (boxesMeet(a, b) && trianglesIntersect(a[0], a[1], a[2], b[0], b[1], b[2])) {
     found.distance = 0.0;
     moveToCrossing(a, b, found);

@@ -38,6 +38,10 @@ class Element {
   double radius(const Eigen::Vector3d& weights) const {
     return m_mesh ? m_mesh->radius(m_vertices, weights) : 0.0;
   }
+  double radius(std::size_t corner) const {
+    return m_mesh ? m_mesh->radius(m_vertices[corner]) : 0.0;
+  }
+  bool isTapered() const { return radius(std::size_t{0}) != radius(std::size_t{1}); }
   bool isPoint() const { return m_vertices[0] == m_vertices[1] && m_vertices[1] == m_vertices[2]; }
   /// Whether corner i repeats an earlier one, and edge i an earlier edge.
   bool repeatsCorner(std::size_t i) const {
@@ -63,8 +67,9 @@ struct ElementDistance {
   Eigen::Vector3d weightsA = Eigen::Vector3d::UnitX(), weightsB = Eigen::Vector3d::UnitX();
 };
 
-/// The least distance of two elements. Whether it is 0 without radii is decided exactly. Exchanged
-/// elements have the same distance.
+/// The least distance of two elements. A segment whose radii differ is the hull of the balls at its
+/// ends; its point is the centre of the nearest ball. Whether the distance is 0 without radii is
+/// decided exactly. Exchanged elements have the same distance.
 ElementDistance elementDistance(const Element& a, const Element& b);
 
 }  // namespace palpate

@@ -1,6 +1,7 @@
 #include "Queries/GeometryDistances.h"
 
 #include "Math/ClosestPoint.h"
+#include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Octree/BoxMap.h"
@@ -18,6 +19,7 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace palpate {
 
@@ -113,13 +115,21 @@ class NearestPair {
   }
   /// Tests pairs of elements.
   void test(const NearElements& elements) {
+    if (m_lowestA.empty() &&
+        m_tests > kTestsPerElement * (m_a.tree.ordered().size() + m_b.tree.ordered().size())) {
+      m_lowestA = lowestOfCoincident(m_a);
+      m_lowestB = lowestOfCoincident(m_b);
+    }
     std::array<Element, NearElements::kSide> all;
     std::uint32_t read = 0;
     for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
       if (elements.near[i] == 0) continue;
+      m_tests += kTestsPerPairs;
+      if (!m_lowestA.empty() && !m_lowestA[elements.placeA + i]) continue;
       const Element a = elementOf(m_a, elements.placeA + i);
       for (std::uint32_t bits = elements.near[i]; bits; bits &= bits - 1) {
         const auto j = static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (!m_lowestB.empty() && !m_lowestB[elements.placeB + j]) continue;
         if (!(read >> j & 1)) all[j] = elementOf(m_b, elements.placeB + j);
         read |= 1u << j;
         test(elements.placeA + i, a, elements.placeB + j, all[j]);
@@ -137,6 +147,38 @@ class NearestPair {
   }
 
  private:
+  /// After so many tests of pairs for each element, elements that coincide with a lower one are
+  /// skipped: they are equally near, and the lower one counts. To find them costs about one test
+  /// for each element.
+  static constexpr double kTestsPerElement = 4.0;
+  /// A row of pairs of boxes costs some hundredth of a test.
+  static constexpr double kTestsPerPairs = 0x1p-6;
+
+  /// By place: whether no lower element has the same corners and radii.
+  static std::vector<std::uint8_t> lowestOfCoincident(const SearchableGeometry& geometry) {
+    using Key = std::array<std::array<double, 4>, 3>;  // positions and radius of the corners
+    std::vector<std::pair<Key, std::uint32_t>> keys;
+    const auto& ordered = geometry.tree.ordered();
+    const auto& order = geometry.tree.octree().order();
+    for (std::uint32_t place = 0; place < ordered.size(); ++place) {
+      Key key;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Vector3d p = geometry.mesh.now[ordered[place][i]];
+        key[i] = {p[0], p[1], p[2], geometry.mesh.radius(ordered[place][i])};
+      }
+      // The order of a triangle's corners changes no distance.
+      if (geometry.mesh.topology.hasFaces()) std::sort(key.begin(), key.end());
+      keys.emplace_back(key, place);
+    }
+    std::sort(keys.begin(), keys.end(), [&](const auto& l, const auto& r) {
+      return l.first < r.first || (l.first == r.first && order[l.second] < order[r.second]);
+    });
+    std::vector<std::uint8_t> lowest(keys.size(), 1);
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      lowest[keys[i].second] = keys[i].first != keys[i - 1].first;
+    return lowest;
+  }
+
   static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
     return {geometry.mesh, geometry.tree.ordered()[place]};
   }
@@ -148,6 +190,7 @@ class NearestPair {
     };
     if (m_best.distance == 0.0 && !precedes()) return;
     if (isFurther(a, b)) return;
+    ++m_tests;
     const ElementDistance found = elementDistance(a, b);
     if (!(found.distance < m_best.distance || (found.distance == m_best.distance && precedes())))
       return;
@@ -192,6 +235,8 @@ class NearestPair {
 
   const SearchableGeometry &m_a, &m_b;
   const double m_radii;  ///< L: the largest ones of both
+  double m_tests = 0;
+  std::vector<std::uint8_t> m_lowestA, m_lowestB;  ///< by place; empty: all are tested
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
   Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0
@@ -274,6 +319,22 @@ void descend(const SearchableGeometry& geometry, bool bruteForce, double best, B
   }
 }
 
+/// The centre of the ball of a tapered segment that is nearest to a shape.
+NearestToShape nearestBallTo(const Shape& shape, const Element& segment) {
+  const auto at = [&](double t) {
+    return shape.signedDistance((1.0 - t) * segment[0] + t * segment[1]);
+  };
+  const double start = segment.radius(std::size_t{0}),
+               change = segment.radius(std::size_t{1}) - start;
+  const Vector3d along = segment[1] - segment[0];
+  const Tangent least = leastTangent([&](double t) -> Tangent {
+    const PointShapeDistance centre = at(t);
+    return {t, centre.distance - (start + t * change), centre.normal.dot(along) - change};
+  });
+  const PointShapeDistance nearest = at(least.at);
+  return {edgeWeights(0, least.at), nearest.normal, nearest.distance, false};
+}
+
 }  // namespace
 
 GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
@@ -338,7 +399,9 @@ GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId 
         };
         for (std::size_t i = 0; i < 3; ++i) {
           if (!corners.hasEdge(i)) continue;
-          const NearestToShape found = shape.nearestOfEdge(corners[i], corners[i + 1]);
+          const NearestToShape found = corners.isTapered()
+                                           ? nearestBallTo(shape, corners)
+                                           : shape.nearestOfEdge(corners[i], corners[i + 1]);
           take(found, edgeWeights(i, found.weights[1]));
         }
         if (corners.isPoint()) {

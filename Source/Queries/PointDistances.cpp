@@ -2,6 +2,8 @@
 
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
+#include "Math/RoundSegment.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/VertexTriangleDistances.h"
 
@@ -77,12 +79,16 @@ PointDistances::Near PointDistances::nearOf(std::uint32_t place, VertexTriangleD
                                             double reach) const {
   const TriangleMesh& mesh = m_geometry.mesh;
   const Triangle& corners = m_geometry.tree.ordered()[place];
-  const auto [p, q, _] = corners;
-  // A segment without length is a ball of its larger radius.
-  if (!mesh.radii.empty() && mesh.radii[p] != mesh.radii[q] && mesh.now[p] == mesh.now[q]) {
-    const bool isAtP = mesh.radii[p] > mesh.radii[q];
-    closest.feature = isAtP ? TriangleFeature::CornerA : TriangleFeature::CornerB;
-    closest.barycentric = Eigen::Vector3d::Unit(isAtP ? 0 : 1);
+  if (isTapered(corners)) {
+    const auto [p, q, _] = corners;
+    const Eigen::Vector3d start = mesh.now[p], along = mesh.now[q] - start, from = m_point - start;
+    const double weight = nearestBall(m_point, start, mesh.now[q], mesh.radii[p], mesh.radii[q]);
+    closest.barycentric = {1.0 - weight, weight, 0.0};
+    closest.difference = weight < 1.0 ? Eigen::Vector3d(from - weight * along)
+                                      : Eigen::Vector3d(m_point - mesh.now[q]);
+    closest.distance = stableLength(closest.difference);
+    if (closest.distance > 0.0) closest.normal = closest.difference / closest.distance;
+    closest.feature = TriangleFeature::EdgeAB;
   }
   return {place, m_geometry.tree.octree().order()[place], closest,
           closest.distance - mesh.radius(corners, closest.barycentric),
@@ -122,7 +128,8 @@ bool PointDistances::isNearer(const Near& one, const Near& two) const {
   if (std::abs(difference) > one.error + two.error) return difference < 0;
   const Triangle &first = m_geometry.tree.ordered()[one.place],
                  &second = m_geometry.tree.ordered()[two.place];
-  if (featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature))
+  if (!isTapered(first) && !isTapered(second) &&
+      featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature))
     return one.element < two.element;
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d corners[] = {now[first[0]],  now[first[1]],  now[first[2]],
@@ -142,6 +149,11 @@ bool PointDistances::isWithin(const Near& near, double distance) const {
   const Eigen::Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
   return exact::compareDistance(m_point, {a, b, c, near.closest.feature, radiiOf(corners)},
                                 distance) <= 0;
+}
+
+bool PointDistances::isTapered(const Triangle& corners) const {
+  const TriangleMesh& mesh = m_geometry.mesh;
+  return !mesh.radii.empty() && mesh.radii[corners[0]] != mesh.radii[corners[1]];
 }
 
 Eigen::Vector3d PointDistances::radiiOf(const Triangle& corners) const {

@@ -75,6 +75,7 @@ class PointDistances {
   Near nearOf(std::uint32_t place, VertexTriangleDistance, double reach) const;
   float boundOf(double distance) const;  ///< in the octree's floats
   Eigen::Vector3d radiiOf(const Triangle& corners) const;
+  bool isTapered(const Triangle& corners) const;  ///< a segment whose radii differ
 
   const SearchableGeometry& m_geometry;
   const Eigen::Vector3d m_point;

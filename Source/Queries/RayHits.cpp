@@ -3,11 +3,13 @@
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
+#include "Queries/ElementDistance.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <memory>
 
 namespace palpate {
@@ -123,9 +125,9 @@ void RayHits::intersect(std::uint32_t place, F&& f) const {
       f(*interval);
     return;
   }
-  const RoundIntervals parts = intersectRay(m_ray, mesh.now[a], mesh.now[b],
-                                            mesh.radius(a) + m_radius, mesh.radius(b) + m_radius);
-  for (std::size_t i = 0; i < parts.size; ++i) f(parts.intervals[i]);
+  if (const auto interval = intersectRay(m_ray, mesh.now[a], mesh.now[b], mesh.radius(a) + m_radius,
+                                         mesh.radius(b) + m_radius))
+    f(*interval);
 }
 
 void RayHits::add(std::uint32_t place) {
@@ -201,6 +203,15 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[first[0]], b = now[first[1]], c = now[first[2]], d = now[second[0]],
                  e = now[second[1]], f = now[second[2]];
+  // Triangles with the same corners share the same part of the ray.
+  const auto hasAll = [](const Vector3d& p, const Vector3d& q, const Vector3d& r,
+                         std::initializer_list<const Vector3d*> others) {
+    return std::all_of(others.begin(), others.end(), [&](const Vector3d* other) {
+      return *other == p || *other == q || *other == r;
+    });
+  };
+  if (lastOfFirst == lastOfSecond && hasAll(a, b, c, {&d, &e, &f}) && hasAll(d, e, f, {&a, &b, &c}))
+    return 0;
   ++m_exactDecisions;
   return exact::compareRayEnds(m_ray, {a, b, c, lastOfFirst}, {d, e, f, lastOfSecond});
 }
@@ -213,11 +224,13 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
     const RayPoint at = firstPoint(m_ray, met.interval, a, b, c, &m_exactDecisions);
     return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};
   }
-  // A segment without length is a ball of its larger radius.
   const TriangleMesh& mesh = m_geometry.mesh;
-  if (a == b && b == c && mesh.radius(corners[0]) < mesh.radius(corners[1]))
-    return {m_geometry.id, met.element, corners, Vector3d::UnitY(), t, frontFace, crosses};
   const Vector3d point = m_ray.origin + t * m_ray.direction;
+  if (mesh.radius(corners[0]) != mesh.radius(corners[1])) {
+    const double weight =
+        nearestBall(point, a, b, mesh.radius(corners[0]), mesh.radius(corners[1]));
+    return {m_geometry.id, met.element, corners, edgeWeights(0, weight), t, frontFace, crosses};
+  }
   const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
 }

@@ -1,5 +1,6 @@
 #include "Queries/ShapeOverlap.h"
 
+#include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Queries/ElementsNearShape.h"
@@ -36,11 +37,6 @@ bool meetsHull(const Corners& element, const Shape& hull) {
   return isInside;
 }
 
-/// Whether the radii of lines may differ between their ends.
-bool isTapered(const TriangleMesh& mesh) {
-  return mesh.topology.type == GeometryType::Lines && !mesh.radii.empty();
-}
-
 /// Whether the hull of the balls at a segment's ends has a point in the shape. The hull is the
 /// union of the balls along the segment, with radii in proportion. A ball meets a shape if its
 /// centre's distance is at most its radius. This distance less the radius is convex along the
@@ -49,22 +45,18 @@ bool meetsTapered(const Shape& shape, const std::array<Vector3d, 2>& ends,
                   const std::array<double, 2>& radii) {
   const Vector3d along = ends[1] - ends[0];
   const double taper = radii[1] - radii[0];
-  struct Tangent {
-    double at, gap, slope;
-    double operator()(double t) const { return gap + (t - at) * slope; }
-  };
   const auto tangent = [&](double t) {
     const PointShapeDistance centre = shape.signedDistance((1.0 - t) * ends[0] + t * ends[1]);
     return Tangent{t, centre.distance - ((1.0 - t) * radii[0] + t * radii[1]),
                    centre.normal.dot(along) - taper};
   };
   Tangent low = tangent(0.0), high = tangent(1.0);
-  if (low.gap <= 0.0 || high.gap <= 0.0) return true;
+  if (low.value <= 0.0 || high.value <= 0.0) return true;
   while (low.slope < 0.0 && high.slope > 0.0 && high.at - low.at > kEdgeWeight) {
     const double crossing = (high(0.0) - low(0.0)) / (low.slope - high.slope);
     if (low(crossing) > 0.0) return false;
     const Tangent middle = tangent(0.5 * (low.at + high.at));
-    if (middle.gap <= 0.0) return true;
+    if (middle.value <= 0.0) return true;
     (middle.slope < 0.0 ? low : high) = middle;
   }
   return false;
@@ -292,7 +284,7 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
     build();
     convex = convexOf(*shape);
   }
-  if (convex && convex->slabCount == 0 && convex->p == convex->q && !isTapered(mesh))
+  if (convex && convex->slabCount == 0 && convex->p == convex->q)
     return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);
   near.clear();
   const bool hasRadii =
@@ -302,7 +294,7 @@ void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometr
   if (!floats) {
     build();
     if (shape->hasCorners() && shape->faces().size() == 1 &&
-        shape->corners().front() == shape->corners().back() && !isTapered(mesh))  // a point
+        shape->corners().front() == shape->corners().back())  // a point
       return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
     if (bruteForce) {
       for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);

@@ -30,12 +30,11 @@ std::optional<Inside> clipped(double enter, double leave, const Ray& ray) {
 }
 
 std::optional<Inside> insideCapsule(const Shape& shape, const Ray& ray) {
-  const auto parts =
+  const auto part =
       intersectRay({ray.origin, ray.direction, ray.tMin, ray.tMax}, shape.corners().front(),
                    shape.corners().back(), shape.radius(), shape.radius());
-  if (parts.size == 0) return {};
-  const RayInterval& part = parts.intervals[0];  // one, as a capsule is convex
-  return Inside{part.first, part.last, !part.frontFace, part.crossing == 0};
+  if (!part) return {};
+  return Inside{part->first, part->last, !part->frontFace, part->crossing == 0};
 }
 
 /// A cylinder is the common part of a slab and an infinite cylinder.

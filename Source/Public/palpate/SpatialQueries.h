@@ -27,7 +27,8 @@ struct SurfacePoint {
   std::uint32_t element = kNoElement;     ///< triangle, segment or point; kNoElement for a shape
   std::array<std::uint32_t, 3> vertices;  ///< {p, q, q} of a segment, {p, p, p} of a point
   Eigen::Vector3d weights;                ///< of the vertices; at least 0, sum 1
-  /// L: on the triangle, the centre line or the point.
+  /// L: on the triangle, the centre line or the point. If radii differ between a segment's ends, it
+  /// is the centre of the nearest ball.
   Eigen::Vector3d position;
   /// L, less the radius of lines and points: negative inside the radius.
   double distance;
@@ -131,9 +132,10 @@ struct PathClearance {
   SurfacePoint nearest;  ///< has this distance; kNoElement for a shape, or if there is no surface
 };
 
-/// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. Get the object
-/// from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled elements,
-/// too.
+/// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. A segment
+/// whose radii differ between its ends is the hull of the balls there, in every query. Get the
+/// object from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled
+/// elements, too.
 ///
 ///   const SpatialQueries queries = collisions.queries();
 ///   std::vector<InsideVertex> inside;
@@ -226,14 +228,11 @@ class PALPATE_EXPORT SpatialQueries {
   /// Finds the elements that have a point in a shape, interior included. The poses are those of
   /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
   ///
-  /// A line whose radii differ between its ends is the hull of the balls there. It may reach
-  /// further than the radius at the closest point of its centre line, by which elementsWithin()
-  /// decides.
-  ///
   /// Order    ascending.
-  /// Accuracy decided exactly for spheres, unless radii differ along lines, and for boxes and hulls
-  ///          if elements have no radius, on the shape's corners as they are rounded when it is
-  ///          placed. Otherwise elements are found up to rounding errors of the distance.
+  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius, on
+  /// the
+  ///          shape's corners as they are rounded when it is placed. Otherwise elements are found
+  ///          up to rounding errors of the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
                    const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
@@ -269,10 +268,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// near pairs of elements, by computed distance, the one with the lowest element of a counts,
   /// then with that of b. If a mesh has no elements, the distance is infinite and the element is
   /// kNoElement.
-  ///
-  /// Where radii vary along a line, the distance is the least of all pairs of features. That of an
-  /// edge and a vertex, or of two edges, is the distance of their closest points less the radii
-  /// there. The surfaces' distance may differ slightly.
   ///
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().

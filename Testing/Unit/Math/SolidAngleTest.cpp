@@ -70,7 +70,9 @@ TEST(SolidAngle, AClosedSurfaceCoversAllDirectionsFromInsideOnly) {
 
 TEST(SolidAngle, APointOnTheTriangleHasNoKnownShare) {
   const Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
-  EXPECT_EQ(solidAngleShare({0.5, 0, 0}, a, b, c).error, 1.0);
+  EXPECT_EQ(solidAngleShare({0.5, 0, 0}, a, b, c).error, 1.0);  // on an edge
+  EXPECT_EQ(solidAngleShare(b, a, b, c).error, 1.0);
+  EXPECT_EQ(solidAngleShare({0.25, 0.25, 0}, a, b, c).error, 0.5);
   EXPECT_NEAR(solidAngleShare({0, 0, -1e-9}, {-1, -1, 0}, {2, -1, 0}, {0, 3, 0}).value, 0.5, 1e-6);
 }
 

@@ -135,14 +135,9 @@ Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const
   for (const PathClearance& clearance : found.outside) {
     EXPECT_EQ(clearance.nearest.distance, clearance.distance);
     EXPECT_EQ(clearance.body, body);
-    // Where radii vary along a line, other features than the closest may be nearer: see distance().
-    const bool varies = !scene.meshes.empty() && scene.meshes[0].type == GeometryType::Lines &&
-                        scene.meshes[0].radii.size() > 1;
     const double there = queries.closestPoint(body, line(clearance.at))->distance;
-    if (!varies) {
-      EXPECT_GE(least, clearance.distance - 1e-13 * size);
-      EXPECT_NEAR(std::max(0.0, there - radius), clearance.distance, 1e-13 * size);
-    }
+    EXPECT_GE(least, clearance.distance - 1e-13 * size);
+    EXPECT_NEAR(std::max(0.0, there - radius), clearance.distance, 1e-13 * size);
     // The path as a line mesh.
     OctreeBasedCD other;
     if (body != scene.bodies.front() || scene.meshes.size() != 1) continue;
@@ -156,6 +151,25 @@ Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const
   return found;
 }
 
+/// The distance of a point from an element, less the radius: of a segment from the nearest of its
+/// balls.
+double elementGap(const TestGeometry& geometry, const Positions& now,
+                  const std::array<std::uint32_t, 3>& vertices, const Vector3d& p) {
+  const auto& [a, b, c] = vertices;
+  if (geometry.radius(a) == geometry.radius(b))
+    return vertexTriangleDistance(p, now[a], now[b], now[c]).distance - geometry.radius(a);
+  const auto gap = [&](double t) {
+    return (p - now[a] - t * (now[b] - now[a])).norm() -
+           ((1 - t) * geometry.radius(a) + t * geometry.radius(b));
+  };
+  double low = 0, high = 1;
+  for (int i = 0; i < 80; ++i) {
+    const double l = low + (high - low) * 0.382, r = low + (high - low) * 0.618;
+    (gap(l) < gap(r) ? high : low) = gap(l) < gap(r) ? r : l;
+  }
+  return std::min({gap(0), gap(1), gap(low)});
+}
+
 /// Expects that the ball touches the entry and exit elements at the ends.
 void expectEndsOnElements(const TestGeometry& geometry, const Positions& now, const Answer& found,
                           const Positions& path, double radius, double size = 5.0) {
@@ -166,11 +180,7 @@ void expectEndsOnElements(const TestGeometry& geometry, const Positions& now, co
     if (geometry.type == GeometryType::Lines)
       vertices = {geometry.segments[element][0], geometry.segments[element][1],
                   geometry.segments[element][1]};
-    const auto at =
-        vertexTriangleDistance(line(s), now[vertices[0]], now[vertices[1]], now[vertices[2]]);
-    double own = 0;
-    for (int i = 0; i < 3; ++i) own += at.barycentric[i] * geometry.radius(vertices[i]);
-    EXPECT_NEAR(at.distance - own, radius, 1e-11 * size) << element;
+    EXPECT_NEAR(elementGap(geometry, now, vertices, line(s)), radius, 1e-11 * size) << element;
   };
   for (const PathInterval& interval : found.inside) {
     if (interval.enter > 0) {
@@ -611,6 +621,66 @@ TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {
   collisions.setPositions(body, mesh.positions);
   expectRefused(InvalidCall, "outdated",
                 [&] { queries.path(path, 0.0, {}, answer.inside, answer.outside); });
+}
+
+/// Radii that differ along a segment: no ball along it is nearer to the path than the clearance,
+/// and the path enters the segment where it enters the hull of the balls at its ends.
+TEST(Path, TaperedSegmentsAreHullsOfBalls) {
+  Random random(907);
+  int entered = 0, between = 0;
+  for (int round = 0; round < 400; ++round) {
+    const Positions ends{randomPoint(random, 0, 10), randomPoint(random, 0, 10)};
+    const std::vector<double> radii{uniform(random, 0, 3), uniform(random, 0, 0.3)};
+    OctreeBasedCD collisions;
+    const GeometryId line = collisions.addLineMesh(ends, std::vector<Segment>{{0, 1}}, radii),
+                     ball = collisions.addPointSet(Positions{randomPoint(random, 0, 10)}, 0.1);
+    const SpatialQueries queries = collisions.queries();
+    const Positions path{randomPoint(random, -2, 12), randomPoint(random, -2, 12)};
+    const double own = round % 2 ? 0.0 : 0.2;
+    const Answer found = follow(queries, path, own, {line});
+    double least = kInfinity, first = -1, last = -1, leastOfBall = kInfinity;
+    const double length = (path[1] - path[0]).norm();
+    constexpr int kBalls = 2000, kPlaces = 200;
+    for (int k = 0; k <= kBalls; ++k) {
+      const double w = double(k) / kBalls, radius = (1 - w) * radii[0] + w * radii[1];
+      const Vector3d centre = (1 - w) * ends[0] + w * ends[1];
+      const double t =
+          std::clamp((centre - path[0]).dot(path[1] - path[0]) / (length * length), 0.0, 1.0);
+      least = std::min(least, (centre - path[0] - t * (path[1] - path[0])).norm() - radius - own);
+      leastOfBall =
+          std::min(leastOfBall, (centre - collisions.positions(ball)[0]).norm() - radius - 0.1);
+    }
+    EXPECT_NEAR(queries.distance(line, ball).distance, std::max(0.0, leastOfBall), 1e-4) << round;
+    if (least > 1e-4) {
+      ASSERT_EQ(found.outside.size(), 1u) << round;
+      EXPECT_NEAR(found.outside[0].distance, least, 1e-4) << round;
+      const double w = found.outside[0].nearest.weights[0];
+      between += w > 0 && w < 1;
+      continue;
+    }
+    if (least > -1e-4) continue;
+    ASSERT_EQ(found.inside.size(), 1u) << round;
+    ++entered;
+    for (int i = 0; i <= kPlaces; ++i) {
+      const Vector3d at = path[0] + double(i) / kPlaces * (path[1] - path[0]);
+      double gap = kInfinity;
+      for (int k = 0; k <= kBalls; ++k) {
+        const double w = double(k) / kBalls;
+        gap = std::min(gap, (at - (1 - w) * ends[0] - w * ends[1]).norm() -
+                                ((1 - w) * radii[0] + w * radii[1]) - own);
+      }
+      if (gap > 0) continue;
+      if (first < 0) first = length * i / kPlaces;
+      last = length * i / kPlaces;
+    }
+    if (first < 0) continue;
+    EXPECT_LE(found.inside[0].enter, first + 1e-12) << round;
+    EXPECT_GE(found.inside[0].leave, last - 1e-12) << round;
+    EXPECT_LE(first - length / kPlaces, found.inside[0].enter + 1e-3) << round;
+    EXPECT_GE(last + length / kPlaces, found.inside[0].leave - 1e-3) << round;
+  }
+  EXPECT_GT(entered, 40);
+  EXPECT_GT(between, 40);
 }
 
 }  // namespace

@@ -79,8 +79,32 @@ void expectSameAnswers(const Both& both, std::span<const Vector3d> points) {
   }
 }
 
-/// An element's distance from a point in 400 bits, less the radius at the closest point. Elements
-/// without radius have the exact squares beside it.
+/// The distance of p from the nearest of the balls along a segment in 400 bits: the minimum of a
+/// convex function, by golden sections.
+mpf_class distanceFromBalls(const Vector3d& p, const Vector3d& a, const Vector3d& b, double radiusA,
+                            double radiusB) {
+  const auto gap = [&](const mpf_class& t) {
+    mpf_class square(0, 400);
+    for (int k = 0; k < 3; ++k) {
+      const mpf_class from = mpf_class(p[k], 400) - a[k] - t * (mpf_class(b[k], 400) - a[k]);
+      square += from * from;
+    }
+    return mpf_class(sqrt(square) - radiusA - t * (mpf_class(radiusB, 400) - radiusA));
+  };
+  mpf_class low(0, 400), high(1, 400);
+  for (int i = 0; i < 290; ++i) {
+    const mpf_class l = low + (high - low) * 0.382, r = low + (high - low) * 0.618;
+    if (gap(l) < gap(r))
+      high = r;
+    else
+      low = l;
+  }
+  return std::min({gap(mpf_class(0, 400)), gap(mpf_class(1, 400)), gap(low)},
+                  [](const mpf_class& l, const mpf_class& r) { return l < r; });
+}
+
+/// An element's distance from a point in 400 bits, less the radius. Elements without radius have
+/// the exact squares beside it.
 struct TrueDistance {
   std::uint32_t element;
   Rational square;
@@ -95,9 +119,11 @@ std::vector<TrueDistance> trueDistances(const TestGeometry& geometry, const Posi
   for (std::uint32_t e = 0; e < elements.size(); ++e) {
     const auto& [a, b, c] = elements[e];
     const oracle::Closest closest = oracle::vertexTriangle(p, now[a], now[b], now[c]);
-    Rational radius = closest.weights[0] * geometry.radius(a);
-    radius += closest.weights[1] * geometry.radius(b) + closest.weights[2] * geometry.radius(c);
-    all.push_back({e, closest.square, oracle::root(closest.square) - mpf_class(radius, 400)});
+    all.push_back(
+        {e, closest.square,
+         geometry.radius(a) == geometry.radius(b)
+             ? mpf_class(oracle::root(closest.square) - mpf_class(geometry.radius(a), 400))
+             : distanceFromBalls(p, now[a], now[b], geometry.radius(a), geometry.radius(b))});
   }
   const bool sameRadius = geometry.radii.size() == 1;
   std::stable_sort(all.begin(), all.end(), [&](const TrueDistance& l, const TrueDistance& r) {

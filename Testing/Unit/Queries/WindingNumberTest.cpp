@@ -271,5 +271,70 @@ TEST(WindingNumber, BadCallsThrow) {
   EXPECT_EQ(refused(id, id, byNumber()), ErrorCode::InvalidSettings);
 }
 
+/// Points within ulps of the faces, edges and vertices of closed meshes: the vertices are those of
+/// InsideRule::Closed, which exact predicates decide, and all are decided.
+TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
+  Random random(11);
+  std::size_t inside = 0, outside = 0;
+  for (int run = 0; run < 8; ++run) {
+    Mesh body = lump(random, 6, 8);
+    const Vector3d offset = run % 2 ? randomPoint(random, -100, 100) : Vector3d(0, 0, 0);
+    for (Vector3d& p : body.positions) p += offset;
+    if (run % 4 > 1)
+      for (Triangle& t : body.triangles) std::swap(t[0], t[1]);
+    Positions points;
+    for (const Triangle& t : body.triangles)
+      for (int kind = 0; kind < 3; ++kind)
+        for (int i = 0; i < 12; ++i) {
+          Vector3d w(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
+          if (kind > 0) w[0] = 0;
+          if (kind > 1) w[1] = 0;
+          w /= w.sum();
+          Vector3d p = w[0] * body.positions[t[0]] + w[1] * body.positions[t[1]] +
+                       w[2] * body.positions[t[2]];
+          for (double& x : p)
+            for (std::size_t ulps = random() % 5, up = random() % 2; ulps > 0; --ulps)
+              x = std::nextafter(x, up ? 1e9 : -1e9);
+          points.push_back(p);
+        }
+    const std::vector<InsideVertex> truth = find(points, body, {}),
+                                    found = find(points, body, byNumber());
+    ASSERT_EQ(found, truth) << run;
+    ASSERT_EQ(find(points, body, byNumber(0.25)), truth) << run;
+    ASSERT_EQ(find(points, body, byNumber(), settingsOf(Engine::BruteForce)), truth) << run;
+    inside += truth.size();
+    outside += points.size() - truth.size();
+  }
+  EXPECT_GT(inside, 5000u);
+  EXPECT_GT(outside, 5000u);
+}
+
+/// Without a face the mesh is open. Faces far from the hole decide the side of points within
+/// rounding of them by exact signs, too: none is decided wrongly.
+TEST(WindingNumber, PointsWithinRoundingOfAnOpenSurfaceAreNotDecidedWrongly) {
+  Random random(12);
+  const Mesh closed = lump(random, 6, 8);
+  Mesh open = closed;
+  open.triangles.erase(open.triangles.begin());
+  Positions points;
+  for (std::size_t i = open.triangles.size() / 2; i < open.triangles.size(); ++i)
+    for (int k = 0; k < 40; ++k) {
+      const auto& [a, b, c] = open.triangles[i];
+      Vector3d w(uniform(random, 0.1, 1), uniform(random, 0.1, 1), uniform(random, 0.1, 1));
+      w /= w.sum();
+      Vector3d p = w[0] * open.positions[a] + w[1] * open.positions[b] + w[2] * open.positions[c];
+      for (double& x : p) x += (static_cast<int>(random() % 5) - 2) * std::abs(x) * 0x1p-52;
+      points.push_back(p);
+    }
+  const std::vector<InsideVertex> truth = find(points, closed, {}),
+                                  found = find(points, open, byNumber());
+  std::vector<std::uint32_t> expected, decided;
+  for (const InsideVertex& each : truth) expected.push_back(each.vertex);
+  for (const InsideVertex& each : found)
+    if (each.decided) decided.push_back(each.vertex);
+  EXPECT_EQ(decided, expected);
+  EXPECT_GT(decided.size(), points.size() / 4);
+}
+
 }  // namespace
 }  // namespace palpate
