@@ -119,24 +119,6 @@ constexpr const char* kRigidWithItself =
 
 constexpr const char* kNoPredicate = "Method::DistanceField does not use contact predicates";
 
-const char* nameOf(Method method) {
-  switch (method) {
-    case Method::Auto:
-      return "Auto";
-    case Method::Intersection:
-      return "Intersection";
-    case Method::Proximity:
-      return "Proximity";
-    case Method::Continuous:
-      return "Continuous";
-    case Method::DistanceField:
-      return "DistanceField";
-    case Method::Proxy:
-      return "Proxy";
-  }
-  return "?";
-}
-
 [[noreturn]] void throwPredicate(GeometryId a, GeometryId b) {
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(a, b) + ": contact predicates are not for Method::Proxy", a);
@@ -168,7 +150,7 @@ class Check {
     }
     const bool proximity = hasProximity(a.inStep(), b.inStep(), settings.thickness);
     need((m_method != Method::Proximity && m_method != Method::Proxy) || proximity,
-         std::string("Method::") + nameOf(m_method) + " needs a positive thickness; it is 0");
+         std::string("Method::") + toString(m_method) + " needs a positive thickness; it is 0");
     need(m_method != Method::Auto || proximity || hasContinuous(a.inStep(), b.inStep()),
          "Method::Auto needs a positive thickness if radii differ between vertices; it is 0");
   }
@@ -208,18 +190,18 @@ class Check {
          "Method::Proxy needs a positive allowedError; it is 0");
     need(method == Method::Auto || method == Method::Proxy || allowedError == 0.0,
          "allowedError is " + textOf(allowedError) +
-             "; only Auto and Proxy use it, so it must be 0 for Method::" + nameOf(method));
+             "; only Auto and Proxy use it, so it must be 0 for Method::" + toString(method));
     need(normalCone > 0.0 && normalCone <= kWidestNormalCone,
          "widestNormalCone is " + textOf(normalCone) + "; it must be above 0 and at most 1.5");
     need(method == Method::Auto || motionTolerance < 0.0,
          "motionTolerance is " + textOf(motionTolerance) +
-             "; only Method::Auto uses it, so it must be negative for Method::" + nameOf(method));
+             "; only Method::Auto uses it, so it must be negative for Method::" + toString(method));
   }
 
   void field(const Geometry& a, const Geometry& b, const PairSettings& settings) {
     support(m_method == Method::DistanceField,
             std::string("a distance field accepts only Method::DistanceField, not ") +
-                nameOf(m_method));
+                toString(m_method));
     support(&a != &b, "Method::DistanceField is not for a geometry with itself");
     support(!a.isField() || !b.isField(), "a pair of two distance fields is not supported");
     support(!a.shape && !b.shape, "a distance field with a shape is not supported");

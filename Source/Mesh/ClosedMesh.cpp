@@ -19,6 +19,12 @@ MeshDefects findMeshDefects(std::span<const Triangle> triangles) {
   std::sort(halfEdges.begin(), halfEdges.end(),
             [](const HalfEdge& l, const HalfEdge& r) { return l.edge < r.edge; });
   MeshDefects defects;
+  std::vector<std::uint32_t> vertices;
+  vertices.reserve(halfEdges.size());
+  for (const HalfEdge& h : halfEdges) vertices.push_back(h.edge[h.reversed]);  // where it begins
+  std::sort(vertices.begin(), vertices.end());
+  defects.unwelded =
+      vertices.size() > 3 && std::adjacent_find(vertices.begin(), vertices.end()) == vertices.end();
   for (auto first = halfEdges.begin(), last = first; first != halfEdges.end(); first = last) {
     last = std::find_if(first, halfEdges.end(),
                         [&](const HalfEdge& h) { return h.edge != first->edge; });

@@ -213,7 +213,10 @@ void checkInside(SearchableGeometry& body, InsideRule rule) {
               nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
                   describe(defects.open, "belong to one triangle only") +
                   describe(defects.flipped, "have the same direction in both of their triangles") +
-                  describe(defects.shared, "belong to three triangles or more"),
+                  describe(defects.shared, "belong to three triangles or more") +
+                  (defects.unwelded ? "; no two triangles share a vertex, as in an STL file, until "
+                                      "weld() joins equal positions"
+                                    : ""),
               body.id);
 }
 

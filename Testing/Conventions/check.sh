@@ -185,6 +185,21 @@ checkWords() {
   echo "Source has $lines lines of code, $(sourceFiles | xargs cat | wc -l) with comments and blanks"
 }
 
+# Every enumeration of the public headers, but ids, has toString() beside it, which returns the enumerators' names.
+checkEnumerations() {
+  local file name line
+  while read -r file; do
+    while read -r name; do
+      grep -qE "toString\(([A-Za-z]+::)?$name\)" "$file" || fault "$file: no toString($name)"
+    done < <(grep -E 'enum class' "$file" | grep -v '{};' | sed -E 's/.*enum class ([A-Za-z]+).*/\1/')
+  done < <(find Source -path '*Public*' -name '*.h' | sort)
+  while read -r line; do fault "toString() returns another name: $line"; done < <(
+    sourceFiles | xargs awk '
+      /^    case [A-Za-z0-9:]+:$/ { name = $2; sub(/:$/, "", name); sub(/.*:/, "", name); next }
+      name != "" && /^      return "/ && $0 != "      return \"" name "\";" { print FILENAME ": " name }
+      { name = "" }')
+}
+
 # Nothing prints and nothing exits, but an assertion that fails.
 checkQuiet() {
   local line

@@ -1,9 +1,9 @@
 #include "Vtk/MeshFile.h"
 
+#include <palpate/AnalyticalGeometry.h>
+#include <palpate/Types.h>
+
 #include <algorithm>
-#include <cstdint>
-#include <limits>
-#include <numeric>
 #include <vector>
 
 namespace palpate::vtk {
@@ -50,36 +50,19 @@ Polygons readStl(std::string_view content) {
   const std::vector<Eigen::Vector3d> corners =
       text ? readText(FileText(content)) : readBinary(FileText(content, Encoding::LittleEndian));
   Polygons polygons;
-  const auto bad = std::find_if_not(corners.begin(), corners.end(),
-                                    [](const Eigen::Vector3d& p) { return p.allFinite(); });
+  const bool areGood = std::all_of(corners.begin(), corners.end(), [](const Eigen::Vector3d& p) {
+    return p.cwiseAbs().maxCoeff() <= kLargestMeasure && p.allFinite();
+  });
   // The checks of all formats refuse these positions.
-  if (bad != corners.end()) {
+  if (!areGood) {
     for (const Eigen::Vector3d& p : corners) polygons.addPosition(p);
     return polygons;
   }
-  // Equal corners become neighbours, the first one of the file in front.
-  if (corners.size() > std::numeric_limits<std::uint32_t>::max())
-    throw FileFault{"it has too many vertices"};
-  std::vector<std::uint32_t> order(corners.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto isLess = [&](std::uint32_t i, std::uint32_t j) {
-    const Eigen::Vector3d &p = corners[i], &q = corners[j];
-    for (int k = 0; k < 3; ++k)
-      if (p[k] != q[k]) return p[k] < q[k];
-    return i < j;
-  };
-  std::sort(order.begin(), order.end(), isLess);
-  std::vector<std::uint32_t> firstOf(corners.size()), vertexOf(corners.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool isNew = i == 0 || corners[order[i]] != corners[order[i - 1]];
-    firstOf[order[i]] = isNew ? order[i] : firstOf[order[i - 1]];
-  }
+  if (corners.size() >= kNoElement) throw FileFault{"it has too many vertices"};
+  const Welded welded = weld(corners, {});
+  for (const Eigen::Vector3d& p : welded.positions) polygons.addPosition(p);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (firstOf[i] == i) {
-      vertexOf[i] = static_cast<std::uint32_t>(polygons.positionCount());
-      polygons.addPosition(corners[i]);
-    }
-    polygons.addCorner(vertexOf[firstOf[i]]);
+    polygons.addCorner(welded.vertexOf[i]);
     if (i % 3 == 2) polygons.endCell(false);
   }
   if (polygons.hasOpenCell()) polygons.endCell(false);  // refuses it

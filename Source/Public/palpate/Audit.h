@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Export.h>
 #include <palpate/CollisionData.h>
 #include <palpate/Types.h>
 
@@ -42,5 +43,7 @@ struct AuditFailure {
   std::filesystem::path file{};      ///< Capture of the pair's frame; empty: not written.
   std::string fileError{};           ///< Why the capture was not written, with its name.
 };
+PALPATE_EXPORT const char* toString(AuditFailure::Fault) noexcept;  ///< its name, or "unknown"
+PALPATE_EXPORT const char* toString(AuditFailure::List) noexcept;   ///< its name, or "unknown"
 
 }  // namespace palpate

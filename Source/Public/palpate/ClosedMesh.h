@@ -20,8 +20,17 @@ struct MeshDefects {
   std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
   std::vector<Segment> flipped;  ///< edges that both triangles traverse in the same direction
   std::vector<Segment> shared;   ///< edges of three triangles or more
+  /// Whether there are two triangles or more, and no two share a vertex, as in an STL file. weld()
+  /// joins them.
+  bool unwelded = false;
+  /// Whether the mesh is closed, and its triangles are wound inward: its volume is negative by more
+  /// than rounding. findMeshDefects() of positions only.
+  bool insideOut = false;
+  /// Pairs of triangles of different parts that intersect or touch. A part is a set of triangles
+  /// connected by vertices. findMeshDefects() of positions only, and empty if unwelded.
+  std::vector<ElementPair> overlapping;
 
-  /// Whether the mesh has no defects.
+  /// Whether no edge is at fault.
   bool closed() const { return open.empty() && flipped.empty() && shared.empty(); }
 };
 
@@ -29,6 +38,9 @@ struct MeshDefects {
 /// place are two vertices. A triangle that names a vertex twice has no edges.
 /// Errors   none.
 PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
+/// Also finds the defects that positions show.
+/// Errors   as OctreeBasedCD::addTriangleMesh(); messages name the mesh geometry 0.
+PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 
 /// Which points are inside a body.
 enum class InsideRule {
@@ -41,6 +53,7 @@ enum class InsideRule {
   /// For a closed body the rule finds the same vertices as Closed.
   WindingNumber
 };
+PALPATE_EXPORT const char* toString(InsideRule) noexcept;  ///< its name, or "unknown"
 
 /// Values out of range throw InvalidSettings.
 struct InsideSettings {

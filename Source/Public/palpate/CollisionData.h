@@ -87,6 +87,7 @@ struct EdgeEdgeContact {
 
 /// The type of feature that touches an analytical shape or a distance field.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
+PALPATE_EXPORT const char* toString(ShapeElement) noexcept;  ///< its name, or "unknown"
 
 /// A contact of a vertex, edge or triangle with an analytical shape, or with a body by
 /// Method::DistanceField or Method::Proxy. All values are those at timeOfImpact.

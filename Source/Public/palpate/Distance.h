@@ -19,9 +19,11 @@ enum class TriangleFeature : std::uint8_t {
   EdgeCA,
   Face
 };
+PALPATE_EXPORT const char* toString(TriangleFeature) noexcept;  ///< its name, or "unknown"
 
 /// The part of an edge that holds a point.
 enum class EdgeFeature : std::uint8_t { Start, End, Interior };
+PALPATE_EXPORT const char* toString(EdgeFeature) noexcept;  ///< its name, or "unknown"
 
 /// The result of vertexTriangleDistance().
 struct VertexTriangleDistance {

@@ -36,6 +36,7 @@ enum class ErrorCode {
   MemoryLimit,        ///< The answer needs more memory than the limit that you set.
   Cancelled,          ///< A progress callback returned false.
 };
+PALPATE_EXPORT const char* toString(ErrorCode) noexcept;  ///< its name, or "unknown"
 
 /// The exception that the library throws for an invalid call. what() is a sentence that names the
 /// geometry, the element and the value at fault. The call leaves the object unchanged.

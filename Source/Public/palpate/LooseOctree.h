@@ -88,5 +88,6 @@ class PALPATE_EXPORT LooseOctree {
  private:
   std::shared_ptr<const State> m_state;
 };
+PALPATE_EXPORT const char* toString(LooseOctree::Update) noexcept;  ///< its name, or "unknown"
 
 }  // namespace palpate

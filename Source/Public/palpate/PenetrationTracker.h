@@ -23,6 +23,7 @@ enum class DirectionChange {
   /// leaves the body within the allowed depth.
   Jumped
 };
+PALPATE_EXPORT const char* toString(DirectionChange) noexcept;  ///< its name, or "unknown"
 
 /// A vertex inside a body with a penetration direction that is stable over time. From step to step
 /// the direction turns no further than motion explains, unless `change` is Jumped or Entered.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Export.h>
 #include <palpate/Executor.h>
 
 #include <array>
@@ -16,6 +17,7 @@ enum class OctreeUpdate {
   Auto,    ///< keep the tree and refit its boxes while they stay tight, else rebuild the tree
   Rebuild  ///< rebuild the tree from sorted keys in every update
 };
+PALPATE_EXPORT const char* toString(OctreeUpdate) noexcept;  ///< its name, or "unknown"
 
 /// By what the octree of a body that setTransform() places bounds its elements and nodes. Contacts
 /// do not depend on it.
@@ -24,6 +26,7 @@ enum class OctreeBounds {
   Dop14,  ///< boxes cut along 4 further directions, the diagonals of a cube
   Dop18   ///< boxes cut along 6 further directions, the diagonals of a cube's faces
 };
+PALPATE_EXPORT const char* toString(OctreeBounds) noexcept;  ///< its name, or "unknown"
 
 struct OctreeSettings {
   /// Deepest level, in [1, 60]; the root has level 0. The library does not split cells of this
@@ -45,6 +48,7 @@ enum class Engine {
   Octree,     ///< pooled loose octrees
   BruteForce  ///< every element against every other: the reference for tests, and very slow
 };
+PALPATE_EXPORT const char* toString(Engine) noexcept;  ///< its name, or "unknown"
 
 /// The audit: a check of the library by itself, in any build. After each detectCollision() it tests
 /// a sample of features against the whole other geometry, without an octree.
@@ -123,6 +127,7 @@ enum class Method {
   /// Source   octree proxies: Fan et al. (2013). The proof of the error: Docs/SurfaceProxies.md.
   Proxy
 };
+PALPATE_EXPORT const char* toString(Method) noexcept;  ///< its name, or "unknown"
 
 /// Which of several contacts at the same features the library reports.
 enum class Contacts {
@@ -139,6 +144,7 @@ enum class Contacts {
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };
+PALPATE_EXPORT const char* toString(Contacts) noexcept;  ///< its name, or "unknown"
 
 /// How one pair is tested. Docs/SupportMatrix.md lists which methods use which settings. A setting
 /// that a method refuses, or a value outside its range, throws InvalidSettings.
@@ -207,6 +213,7 @@ enum class Sidedness {
   /// shapes, are never dropped.
   Outer
 };
+PALPATE_EXPORT const char* toString(Sidedness) noexcept;  ///< its name, or "unknown"
 
 /// Which pairs a geometry takes part in, and from which sides.
 struct CollisionFilter {
@@ -225,6 +232,7 @@ struct ContactFeatures {
   /// The index of a vertex or triangle, twice; or the two vertices of an edge, lower first.
   std::array<std::uint32_t, 2> a, b;
 };
+PALPATE_EXPORT const char* toString(ContactFeatures::Kind) noexcept;  ///< its name, or "unknown"
 
 /// Returns whether two features may be a contact. The library calls it only for features that are
 /// near enough, once or several times each. A call does not mean that the features are a contact.

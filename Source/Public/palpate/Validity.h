@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Export.h>
 #include <palpate/Settings.h>
 
 #include <cstddef>
@@ -31,6 +32,7 @@ enum class MethodReason {
   /// particles for which this is not proven. Otherwise the reason is that of the exact method.
   AllowedError
 };
+PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "unknown"
 
 /// Whether the last answer for one pair can be trusted, and what the library knows about the step.
 /// Each method relies on conditions, and each detectCollision() checks them. Docs/HowTo/Validity.md

@@ -1,0 +1,83 @@
+#include <palpate/ClosedMesh.h>
+#include <palpate/OctreeBasedCD.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+// findMeshDefects() with positions. It is here, because it runs a detection.
+namespace palpate {
+
+using Eigen::Vector3d;
+
+namespace {
+
+bool namesTwice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+/// For each vertex, the lowest vertex that triangles connect it with.
+std::vector<std::uint32_t> partsOf(const TriangleMeshView& mesh) {
+  std::vector<std::uint32_t> parents(mesh.positions.size());
+  std::iota(parents.begin(), parents.end(), 0u);
+  const auto partOf = [&](std::uint32_t v) {
+    while (parents[v] != v) v = parents[v] = parents[parents[v]];
+    return v;
+  };
+  for (const Triangle& t : mesh.triangles) {
+    if (namesTwice(t)) continue;
+    for (const std::uint32_t v : {t[1], t[2]}) {
+      const auto [low, high] = std::minmax({partOf(t[0]), partOf(v)});
+      parents[high] = low;
+    }
+  }
+  for (std::uint32_t v = 0; v < parents.size(); ++v) parents[v] = partOf(v);
+  return parents;
+}
+
+/// Whether the volume is negative by more than rounding. Each term has an error below 16 u of its
+/// magnitudes, and the sum one of u for each term.
+bool hasNegativeVolume(const TriangleMeshView& mesh) {
+  if (mesh.triangles.empty()) return false;
+  const Vector3d origin = mesh.positions[mesh.triangles[0][0]];
+  double largest = 0.0;
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t v : t)
+      largest = std::max(largest, (mesh.positions[v] - origin).cwiseAbs().maxCoeff());
+  if (!(largest > 0.0)) return false;
+  const double unit = std::exp2(-std::ilogb(largest));  // so that no product is out of range
+  double volume = 0.0, magnitude = 0.0;
+  for (const auto& [p, q, r] : mesh.triangles) {
+    const Vector3d a = unit * (mesh.positions[p] - origin), b = unit * (mesh.positions[q] - origin),
+                   c = unit * (mesh.positions[r] - origin);
+    volume += a.dot(b.cross(c));
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      magnitude += std::abs(a[k]) * (std::abs(b[i] * c[j]) + std::abs(b[j] * c[i]));
+    }
+  }
+  const double error =
+      (16.0 + static_cast<double>(mesh.triangles.size())) * 0x1p-52 * std::max(magnitude, 0x1p-900);
+  return volume < -error;
+}
+
+}  // namespace
+
+MeshDefects findMeshDefects(const TriangleMeshView& mesh) {
+  Settings settings;
+  settings.threads = 1;
+  OctreeBasedCD collisions(settings);  // refuses what is no mesh
+  const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  MeshDefects defects = findMeshDefects(mesh.triangles);
+  if (defects.unwelded) return defects;
+  defects.insideOut = defects.closed() && hasNegativeVolume(mesh);
+  const std::vector<std::uint32_t> parts = partsOf(mesh);
+  collisions.addCollisionPair(id, id, {Method::Intersection, 0.0});
+  collisions.detectCollision();
+  for (const ElementPair& pair : collisions.collisionData(id, id).intersectingTriangles())
+    if (parts[mesh.triangles[pair.a][0]] != parts[mesh.triangles[pair.b][0]])
+      defects.overlapping.push_back(pair);
+  return defects;
+}
+
+}  // namespace palpate
