@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -42,12 +43,33 @@ std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
   return {reinterpret_cast<const Eigen::Vector3d*>(&array[0]), size};
 }
 
+/// A copy of positions in floats or doubles, such as those of a vertex buffer for drawing.
+/// numbers  position i begins at numbers[i * stride]
+/// Errors   WrongPositionCount if a position is not whole, and InvalidSettings for a stride below 3.
+template <class Real>
+std::vector<Eigen::Vector3d> copyPositions(std::span<const Real> numbers, std::size_t stride = 3) {
+  static_assert(std::is_floating_point_v<Real>);
+  if (stride < 3)
+    throw Error(ErrorCode::InvalidSettings,
+                "The stride is " + std::to_string(stride) + "; it must be at least 3.");
+  const std::size_t rest = numbers.size() % stride;
+  if (rest == 1 || rest == 2)
+    throw Error(ErrorCode::WrongPositionCount,
+                std::to_string(numbers.size()) + " numbers with a stride of " +
+                    std::to_string(stride) + " are no whole number of positions.");
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(numbers.size() / stride + 1);
+  for (std::size_t i = 0; i + 3 <= numbers.size(); i += stride)
+    positions.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  return positions;
+}
+
 /// A copy of the elements of an array, with N vertices each: 2 for a Segment, 3 for a Triangle, 4
 /// for a Tetrahedron.
-/// Needs    an array with size() and operator[]. Its items are integers, N for each element, or
-///          have an operator[] themselves.
-/// Errors   IndexOutOfRange names the first element with a negative index, and WrongPositionCount a
-///          number of integers that is no multiple of N.
+/// Needs    an array with size() and operator[], such as a std::span. Its items are integers of any
+///          width, N for each element, or have an operator[] themselves.
+/// Errors   IndexOutOfRange names the first element with an index that is negative or beyond 32
+///          bits, and WrongPositionCount a number of integers that is no multiple of N.
 template <std::size_t N, class Array>
 std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
   constexpr bool kIsFlat = std::is_integral_v<std::remove_cvref_t<decltype(array[0])>>;
@@ -63,12 +85,13 @@ std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
   for (std::size_t i = 0; i < size; ++i) {
     std::array<std::uint32_t, N> element;
     for (std::size_t corner = 0; corner < N; ++corner) {
-      long long index;
-      if constexpr (kIsFlat)
-        index = static_cast<long long>(array[N * i + corner]);
-      else
-        index = static_cast<long long>(array[static_cast<int>(i)][static_cast<int>(corner)]);
-      if (index < 0)
+      const auto index = [&] {
+        if constexpr (kIsFlat)
+          return array[N * i + corner];
+        else
+          return array[static_cast<int>(i)][static_cast<int>(corner)];
+      }();
+      if (!std::in_range<std::uint32_t>(index))
         throw Error(
             ErrorCode::IndexOutOfRange,
             "Element " + std::to_string(i) + " has the index " + std::to_string(index) + ".", {},
@@ -78,6 +101,18 @@ std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
     elements.push_back(element);
   }
   return elements;
+}
+
+/// The triangles of quads: (a, b, c) and (a, c, d) of each quad (a, b, c, d), in their order.
+/// Needs, Errors   as elementsOf<4>()
+template <class Array>
+std::vector<std::array<std::uint32_t, 3>> trianglesOfQuads(const Array& array) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const auto& [a, b, c, d] : elementsOf<4>(array)) {
+    triangles.push_back({a, b, c});
+    triangles.push_back({a, c, d});
+  }
+  return triangles;
 }
 
 /// The cell types of a simulator, for appendCells().

@@ -130,6 +130,37 @@ TEST(ArrayAdapter, CellsOfSegmentsAndPointsAreNotTriangles) {
   }
 }
 
+/// A vertex buffer for drawing: floats, with normals between the positions.
+TEST(ArrayAdapter, CopiesPositionsWithAStride) {
+  const std::vector<float> buffer{0, 1, 2, 9, 9, 9, 3, 4, 5.5f, 9, 9, 9};
+  const std::vector<Vector3d> expected{{0, 1, 2}, {3, 4, 5.5}};
+  const std::span<const float> numbers(buffer);
+  EXPECT_EQ(copyPositions(numbers, 6), expected);
+  EXPECT_EQ(copyPositions(numbers.first(9), 6), expected);  // the last position ends the buffer
+  EXPECT_EQ(copyPositions(numbers.subspan(1), 6).front(), Vector3d(1, 2, 9));
+  EXPECT_EQ(copyPositions(numbers).size(), 4u);
+  EXPECT_TRUE(copyPositions(std::span<const double>()).empty());
+  expectRefused(ErrorCode::WrongPositionCount, "8 numbers with a stride of 6",
+                [&] { copyPositions(numbers.first(8), 6); });
+  expectRefused(ErrorCode::InvalidSettings, "The stride is 2", [&] { copyPositions(numbers, 2); });
+}
+
+TEST(ArrayAdapter, TakesIndicesOfAnyWidthAndQuads) {
+  const std::vector<std::uint16_t> narrow{0, 1, 65535, 2, 1, 0};
+  const std::vector<Triangle> expected{{0, 1, 65535}, {2, 1, 0}};
+  EXPECT_EQ(elementsOf<3>(std::span<const std::uint16_t>(narrow)), expected);
+  const std::vector<std::int64_t> wide(narrow.begin(), narrow.end());
+  EXPECT_EQ(elementsOf<3>(std::span(wide)), expected);
+  const std::vector<Tetrahedron> quads{{0, 1, 2, 3}, {3, 2, 4, 5}};
+  const std::vector<Triangle> halves{{0, 1, 2}, {0, 2, 3}, {3, 2, 4}, {3, 4, 5}};
+  EXPECT_EQ(trianglesOfQuads(std::span(quads)), halves);
+  const std::vector<std::uint32_t> flat{0, 1, 2, 3, 3, 2, 4, 5};
+  EXPECT_EQ(trianglesOfQuads(std::span(flat)), halves);
+  const std::vector<std::uint64_t> beyond{0, 1, 2, 0, 1, std::uint64_t{1} << 32};
+  expectRefused(ErrorCode::IndexOutOfRange, "Element 1 has the index 4294967296",
+                [&] { elementsOf<3>(std::span(beyond)); });
+}
+
 TEST(ArrayAdapter, RefusesNegativeIndices) {
   VecArray<int, 2> segments;
   segments.push_back({0, 1});
