@@ -463,7 +463,7 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
   m_nodePairs.clear();
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
-    if (record->pair.settings.method == Method::DistanceField || record->usesField()) {
+    if (record->usesField()) {
       if (adjacentPairs) startField(*record, threads);
       continue;
     }
@@ -727,7 +727,8 @@ void Frame::findMissedIntersections(const Threads& threads) {
 /// Returns the number of preferred buffers.
 std::size_t Frame::preferBodies(PairRecord& record, Engine engine, std::size_t preferred) {
   record.byBodies = false;
-  if (record.pair.settings.method != Method::Auto || record.hasShape()) return preferred;
+  if (record.pair.settings.method != Method::Auto || record.hasShape() || record.needsField())
+    return preferred;
   if (!m_bodies) m_bodies = std::make_unique<BodyContacts>();
   const BodyContacts::Buffers all(m_buffers);
   const bool byIntersection = record.plan.method == Method::Intersection;

@@ -143,8 +143,8 @@ struct OctreeBasedCD::Implementation {
     Stopwatch watch;
     for (const auto& record : records) {
       const Method method = record->pair.settings.method;
-      const bool moves = (detecting || method == Method::Auto) && method != Method::Proxy &&
-                         method != Method::DistanceField;
+      const bool moves =
+          (detecting || method == Method::Auto) && method != Method::Proxy && !record->needsField();
       if (moves)
         for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
       record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);

@@ -199,8 +199,8 @@ class Check {
   }
 
   void field(const Geometry& a, const Geometry& b, const PairSettings& settings) {
-    support(m_method == Method::DistanceField,
-            std::string("a distance field accepts only Method::DistanceField, not ") +
+    support(m_method == Method::DistanceField || m_method == Method::Auto,
+            std::string("a distance field accepts only Auto and Method::DistanceField, not ") +
                 toString(m_method));
     support(&a != &b, "Method::DistanceField is not for a geometry with itself");
     support(!a.isField() || !b.isField(), "a pair of two distance fields is not supported");
@@ -355,7 +355,7 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
                 nameOf(a, b) +
                     ": contact predicates are for pairs of meshes, and one of the two is a shape",
                 a);
-  if (predicate && record.pair.settings.method == Method::DistanceField)
+  if (predicate && record.needsField())
     throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();

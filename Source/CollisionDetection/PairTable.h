@@ -80,14 +80,16 @@ struct PairRecord : CountedObject {
   void releaseMemory();  ///< keeps the result, and candidates that are valid
 
   bool hasShape() const { return a->shape || b->shape; }
+  /// Whether a distance field answers in every frame.
+  bool needsField() const {
+    return pair.settings.method == Method::DistanceField || a->isField() || b->isField();
+  }
   bool usesProxy() const { return pair.settings.method == Method::Proxy; }
   /// Auto: whether the settings allow the leaves that are attached to b.
   bool mayUseProxy() const;
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
   /// ask for candidates.
-  bool hasCandidates() const {
-    return !hasShape() && !usesProxy() && pair.settings.method != Method::DistanceField;
-  }
+  bool hasCandidates() const { return !hasShape() && !usesProxy() && !needsField(); }
   /// Makes `proxy` for the body and the settings if it is another one, or takes that of `others`.
   /// Returns whether leaves were built.
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);

@@ -69,6 +69,14 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     plan.arcDeviation = a.arcDeviation + b.arcDeviation;
   }
   if (settings.method == Method::DistanceField) return plan;
+  const auto isField = [](const GeometryInStep& each) {
+    return each.mesh.topology.type == GeometryType::Field;
+  };
+  if (isField(a) || isField(b)) {
+    plan.method = Method::DistanceField;
+    plan.reason = MethodReason::NoAlternative;
+    return plan;
+  }
   if (!haveTriangles(a, b)) {
     if (settings.method == Method::Auto) chooseMethod(settings, a, b, plan);
     if (plan.method == Method::Proximity)
@@ -116,7 +124,8 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
                                     const GeometryInStep& b, const PairPlan& exact) {
   const GeometryInStep& body = bodyWithField(a, b);
   const GeometryInStep& other = &body == &b ? a : b;
-  if (settings.method != Method::Auto || !body.field || &a.mesh == &b.mesh || other.isShape ||
+  if (settings.method != Method::Auto || exact.method == Method::DistanceField || !body.field ||
+      &a.mesh == &b.mesh || other.isShape ||
       !(settings.allowedError > 0.0 && body.field->errorBound() <= settings.allowedError))
     return {};
   // A field knows only sides of its own.

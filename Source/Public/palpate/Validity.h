@@ -25,7 +25,8 @@ enum class MethodReason {
   Cheapest,
   /// The pair has lines, points or shapes, and no other method answers it as well. Continuous, if
   /// features move, or if Proximity would need a thickness or a radius. Proximity, if Continuous
-  /// does not answer the pair: then impacts within the step may be missing.
+  /// does not answer the pair: then impacts within the step may be missing. DistanceField, if one
+  /// of the two is a geometry of addDistanceField().
   NoAlternative,
   /// An attached DistanceField or proxy is within PairSettings::allowedError, and proves that
   /// nothing touched in the step: DistanceField or Proxy. With Proxy, the exact method answers

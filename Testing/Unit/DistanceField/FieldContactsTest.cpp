@@ -394,6 +394,43 @@ TEST(FieldContacts, ByAutoWhereTheErrorIsAllowedAndNothingMoves) {
   EXPECT_EQ(methodFor(kErrorBound).method, Method::Proximity);
 }
 
+/// No other method answers an added field: Auto has the contacts of Method::DistanceField.
+TEST(FieldContacts, ByAutoOfAnAddedField) {
+  const Mesh mesh = sphere(12, 16, {1.0, 0, 0}, 0.35);
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    std::vector<std::uint64_t> hashes;
+    for (const Method method : {Method::DistanceField, Method::Auto}) {
+      OctreeBasedCD detection(Settings{.engine = engine, .threads = 1});
+      const GeometryId field = detection.addDistanceField(bodyField()),
+                       other = detection.addTriangleMesh(mesh.positions, mesh.triangles),
+                       points = detection.addPointSet(mesh.positions, 0.05);
+      const PairSettings settings{.method = method, .thickness = 0.1};
+      detection.addCollisionPair(other, field, settings);
+      detection.addCollisionPair(field, points, settings);
+      for (const double height : {0.6, 0.5, -0.55}) {
+        std::vector<Vector3d> positions = mesh.positions;
+        for (Vector3d& p : positions) p.z() += height;
+        detection.setPositions(other, positions);
+        detection.setPositions(points, positions);
+        detection.detectCollision();
+        for (const auto& [a, b] : {std::pair(other, field), std::pair(field, points)}) {
+          const CollisionData& data = detection.collisionData(a, b);
+          EXPECT_EQ(data.validity().method, Method::DistanceField);
+          EXPECT_EQ(data.validity().reason,
+                    method == Method::Auto ? MethodReason::NoAlternative : MethodReason::Requested);
+          EXPECT_FALSE(data.validity().trusted);
+          EXPECT_EQ(detection.pairSettings(a, b).method, method);
+          hashes.push_back(data.hash());
+        }
+        EXPECT_GT(detection.statistics().contacts, 0u);
+        detection.advance();
+      }
+    }
+    const auto half = hashes.begin() + static_cast<std::ptrdiff_t>(hashes.size() / 2);
+    EXPECT_TRUE(std::equal(hashes.begin(), half, half, hashes.end()));
+  }
+}
+
 TEST(FieldContacts, RefuseWhatTheyDoNotSupport) {
   const Mesh mesh = sphere(8, 10, {0, 0, 0}, 0.5);
   OctreeBasedCD detection(Settings{.threads = 1});
@@ -411,8 +448,9 @@ TEST(FieldContacts, RefuseWhatTheyDoNotSupport) {
   const ErrorCode unsupported = ErrorCode::UnsupportedMethod, invalid = ErrorCode::InvalidSettings;
   expectRefused(invalid, "geometry 7: the field is null",
                 [&] { detection.addDistanceField(nullptr); });
-  expectRefused(unsupported, "accepts only Method::DistanceField, not Auto",
-                add(other, field, {.thickness = 0.1}));
+  expectRefused(unsupported, "accepts only Auto and Method::DistanceField, not Proximity",
+                add(other, field, {.method = Method::Proximity, .thickness = 0.1}));
+  expectRefused(invalid, "less than the band", add(other, field, {.thickness = 0.39}));
   expectRefused(unsupported, "two distance fields", add(field, second, byField()));
   expectRefused(unsupported, "with a shape", add(field, shape, byField()));
   expectRefused(unsupported, "with itself", add(field, field, byField()));
