@@ -664,10 +664,16 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     const Job& job = *m_jobs[i];
     all += job.milliseconds;
     narrow += job.narrowMilliseconds;
+    const std::size_t exact = job.contacts.exactDecisions + job.intersections.exactDecisions;
     statistics.candidatePairs += job.sink.total();
     statistics.featurePairs += job.contacts.featurePairs;
-    statistics.exactDecisions += job.contacts.exactDecisions + job.intersections.exactDecisions;
+    statistics.exactDecisions += exact;
     statistics.validityPairs += job.intersections.validityPairs;
+    PairStatistics& ofPair = job.record->statistics;
+    ofPair.milliseconds += job.milliseconds;
+    ofPair.candidatePairs += job.sink.total();
+    ofPair.featurePairs += job.contacts.featurePairs;
+    ofPair.exactDecisions += exact;
   }
   // Threads work on both stages at once. The wall-clock time is therefore divided in proportion to
   // the work of each stage.
@@ -694,9 +700,13 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
     const auto jobs = std::span(m_jobs).subspan(first, i - first);
     if (record->usesProxy()) writeProxyContacts(jobs, threads, *record);
     if (record->plan.byProxy) describeProxy(jobs, *record);
+    const std::size_t exact = statistics.exactDecisions;
     finish(*record, nearby, false, settings, statistics);
+    const double spent = watch.lap();
+    record->statistics.milliseconds += spent;
+    record->statistics.exactDecisions += statistics.exactDecisions - exact;
+    statistics.milliseconds.order += spent;
   }
-  statistics.milliseconds.order = watch.lap();
 }
 
 /// Repeats jobs in which some batches ran before the step was known to start intersecting. This is
@@ -812,6 +822,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
                                FrameStatistics& statistics) {
   for (PairRecord* record : records) {
     Stopwatch watch;
+    const FrameStatistics before = statistics;
     ContactBuffers contacts, intersections;
     m_buffers = {&contacts};
     m_jobCount = 0;
@@ -846,6 +857,9 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Setti
     m_intersections = {&intersections};
     finish(*record, true, true, settings, statistics);
     statistics.milliseconds.order += watch.lap();
+    record->statistics.milliseconds = statistics.milliseconds.total() - before.milliseconds.total();
+    record->statistics.featurePairs = statistics.featurePairs - before.featurePairs;
+    record->statistics.exactDecisions = statistics.exactDecisions - before.exactDecisions;
   }
 }
 

@@ -295,6 +295,7 @@ struct OctreeBasedCD::Implementation {
       if (!settings.keepCandidates) record->useField(settings.engine);
     FrameStatistics next = updates;
     const auto records = outdatedPairs(&PairRecord::dataVersion);
+    for (const auto& record : pairs.records()) record->statistics = {};
     for (PairRecord* record : records)
       record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
                           record->plan);
@@ -310,7 +311,8 @@ struct OctreeBasedCD::Implementation {
       if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
         record->commitEmpty(settings.keepCandidates);
       const CollisionData& data = record->data;
-      next.contacts += data.validity().atImpact + data.validity().atEnd;
+      record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
+      next.contacts += record->statistics.contacts;
       next.intersectingTriangles += data.intersectingTriangles().size();
     }
     for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->mesh);
@@ -647,6 +649,11 @@ std::span<const CollisionPair> OctreeBasedCD::pairs() const { return read().pair
 const PairSettings& OctreeBasedCD::pairSettings(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
   return all.pairs.inOrder(all.geometries, a, b).pair.settings;
+}
+
+PairStatistics OctreeBasedCD::pairStatistics(GeometryId a, GeometryId b) const {
+  const Implementation& all = read();
+  return all.pairs.at(all.geometries, a, b).statistics;
 }
 
 bool OctreeBasedCD::contains(GeometryId geometry) const {

@@ -111,6 +111,7 @@ struct PairRecord : CountedObject {
   bool byBodies = false;           ///< whether BodyContacts changed the last answer
   std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
   std::size_t candidateCount = 0;  ///< number of candidates when last found
+  PairStatistics statistics;       ///< of the last detection
   std::unique_ptr<FieldScratch> fieldScratch;
   Buffer<ElementPair> candidates;  ///< unsorted until candidatePairs() is called
   Derived candidatesVersion;

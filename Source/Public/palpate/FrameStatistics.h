@@ -55,4 +55,14 @@ struct FrameStatistics {
   MemoryUse peakMemory;
 };
 
+/// Time and counts of one pair in the last detectCollision(). All but `contacts` are 0 for a pair
+/// whose answer still holds, because nothing changed.
+struct PairStatistics {
+  /// Of all threads together: the search for candidates, the narrow phase and the order. Not the
+  /// octrees, which pairs share.
+  double milliseconds = 0;
+  std::size_t candidatePairs = 0, featurePairs = 0, exactDecisions = 0;  ///< as FrameStatistics
+  std::size_t contacts = 0;                                              ///< in all lists
+};
+
 }  // namespace palpate

@@ -374,6 +374,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Times and counts of the last detectCollision() or collectCandidates() with the updates before
   /// it, or of a later update(). queries() does not change them.
   const FrameStatistics& statistics() const;
+  /// Time and counts of one pair in the last detectCollision(). (a, b) may be in either order.
+  ///
+  /// Errors   UnknownPair.
+  PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
   const Settings& settings() const;
   /// The differences that the audit (Settings::audit) found between the last detectCollision() and
   /// brute force. They are faults of this library; the audit finds those in its sample of features.

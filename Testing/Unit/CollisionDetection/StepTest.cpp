@@ -1,7 +1,10 @@
 #include <palpate/CollisionProblem.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
+#include "Common/PairRun.h"
 #include "Common/QueryCalls.h"
+#include "Common/RandomMeshes.h"
 
 #include <gtest/gtest.h>
 
@@ -279,6 +282,43 @@ ErrorCode codeOf(const std::function<void()>& call) {
   }
   ADD_FAILURE() << "nothing was thrown";
   return {};
+}
+
+TEST(PairStatistics, AddUpToThoseOfTheFrame) {
+  const testing::Mesh ball = testing::sphere(12, 16, {0.5, 0.5, 0.3}, 0.3),
+                      ground = testing::sheet(12, 0.0, 0.0);
+  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
+    OctreeBasedCD collisions(testing::settingsOf(engine, 2));
+    const GeometryId a = collisions.addTriangleMesh(ball.positions, ball.triangles),
+                     b = collisions.addTriangleMesh(ground.positions, ground.triangles),
+                     tool = collisions.addAnalyticalGeometry(Sphere{{0.5, 0.5, 0.1}, 0.1});
+    collisions.addCollisionPair(a, b, {.thickness = 0.05});
+    collisions.addCollisionPair(tool, b, {.thickness = 0.05});
+    EXPECT_EQ(collisions.pairStatistics(a, b).contacts, 0u);
+    collisions.detectCollision();
+    const PairStatistics first = collisions.pairStatistics(a, b),
+                         second = collisions.pairStatistics(b, tool);
+    const FrameStatistics& frame = collisions.statistics();
+    EXPECT_EQ(first.candidatePairs + second.candidatePairs, frame.candidatePairs);
+    EXPECT_EQ(first.featurePairs + second.featurePairs, frame.featurePairs);
+    EXPECT_EQ(first.exactDecisions + second.exactDecisions, frame.exactDecisions);
+    EXPECT_EQ(first.contacts + second.contacts, frame.contacts);
+    EXPECT_GT(first.contacts, 0u);
+    EXPECT_GT(second.contacts, 0u);
+    EXPECT_GT(first.milliseconds, 0.0);
+    EXPECT_GT(second.milliseconds, 0.0);
+
+    // The answer of the mesh, which does not move, still holds.
+    collisions.advance();
+    collisions.detectCollision();
+    collisions.setTransform(tool, Eigen::Matrix3d::Identity(), {0.1, 0, 0});
+    collisions.detectCollision();
+    EXPECT_EQ(collisions.pairStatistics(a, b).milliseconds, 0.0);
+    EXPECT_EQ(collisions.pairStatistics(a, b).contacts, first.contacts);
+    EXPECT_GT(collisions.pairStatistics(tool, b).milliseconds, 0.0);
+    testing::expectRefused(ErrorCode::UnknownPair, "pair (0, 2) was never added",
+                           [&] { collisions.pairStatistics(a, tool); });
+  }
 }
 
 TEST_F(Step, HasNoContactsBeforeADetection) {
