@@ -691,7 +691,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   EXPECT_FALSE(collisions.collisionData(tool, points).validity().trusted);
   const Matrix3d one = Matrix3d::Identity();
   Matrix3d turned = one;
-  turned(0, 1) = 2e-9;
+  turned(0, 1) = 2e-5;
   expectRefused(Code::InvalidTransform, "geometry 0: rotation is not a rotation", [&] {
     collisions.setTransform(tool, turned, {0, 0, 0});
   });
