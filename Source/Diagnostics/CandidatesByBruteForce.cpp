@@ -28,7 +28,7 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out
   out.clear();
   for (std::uint32_t s = 0; s < boxesA.size(); ++s)
     for (std::uint32_t t = meshes.self() ? s + 1 : 0; t < boxesB.size(); ++t)
-      if (overlap(boxesA[s], boxesB[t], thickness) && !(meshes.self() && adjacent(s, t)) &&
+      if (mayBeWithin(boxesA[s], boxesB[t], thickness) && !(meshes.self() && adjacent(s, t)) &&
           meshes.a.topology.isEnabled(s) && meshes.b.topology.isEnabled(t))
         out.push_back({s, t});
 }

@@ -47,6 +47,9 @@ constexpr double kAccurateCrossLoss = 0x1p-101;
 /// by 2^-49 of the size (edgeEdgeDistance()). The gap, the sum of thickness and radii, and the
 /// subtraction of radii add less than 2^-50 of size and thickness.
 constexpr double kBoxGapError = 0x1p-48;
+/// Relative to the thickness: boxes in float never miss a gap that is more than it by this, so that
+/// they find all pairs that boxes in double do (setShift()).
+constexpr double kFloatBoxGap = 0x1p-26;
 
 // ---- Impacts (RelativeMotion.cpp, FindTouch.cpp, FindApproach.cpp, ImpactFilter.cpp) ----
 

@@ -23,7 +23,8 @@ bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double 
 
 bool mayBeWithin(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness) {
   const double size = (a.max().cwiseMax(b.max()) - a.min().cwiseMin(b.min())).maxCoeff();
-  return overlap(a, b, thickness + std::min(kBoxGapError * (size + thickness), thickness));
+  return overlap(a, b,
+                 thickness + std::min(kBoxGapError * (size + thickness), kFloatBoxGap * thickness));
 }
 
 namespace {

@@ -18,7 +18,7 @@ Eigen::AlignedBox3d elementBox(const TriangleMesh&, std::uint32_t element, bool 
 bool overlap(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness);
 
 /// The same within rounding: true for all elements whose distance may be computed as at most the
-/// thickness, unless it is off by more than the thickness. Without a thickness it is exact.
+/// thickness, unless they are more than 2^22 times as large. Without a thickness it is exact.
 bool mayBeWithin(const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b, double thickness);
 
 /// Keeps the pairs whose elements may be within this thickness by their boxes.
