@@ -254,8 +254,11 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
   }
   const Vector3d from = inBody(p), along = inBody(q) - from;
   const auto slope = [&](double t) {
-    const double rise = atBody(from + t * along, 0).normal.dot(along);
-    return std::abs(rise) <= kOnSurface * m_magnitude ? 0.0 : rise;
+    const Vector3d normal = atBody(from + t * along, 0).normal;
+    const double rise = normal.dot(along);
+    // Over a cylinder's flat end, rounding is no slope.
+    const bool isLevel = std::abs(normal[2]) == 1.0 && std::abs(rise) <= kOnSurface * m_magnitude;
+    return isCylinder() && isLevel ? 0.0 : rise;
   };
   const auto at = [&](double t, bool inInterior) {
     const Vector3d u = from + t * along;
@@ -292,12 +295,12 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
 /// For a cylinder and the plane normal . u = height, with height not negative: the plane's point
 /// that is deepest in the shape, or the shape's point nearest to the plane. The shape shrunk by m
 /// on all sides, { u: distance <= -m }, has the components' sizes less m. m is the largest value
-/// for which it still reaches the plane.
-Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height) const {
+/// for which it still reaches the plane. supportHeight: of the plane that touches the shape.
+Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height, double& supportHeight) const {
   const Components components = componentsOf(normal, 0);
   const auto& [lengths, directions] = components;
-  const double supportHeight = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1],
-               all = lengths[0] + lengths[1], deepest = -std::min(m_sizes[0], m_sizes[1]);
+  supportHeight = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1];
+  const double all = lengths[0] + lengths[1], deepest = -std::min(m_sizes[0], m_sizes[1]);
   const double level = std::min(0.0, std::max(deepest, (height - supportHeight) / all));
   Vector3d point = Vector3d::Zero();
   for (int i = 0; i < 2; ++i)
@@ -353,13 +356,11 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   if (m_type < Type::Capsule || normal == Vector3d::Zero()) return {};
   double height = normal.dot(a - m_p0);
   if (height < 0) normal = -normal, height = -height;
-  const Vector3d across = m_axes.transpose() * normal;
-  const Vector3d point = m_p0 + m_axes * nearestOfPlane(across, height);
+  double reach = 0;
+  const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height, reach);
   const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
   if (on.feature != TriangleFeature::Face) return {};
   const Vector3d& weights = on.barycentric;
-  const Components components = componentsOf(across, 0);
-  const double reach = components.lengths[0] * m_sizes[0] + components.lengths[1] * m_sizes[1];
   if (height > reach - kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
   const Vector3d sides[] = {m_axes.transpose() * (b - a), m_axes.transpose() * (c - a)};

@@ -150,7 +150,8 @@ class Shape {
   /// inside, that most nearly parallel to the element counts. All in the body's frame.
   PointShapeDistance leastAtBody(const Eigen::Vector3d& u,
                                  std::span<const Eigen::Vector3d> sides) const;
-  Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height) const;
+  Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height,
+                                 double& supportHeight) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                                               const Eigen::Vector3d& c) const;
   std::optional<NearestToShape> nearestToAxis(const Eigen::Vector3d& a, const Eigen::Vector3d& b,

@@ -155,7 +155,7 @@ Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const
 /// balls.
 double elementGap(const TestGeometry& geometry, const Positions& now,
                   const std::array<std::uint32_t, 3>& vertices, const Vector3d& p) {
-  const auto& [a, b, c] = vertices;
+  const std::uint32_t a = vertices[0], b = vertices[1], c = vertices[2];
   if (geometry.radius(a) == geometry.radius(b))
     return vertexTriangleDistance(p, now[a], now[b], now[c]).distance - geometry.radius(a);
   const auto gap = [&](double t) {
