@@ -253,12 +253,11 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
     }
   }
   const Vector3d from = inBody(p), along = inBody(q) - from;
+  // Over a cylinder's flat end, rounding is no slope.
+  const bool isLevel = isCylinder() && std::abs(along[2]) <= kOnSurface * m_magnitude;
   const auto slope = [&](double t) {
     const Vector3d normal = atBody(from + t * along, 0).normal;
-    const double rise = normal.dot(along);
-    // Over a cylinder's flat end, rounding is no slope.
-    const bool isLevel = std::abs(normal[2]) == 1.0 && std::abs(rise) <= kOnSurface * m_magnitude;
-    return isCylinder() && isLevel ? 0.0 : rise;
+    return isLevel && std::abs(normal[2]) == 1.0 ? 0.0 : normal.dot(along);
   };
   const auto at = [&](double t, bool inInterior) {
     const Vector3d u = from + t * along;
