@@ -5,6 +5,8 @@
 #include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -19,6 +21,13 @@ bool isFirst(const ShapeContact& a, const ShapeContact& b) {
   return std::tie(a.timeOfImpact, a.distance) < std::tie(b.timeOfImpact, b.distance);
 }
 
+/// L: the largest extent of the shape along an axis of its own frame, which does not turn with it.
+double sizeOf(const Shape& shape, const RigidTransform& pose) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : shape.corners()) box.extend(pose.rotation.transpose() * p);
+  return box.sizes().maxCoeff() + 2.0 * shape.radius();
+}
+
 /// One pair's mesh, and its shape at the step's end.
 class Step {
  public:
@@ -29,7 +38,7 @@ class Step {
         m_before(before),
         m_now(now),
         m_settings(settings),
-        m_size(shape.bounds().sizes().maxCoeff()) {}
+        m_size(sizeOf(shape, now)) {}
 
   /// Whether elements around the vertex or edge that holds the contact's point exclude its normal.
   bool isExcluded(const ShapeContact& c) const {

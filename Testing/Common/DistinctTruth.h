@@ -124,10 +124,15 @@ struct DistinctTruth {
     return atEnd.rotation * turn.inverse() * (c.pointOnShape - place) + atEnd.translation;
   }
   static double sizeOf(const PlacedShape& shape) {
-    double size = 0;
-    for (int k = 0; k < 3; ++k)
-      size = std::max(size, reachOf(shape, Vector3d::Unit(k)) + reachOf(shape, -Vector3d::Unit(k)));
-    return size;
+    double radius = 0;
+    std::vector<Vector3d> corners = cornersOf({shape.geometry}, radius);
+    if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
+      corners = {cylinder->p0, cylinder->p1};
+      radius = cylinder->radius;
+    }
+    Vector3d low = corners.front(), high = low;
+    for (const Vector3d& p : corners) low = low.cwiseMin(p), high = high.cwiseMax(p);
+    return (high - low).maxCoeff() + 2 * radius;
   }
 };
 
