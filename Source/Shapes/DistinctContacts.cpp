@@ -1,6 +1,5 @@
 #include "Shapes/DistinctContacts.h"
 
-#include "Math/Foot.h"
 #include "Math/NormalCone.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
@@ -53,20 +52,7 @@ class Step {
     return excludesDirection(m_mesh, feature, -c.normal, c.timeOfImpact);
   }
 
-  /// Whether the shape has sunk into a triangle's interior.
-  static bool isSunk(const ShapeContact& c) {
-    return c.element == ShapeElement::Face && c.distance < 0;
-  }
-  /// Where the shape has sunk in, the plane of the triangle; else the tangent plane.
   TangentPlane planeOf(const ShapeContact& c) const {
-    if (isSunk(c)) {
-      const auto at = [&](std::size_t i) -> Vector3d { return m_mesh.now[c.vertices[i]]; };
-      const Vector3d normal = unitCross(at(0), at(1), at(0), at(2));
-      const double radius = m_mesh.radius(c.vertices, c.weights);
-      if (normal != Vector3d::Zero())
-        return {normal.dot(c.normal) > 0 ? Vector3d(-normal) : normal, at(0), radius, c.distance,
-                m_settings.thickness};
-    }
     Vector3d point = Vector3d::Zero();
     for (int i = 0; i < 3; ++i) point += c.weights[i] * m_mesh.now[c.vertices[i]];
     const double radius = m_mesh.radius(c.vertices, c.weights);
@@ -134,7 +120,7 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
       m_states[i] = State::OnPlane;
       plane.gap = std::min(plane.gap, other.gap);
     }
-    if (!Step::isSunk(*first) && !step.isHeldBy(plane)) continue;
+    if (!step.isHeldBy(plane)) continue;
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const ShapeContact& c = contacts[i];
       if (m_states[i] != State::Excluded || !step.isInTime(*first, c) || !step.isIn(plane, c) ||

@@ -26,10 +26,6 @@ namespace palpate {
 /// So the rows that stay keep the shape away from the vertex or edge. Tissue that is bent, or that
 /// bends around a tool within the step, keeps all its contacts.
 ///
-/// Where the shape has sunk into a triangle, no row holds it. The contact of that triangle then
-/// stands for what (1) allows and the triangle's own plane contains: it leads out, others to a
-/// side.
-///
 /// A contact stays if it has the normal of the one that stands for it, at another point of the
 /// shape. A body that lies on a floor needs contacts at all its corners.
 ///

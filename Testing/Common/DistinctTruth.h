@@ -57,19 +57,6 @@ struct DistinctTruth {
     return point;
   }
 
-  /// Whether the shape has sunk into a triangle's interior.
-  static bool isSunk(const ShapeContact& c) {
-    return c.element == ShapeElement::Face && c.distance < 0;
-  }
-  /// Towards the plane of a contact from the shape: where the shape has sunk in, that of the
-  /// triangle.
-  Vector3d acrossPlane(const ShapeContact& c) const {
-    if (!isSunk(c)) return c.normal;
-    const auto& [p, q, r] = c.vertices;
-    const Vector3d normal = (now[q] - now[p]).cross(now[r] - now[p]).normalized();
-    return normal.dot(c.normal) > 0 ? normal : Vector3d(-normal);
-  }
-
   /// Whether each contact stays. gaps: of their rows at the step's end.
   std::vector<char> kept(std::span<const ShapeContact> all, std::span<const double> gaps) const {
     const auto isFirst = [&](std::size_t l, std::size_t r) {
@@ -85,24 +72,23 @@ struct DistinctTruth {
     for (int planes = 0; planes < 8 && !proper.empty(); ++planes) {
       const std::size_t first = proper.front();
       const ShapeContact& s = all[first];
-      const Vector3d down = acrossPlane(s);
-      const double height = down.dot(pointAtEnd(s));
+      const double height = s.normal.dot(pointAtEnd(s));
       double gap = gaps[first];
       std::erase_if(proper, [&](std::size_t i) {
-        if ((acrossPlane(all[i]) - down).norm() > 1e-12 ||
-            std::abs(down.dot(pointAtEnd(all[i])) - height) > 2 * near)
+        if ((all[i].normal - s.normal).norm() > 1e-12 ||
+            std::abs(s.normal.dot(pointAtEnd(all[i])) - height) > 2 * near)
           return false;
         gap = std::min(gap, gaps[i]);
         return true;
       });
       // The shape is on the side that the normal comes from.
-      if (!isSunk(s) && reachOf(atEnd, down) > height - radius - gap + near) continue;
+      if (reachOf(atEnd, s.normal) > height - radius - gap + near) continue;
       std::erase_if(excluded, [&](std::size_t i) {
         const ShapeContact& c = all[i];
         const bool inTime = isFirst(first, i) || (s.element == ShapeElement::Face &&
                                                   s.timeOfImpact <= c.timeOfImpact + timeTolerance),
                    isIn = std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
-                     return std::abs(down.dot(now[v]) - height) <= near;
+                     return std::abs(s.normal.dot(now[v]) - height) <= near;
                    });
         // At another part of a flat side of the shape, the same normal is no tilted one.
         const bool isAlike = (c.normal - s.normal).norm() <= 0x1p-10 &&
