@@ -86,4 +86,12 @@ class StandardFloatingPoint {
   std::fenv_t m_callersEnvironment;
 };
 
+/// The float nearest to a value. g++ 12 takes `double(float(x))` for x where it vectorises two of
+/// them: an error bound that is computed from the rounded value must come through here.
+inline float roundedToFloat(double x) {
+  auto rounded = static_cast<float>(x);
+  asm("" : "+m"(rounded));
+  return rounded;
+}
+
 }  // namespace palpate

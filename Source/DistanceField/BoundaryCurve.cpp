@@ -98,16 +98,18 @@ void BoundaryCurve::addNode(std::uint32_t begin, std::uint32_t end) {
   addNode(middle, end);
 }
 
-double BoundaryCurve::steepness(const Vector3d& centre, double radius) const {
+double BoundaryCurve::steepness(const Vector3d& centre, double radius, double most) const {
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   const double magnitude = m_largest + centre.cwiseAbs().maxCoeff() + radius,
                reach = radius + kFieldError * magnitude;
   if (!(magnitude < kOverflowGuard)) return kInfinite;
+  const double mostSum = most * (4.0 * std::numbers::pi);
   double sum = 0.0;
   std::array<std::uint32_t, 64> stack;  // halving ends before
   std::size_t depth = 0;
   if (!isEmpty()) stack[depth++] = 0;
   while (depth > 0) {
+    if (sum > mostSum) return kInfinite;
     const std::uint32_t index = stack[--depth];
     const Node& node = m_nodes[index];
     const double gap = (centre - node.centre).norm() - node.radius - reach;

@@ -23,8 +23,9 @@ class BoundaryCurve {
   bool isEmpty() const { return m_edges.empty(); }
   double length() const { return m_nodes.empty() ? 0.0 : m_nodes[0].length; }  ///< L
 
-  /// 1/L: an upper bound of that gradient in the ball; infinity if the boundary may meet it.
-  double steepness(const Eigen::Vector3d& centre, double radius) const;
+  /// 1/L: an upper bound of that gradient in the ball; infinity if it exceeds `most`, or if the
+  /// boundary may meet the ball.
+  double steepness(const Eigen::Vector3d& centre, double radius, double most) const;
 
  private:
   struct Edge {

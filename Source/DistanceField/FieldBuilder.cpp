@@ -33,6 +33,15 @@ constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two calls 
 constexpr std::size_t kGrain = 64;
 /// Cells on lower levels are split where only some of their points may have a reliable sign.
 constexpr int kSignLevel = 2;
+/// The need for memory is estimated when there are so many cells, and they use this part of the
+/// limit. The estimate takes about as long as the cells that are there by then.
+constexpr std::size_t kFewestForEstimate = std::size_t{1} << 14, kPartBeforeEstimate = 64;
+/// Cells of each level that an estimate splits. It is then right to some tens of percent.
+constexpr std::size_t kSampledPerLevel = 256;
+constexpr double kSureExcess = 1.5;  ///< an estimate above so many limits is a refusal
+
+/// L. Squares of lengths in this range neither overflow nor lose bits.
+constexpr double kLargestDomain = 0x1p400, kSmallestDomain = 0x1p-400;
 
 constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); }
 
@@ -43,7 +52,8 @@ class FieldBuilder {
       : m_geometry(geometry),
         m_settings(settings),
         m_threads(threads),
-        m_tolerance(kCornerError * std::min(settings.errorBound, settings.band)),
+        m_errorBound(std::min(settings.errorBound, settings.band)),
+        m_tolerance(kCornerError * m_errorBound),
         m_sign(geometry, isClosed),
         m_nearestTriangle(geometry, m_tolerance),
         m_certifier(geometry, m_sign, m_tolerance) {
@@ -76,8 +86,10 @@ class FieldBuilder {
     float allowed = 0;  ///< units: the deviation of corners up to which the bound is proven
     std::uint8_t level = 0;
     State state = State::Split;
-    bool isOff = false;       ///< the deviation of its corners is larger than allowed
-    bool isReliable = false;  ///< the sign in all of it; otherwise its values have none
+    bool isOff = false;         ///< the deviation of its corners is larger than allowed
+    bool isReliable = false;    ///< the sign in all of it; otherwise its values have none
+    bool isUnreliable = false;  ///< the sign in all of it
+    bool isSplitForSign = false;
 
     bool isLeaf() const { return state == State::Certified || state == State::Adjusted; }
     /// Whether its neighbours have the same values where they meet.
@@ -94,16 +106,18 @@ class FieldBuilder {
     const double margin = m_settings.band * (1.0 + 0x1p-16);
     const Vector3d low = box.min().array() - margin, high = box.max().array() + margin;
     const double longest = (high - low).maxCoeff();
-    if (!(m_settings.errorBound >= 0x1p-18 * longest &&
-          std::min(m_settings.errorBound, m_settings.band) >= 0x1p-36 * largest &&
-          longest > 0x1p-900 && longest < 0x1p1000))
+    if (!(longest >= kSmallestDomain && longest <= kLargestDomain))
+      throw Error(ErrorCode::InvalidSettings,
+                  "the longest side of the box around the mesh and the band is " + textOf(longest) +
+                      "; it must be from 2^-400 to 2^400");
+    if (!(m_errorBound >= 0x1p-18 * longest && m_errorBound >= 0x1p-36 * largest))
       throw Error(ErrorCode::InvalidSettings,
                   "errorBound is " + textOf(m_settings.errorBound) + " and band is " +
-                      textOf(m_settings.band) + "; errorBound must be at least 2^-18 of " +
+                      textOf(m_settings.band) + "; both must be at least 2^-18 of " +
                       textOf(longest) +
-                      ", the longest side of the box around the band, and both at least 2^-36 of " +
+                      ", the longest side of the box around the band, and at least 2^-36 of " +
                       textOf(largest) + ", the largest coordinate");
-    m_field.errorBound = m_settings.errorBound;
+    m_field.errorBound = m_errorBound;
     m_field.band = m_settings.band;
     m_field.isClosed = m_sign.isClosed();
     m_field.unreliableMargin = std::max(0.0, m_sign.reach() - m_settings.band);
@@ -115,7 +129,7 @@ class FieldBuilder {
       m_field.size[k] = static_cast<std::uint32_t>(std::ceil(high[k] / m_unit) - first);
       m_origin[k] = first * m_unit;
     }
-    m_bound = m_settings.errorBound - kStoredError * (m_settings.band + 4.0 * m_unit) -
+    m_bound = m_errorBound - kStoredError * (m_settings.band + 4.0 * m_unit) -
               kFieldError * (largest + longest) - m_tolerance;
     m_allowed =
         static_cast<float>((1.0 - kShareOfCells) * (1.0 - kStoredError) * (m_bound / m_unit));
@@ -156,7 +170,7 @@ class FieldBuilder {
             corners[i] = cornerAt({(x + (i & 1)) * sideOf(0), (y + (i >> 1 & 1)) * sideOf(0),
                                    (z + (i >> 2)) * sideOf(0)},
                                   kNone);
-          addCell(corners, 0, m_sign.isClosed());
+          addCell(corners, 0);
         }
   }
   /// parent: the cell that is split, or kNone.
@@ -168,9 +182,12 @@ class FieldBuilder {
     }
     return number;
   }
-  void addCell(const std::array<std::uint32_t, 8>& corners, int level, bool isReliable) {
+  /// Its sign is known where that of `parent`, if any, is.
+  void addCell(const std::array<std::uint32_t, 8>& corners, int level,
+               const Cell* parent = nullptr) {
     Cell cell{corners};
-    cell.isReliable = isReliable;
+    cell.isReliable = parent ? parent->isReliable : m_sign.isClosed();
+    cell.isUnreliable = parent && parent->isUnreliable;
     cell.level = static_cast<std::uint8_t>(level);
     for (unsigned i = 0; i < 8; ++i)
       m_covered[corners[i]] = static_cast<std::uint8_t>(m_covered[corners[i]] | 1u << (7 - i));
@@ -200,15 +217,22 @@ class FieldBuilder {
           at += ((child >> k & 1) + (i >> k & 1)) * step;
         ofChild[i] = corners[at];
       }
-      addCell(ofChild, cell.level + 1, cell.isReliable);
+      addCell(ofChild, cell.level + 1, &cell);
     }
   }
   /// Evaluates, tests and splits the cells from `first` on.
   void refine(std::size_t first) {
     while (first < m_cells.size()) {
       ++m_rounds;
-      evaluateCorners();
       const std::size_t end = m_cells.size();
+      if (!m_sign.isClosed())
+        m_threads.forChunks(end - first, kGrain,
+                            [&](std::size_t, std::size_t from, std::size_t to) {
+                              PointQueryStack stack;
+                              for (std::size_t i = first + from; i < first + to; ++i)
+                                findSign(m_cells[i], stack);
+                            });
+      evaluateCorners(first);
       inSlices(first, end, 0.5, [&](std::size_t from, std::size_t to) {
         PointQueryStack stack;
         for (std::size_t i = from; i < to; ++i) {
@@ -216,33 +240,57 @@ class FieldBuilder {
           m_cells[i].allowed = m_allowed;
         }
       });
+      checkEstimate();
+      std::vector<std::uint32_t> open;
       for (std::size_t i = first; i < end; ++i)
-        if (m_cells[i].state == State::Split) split(static_cast<std::uint32_t>(i));
+        if (m_cells[i].state == State::Split) open.push_back(static_cast<std::uint32_t>(i));
+      m_representedCells += m_eachStandsFor * static_cast<double>(end - first);
+      const std::size_t count = std::min(open.size(), m_mostSplit);
+      m_eachStandsFor *= static_cast<double>(open.size()) / static_cast<double>(count);
+      for (std::size_t i = 0; i < count; ++i) split(open[i * open.size() / count]);
       first = end;
     }
   }
   State test(Cell& cell, PointQueryStack& stack) const {
-    if (!findSign(cell, stack)) return State::Split;
+    if (cell.isSplitForSign) return State::Split;
     const InterpolatedCell interpolated = interpolatedCell(cell);
     if (m_certifier.isBeyond(interpolated, m_settings.band)) return State::Beyond;
     const bool isWithin = m_certifier.isWithin(interpolated, kShareOfCells * m_bound, stack);
     return isWithin ? State::Certified : State::Split;
   }
-  /// Finds whether the cell has a reliable sign. Returns false if it has to be split to know more.
-  bool findSign(Cell& cell, PointQueryStack& stack) const {
-    if (cell.isReliable) return true;
+  /// Finds whether the cell has a reliable sign, or has to be split to know more.
+  void findSign(Cell& cell, PointQueryStack& stack) const {
+    if (cell.isReliable || cell.isUnreliable) return;
     const double half = halfSideOf(cell);
     const Vector3d centre = positionOf(m_corners[cell.corners[0]]) + Vector3d::Constant(half);
     const auto reliability =
         m_sign.in(centre, std::numbers::sqrt3 * half * (1.0 + kFieldError), stack);
     cell.isReliable = reliability == SurfaceSign::Reliability::Reliable;
-    return cell.level >= kSignLevel || reliability != SurfaceSign::Reliability::Unknown;
+    cell.isUnreliable = reliability == SurfaceSign::Reliability::Unreliable;
+    cell.isSplitForSign =
+        cell.level < kSignLevel && reliability == SurfaceSign::Reliability::Unknown;
   }
-  /// Of all corners that are new.
-  void evaluateCorners() {
+  /// Finds the distances of all corners that are new, and the signs of those of reliable cells from
+  /// `firstCell` on. All other signs are as of points outside.
+  void evaluateCorners(std::size_t firstCell) {
     const std::size_t first = m_distances.size();
     m_distances.resize(m_corners.size());
     m_nearest.resize(m_corners.size());
+    m_hasSign.resize(m_corners.size());
+    std::vector<std::uint32_t> known;
+    for (std::size_t i = firstCell; i < m_cells.size(); ++i) {
+      if (!m_cells[i].isReliable) continue;
+      for (const std::uint32_t corner : m_cells[i].corners) {
+        if (corner < first && !m_hasSign[corner]) known.push_back(corner);
+        m_hasSign[corner] = 1;
+      }
+    }
+    m_threads.forChunks(known.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+      PointQueryStack stack;
+      for (std::size_t i = from; i < to; ++i)
+        if (m_sign.isInside(positionOf(m_corners[known[i]]), stack))
+          m_distances[known[i]] = -m_distances[known[i]];
+    });
     inSlices(first, m_corners.size(), 0.0, [&](std::size_t from, std::size_t to) {
       PointQueryStack stack;
       for (std::size_t i = from; i < to; ++i) evaluate(i, stack);
@@ -252,12 +300,12 @@ class FieldBuilder {
     const Vector3d point = positionOf(m_corners[i]);
     std::array<std::uint32_t, 8> likely{};
     // Where it is reliable, the sign changes only at the surface.
-    int sign = 0;
+    int sign = m_hasSign[i] ? 0 : 1;
     if (const std::uint32_t parent = m_parents[i]; parent != kNone)
       for (std::size_t k = 0; k < 8; ++k) {
         const std::uint32_t corner = m_cells[parent].corners[k];
         likely[k] = m_nearest[corner];
-        if (!m_cells[parent].isReliable) continue;
+        if (sign != 0 || !m_cells[parent].isReliable) continue;
         const double distance = std::abs(m_distances[corner]) * m_unit;
         if ((point - positionOf(m_corners[corner])).norm() < 0.999 * distance - m_tolerance)
           sign = m_distances[corner] < 0.0f ? -1 : 1;
@@ -289,6 +337,35 @@ class FieldBuilder {
   }
   // ---- Memory ----
 
+  /// Throws if the build will need far more memory than the limit. Before that it has used a small
+  /// part of what the limit allows.
+  void checkEstimate() {
+    const std::size_t used =
+        m_cells.size() * kBytesPerCell + m_corners.size() * kBytesPerCorner + m_corners.bytes();
+    if (m_settings.memoryLimit == 0 || m_isEstimated || m_cells.size() < kFewestForEstimate ||
+        used < m_settings.memoryLimit / kPartBeforeEstimate)
+      return;
+    m_isEstimated = true;
+    const double perCell = static_cast<double>(used) / static_cast<double>(m_cells.size()),
+                 needed = perCell * estimateCells(),
+                 limit = static_cast<double>(m_settings.memoryLimit);
+    if (!(needed > kSureExcess * limit)) return;
+    throw Error(ErrorCode::MemoryLimit, "memoryLimit is " + std::to_string(m_settings.memoryLimit) +
+                                            " bytes; the build of the distance field needs about " +
+                                            textOf(needed) +
+                                            " bytes, as estimated from a sample of its cells");
+  }
+  /// The number of cells after all are refined, from a build that splits few cells of each level.
+  double estimateCells() const {
+    DistanceFieldSettings settings = m_settings;
+    settings.memoryLimit = 0;
+    settings.progress = {};
+    FieldBuilder sample(m_geometry, m_sign.isClosed(), settings, m_threads);
+    sample.m_mostSplit = kSampledPerLevel;
+    sample.addRoots();
+    sample.refine(0);
+    return sample.m_representedCells;
+  }
   /// For the eight cells of a split.
   void makeRoom() {
     if (m_cells.size() + 8 > m_cells.capacity()) {
@@ -303,6 +380,7 @@ class FieldBuilder {
     m_parents.reserve(m_corners.capacity());
     m_covered.reserve(m_corners.capacity());
     m_distances.reserve(m_corners.capacity());
+    m_hasSign.reserve(m_corners.capacity());
     m_nearest.reserve(m_corners.capacity());
     m_values.reserve(m_corners.capacity());
     m_owners.reserve(m_corners.capacity());
@@ -505,6 +583,8 @@ class FieldBuilder {
   const SearchableGeometry& m_geometry;
   const DistanceFieldSettings& m_settings;
   const Threads& m_threads;
+  /// L: at most the band, or values beyond the band could have the wrong sign.
+  const double m_errorBound;
   const double m_tolerance;  ///< L: the error of distances at corners
   const SurfaceSign m_sign;
   const NearestTriangle m_nearestTriangle;
@@ -515,6 +595,10 @@ class FieldBuilder {
   double m_bound = 0.0;  ///< L: the error bound without what rounding may add
   float m_allowed = 0;   ///< units: the part of it that is for corners that hang
   int m_rounds = 0;
+  // For an estimate: all cells of a level are split but there.
+  std::size_t m_mostSplit = std::numeric_limits<std::size_t>::max();
+  double m_eachStandsFor = 1.0, m_representedCells = 0.0;
+  bool m_isEstimated = false;
   std::vector<Cell> m_cells;  ///< the roots come first
   static constexpr std::size_t kBytesPerCell =
       sizeof(Cell) + 2 * sizeof(std::uint32_t);  // of lists in adjustCellsBeyond()
@@ -523,11 +607,12 @@ class FieldBuilder {
   std::vector<std::uint32_t> m_parents;  ///< the cell whose split made it, or kNone
   std::vector<std::uint8_t> m_covered;   ///< octants in which it is the corner of a cell, as bits
   std::vector<float> m_distances;        ///< units
+  std::vector<std::uint8_t> m_hasSign;   ///< of the distance: a reliable cell has this corner
   std::vector<std::uint32_t> m_nearest;  ///< the nearest triangle, by its place in the octree
   std::vector<float> m_values;           ///< units: what the cells interpolate
   std::vector<std::uint32_t> m_owners;   ///< the cell on which it hangs, or kNone
   static constexpr std::size_t kBytesPerCorner =
-      2 * sizeof(float) + 3 * sizeof(std::uint32_t) + 2 * sizeof(std::uint8_t) +
+      2 * sizeof(float) + 3 * sizeof(std::uint32_t) + 3 * sizeof(std::uint8_t) +
       2 * sizeof(std::uint32_t);  // of lists in computeValues()
 };
 

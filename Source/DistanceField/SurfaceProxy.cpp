@@ -2,6 +2,7 @@
 
 #include <palpate/Error.h>
 
+#include "Core/FloatingPoint.h"
 #include "DistanceField/ProxyPlane.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
@@ -14,6 +15,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <string>
 
 namespace palpate {
 
@@ -32,6 +34,9 @@ constexpr std::size_t kMostSmall = std::size_t{1} << 15, kSmallPerTriangle = 2;
 constexpr std::size_t kCellsPerTask = 64;
 /// Nodes down to this level are visited level by level, the others below each of them in one task.
 constexpr int kSharedLevels = 3;
+/// Memory of a ProxyItem, in that of an entry of a list.
+constexpr std::uint64_t kListedPerItem = 3;
+constexpr const char* kInLists = "entries in lists of triangles";
 /// Edge of a cell in mean edges of the mesh, at most.
 constexpr double kLargestCell = 1.5;
 /// L. Squares of lengths in this range neither overflow nor lose bits.
@@ -91,12 +96,14 @@ class SurfaceProxyBuilder {
     for (int depth = 1; depth <= kSharedLevels; ++depth) {
       CountedVector<Visited> next(8 * level.size());
       CountedVector<Part> found(next.size());
+      std::atomic<std::uint64_t> kept = 0;
       threads.forEach(next.size(), [&](std::size_t i) {
         const Visited& parent = level[i / 8];
         next[i].node = parent.node.child(i % 8);
         ProxyPlanes::Scratch scratch;
         if (!isDivided(next[i].node, parent.items, next[i].items, scratch, found[i]))
           next[i].items = {};
+        count(next[i].items.size, kept, m_settings.mostListed / kListedPerItem, kInLists);
       });
       for (Part& part : found) parts.push_back(std::move(part));
       std::erase_if(next, [](const Visited& visited) { return visited.items.size == 0; });
@@ -174,7 +181,7 @@ class SurfaceProxyBuilder {
   /// Returns whether the node must be divided: it is near, and no plane stands for its surface.
   bool isDivided(const Node& node, const ProxyItems& items, ProxyItems& kept,
                  ProxyPlanes::Scratch& scratch, Part& out) {
-    count(items.size, m_work, m_settings.mostWork);
+    count(items.size, m_work, m_settings.mostWork, "comparisons of triangles with cells");
     const ProxyCube cube = cubeOf(node);
     const NearestItem found = nearestOf(items, cube.centre, nearOf(cube));
     kept.size = 0;
@@ -203,6 +210,8 @@ class SurfaceProxyBuilder {
       Part::Open& open = out.open.emplace_back();
       open.node = node;
       open.block = out.blocks.size() - 1;
+      countListed(items.size);
+      open.triangles.reserve(items.size);
       for (std::size_t i = 0; i < items.size; ++i) open.triangles.push_back(items.triangleAt(i));
       return;
     }
@@ -294,7 +303,7 @@ class SurfaceProxyBuilder {
     for (std::size_t i = 0; i < items.size; ++i)
       if (scratch.distances[i] <= reach) kept.append(items, i);
     if (addPlane(node, {kept, cube, reach, nearest}, scratch.planes, out)) return;
-    count(kept.size, m_listed, m_settings.mostListed);
+    countListed(kept.size);
     SurfaceProxy::Leaf leaf{};
     leaf.firstTriangle = static_cast<std::uint32_t>(out.triangles.size());
     leaf.triangleCount = static_cast<std::uint32_t>(kept.size);
@@ -329,7 +338,9 @@ class SurfaceProxyBuilder {
   SurfaceProxy::Listed listed(std::uint32_t triangle) const {
     const auto& [i, j, k] = m_topology.triangles[triangle];
     const Vector3d &a = m_positions[i], &b = m_positions[j], &c = m_positions[k];
-    const Eigen::Vector3f rounded = ((a + b + c) / 3.0).cast<float>();
+    const Vector3d middle = (a + b + c) / 3.0;
+    const Eigen::Vector3f rounded(roundedToFloat(middle[0]), roundedToFloat(middle[1]),
+                                  roundedToFloat(middle[2]));
     const Vector3d centre = rounded.cast<double>();
     const double radius = std::max({(a - centre).norm(), (b - centre).norm(), (c - centre).norm()});
     const auto outward = static_cast<float>(radius * (1.0 + 0x1p-20) + m_rounding);
@@ -337,11 +348,15 @@ class SurfaceProxyBuilder {
             std::nextafter(outward, std::numeric_limits<float>::infinity()), triangle};
   }
 
-  void count(std::size_t size, std::atomic<std::uint64_t>& total, std::uint64_t most) const {
+  static void count(std::size_t size, std::atomic<std::uint64_t>& total, std::uint64_t most,
+                    const char* what) {
     if (total.fetch_add(size, std::memory_order_relaxed) + size > most)
       throw Error(ErrorCode::TooLarge,
-                  "the leaves of a surface proxy need too much memory or time: the thickness and "
-                  "the radii are too large for the body");
+                  "the leaves of a surface proxy need more than " + std::to_string(most) + " " +
+                      what + ": the thickness and the radii are too large for the body");
+  }
+  void countListed(std::size_t size) const {
+    count(size, m_listed, m_settings.mostListed, kInLists);
   }
 
   /// Appends leaves, lists and blocks. Returns the indices of the part's first leaf and block.

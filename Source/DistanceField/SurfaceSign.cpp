@@ -34,7 +34,8 @@ bool SurfaceSign::isInside(const Vector3d& point, PointQueryStack& stack) const 
 SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius,
                                          PointQueryStack& stack) const {
   if (m_isClosed || m_boundary->isEmpty()) return Reliability::Reliable;
-  const double change = (1.0 + kAside.norm()) * radius * m_boundary->steepness(centre, radius);
+  const double way = (1.0 + kAside.norm()) * radius,
+               change = way * m_boundary->steepness(centre, radius, kMostDefect / way);
   if (!(change < kMostDefect)) return Reliability::Unknown;
   const SolidAngleShare number =
       m_body.windingNumbers.value(m_body, centre + radius * kAside, kNumberError, stack);

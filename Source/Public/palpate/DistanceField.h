@@ -17,15 +17,18 @@ class FieldLookup;
 
 /// Settings of DistanceField::build(). A value out of range throws InvalidSettings.
 struct DistanceFieldSettings {
-  /// L, positive: what value() may be off by, in the band. At least 2^-18 of the longest side of
-  /// the mesh's box, enlarged by the band, and 2^-36 of the largest coordinate of that box.
+  /// L, positive: what value() may be off by, in the band. If it exceeds the band, the band takes
+  /// its place, so that signs beyond the band are right.
   double errorBound = 0.0;
-  /// L, positive: the distance from the surface up to which the error bound holds.
+  /// L, positive: the distance from the surface up to which the error bound holds. Both lengths are
+  /// at least 2^-18 of the longest side of the mesh's box, enlarged by the band, and 2^-36 of the
+  /// largest coordinate of that box. The longest side is from 2^-400 to 2^400.
   double band = 0.0;
   /// Bytes that the field and the build may hold, without the queries' copy of the mesh. 0: no
   /// limit. A build that needs more throws MemoryLimit, with the number of bytes, before it
-  /// allocates them.
-  std::size_t memoryLimit = 0;
+  /// allocates them; soon, with an estimate, if it needs far more. A field is about a quarter of
+  /// its build.
+  std::size_t memoryLimit = std::size_t{1} << 31;
   /// Number of threads of the build, in [0, 1024]; 0: one per core. The field does not depend on
   /// it.
   int threads = 0;
@@ -59,7 +62,7 @@ class PALPATE_EXPORT DistanceField {
 
   /// Whether the mesh was closed and consistently oriented: all signs are reliable.
   bool isClosed() const;
-  double errorBound() const;  ///< L
+  double errorBound() const;  ///< L: the lesser of the settings' errorBound and band
   double band() const;        ///< L
   std::size_t bytes() const;  ///< of memory that the field holds
   std::size_t cells() const;  ///< with corner values

@@ -271,6 +271,70 @@ TEST(DistanceField, KeepsItsMemoryLimit) {
   }
 }
 
+/// A value within a bound of more than the band could have the wrong sign beyond the band.
+TEST(DistanceField, SignsBeyondTheBandAreRightForEveryErrorBound) {
+  const Mesh mesh = sphere(20, 30, {0.1, 0.2, 0.3}, 1.0);
+  for (const double errorBound : {0.05, 0.1, 0.4, 3.0}) {
+    const double band = 0.05;
+    const DistanceField field =
+        DistanceField::build({mesh.positions, mesh.triangles}, {errorBound, band});
+    EXPECT_EQ(field.errorBound(), band);
+    OctreeBasedCD detection;
+    const GeometryId body = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+    const SpatialQueries queries = detection.queries();
+    Random random(4);
+    for (int i = 0; i < casesOf(20000); ++i) {
+      Eigen::Vector3d point = randomPoint(random, -1, 1);
+      point = mesh.positions[random() % mesh.positions.size()] + 3 * band * point;
+      const double exact = queries.signedDistance(body, point).distance;
+      if (std::abs(exact) > band) {
+        ASSERT_EQ(field.value(point) < 0, exact < 0) << exact;
+      } else {
+        ASSERT_NEAR(field.value(point), exact, band);
+      }
+    }
+  }
+}
+
+TEST(DistanceField, HasARangeOfSizes) {
+  const auto build = [](int exponent) {
+    const double size = std::ldexp(1.0, exponent);
+    const Mesh mesh = boxMesh(Eigen::Vector3d::Constant(-size), Eigen::Vector3d::Constant(size));
+    return DistanceField::build({mesh.positions, mesh.triangles}, {0.05 * size, 0.2 * size});
+  };
+  for (const int exponent : {-397, -300, 300, 397})
+    EXPECT_NEAR(build(exponent).value({std::ldexp(0.75, exponent), 0, 0}),
+                std::ldexp(-0.2, exponent), std::ldexp(0.05, exponent));
+  for (const int exponent : {-1000, -540, -402, 402, 900})
+    expectRefused(ErrorCode::InvalidSettings, "from 2^-400 to 2^400", [&] { build(exponent); });
+}
+
+/// Between two boxes that nearly touch, cells are as small as the error bound.
+TEST(DistanceField, RefusesWhatNeedsFarMoreMemoryBeforeMuchWork) {
+  Mesh mesh = boxMesh({-1, -0.5, -0.5}, {-1e-4, 0.5, 0.5});
+  append(mesh, boxMesh({1e-4, -0.5, -0.5}, {1, 0.5, 0.5}));
+  DistanceFieldSettings settings{.errorBound = 5e-5, .band = 0.1};
+  FailingAllocation::arm(0);
+  expectRefused(ErrorCode::MemoryLimit, "as estimated", [&] {
+    DistanceField::build({mesh.positions, mesh.triangles}, settings);
+  });
+  FailingAllocation::disarm();
+  EXPECT_LT(FailingAllocation::peakBytes(), settings.memoryLimit / 16);
+  // The estimate of a build that needs little more or less than the limit.
+  settings.errorBound = 0.004;
+  settings.memoryLimit = 0;
+  FailingAllocation::arm(0);
+  DistanceField::build({mesh.positions, mesh.triangles}, settings);
+  FailingAllocation::disarm();
+  const auto needed = static_cast<double>(FailingAllocation::peakBytes());
+  settings.memoryLimit = static_cast<std::size_t>(2.0 * needed);
+  EXPECT_NO_THROW(DistanceField::build({mesh.positions, mesh.triangles}, settings));
+  settings.memoryLimit = static_cast<std::size_t>(needed / 8.0);
+  expectRefused(ErrorCode::MemoryLimit, "as estimated", [&] {
+    DistanceField::build({mesh.positions, mesh.triangles}, settings);
+  });
+}
+
 TEST(DistanceField, RefusesInvalidInput) {
   const Mesh good = boxMesh({0, 0, 0}, {1, 1, 1});
   const auto build = [](const Mesh& mesh, const DistanceFieldSettings& settings) {

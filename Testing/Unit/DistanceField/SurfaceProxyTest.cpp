@@ -206,6 +206,38 @@ TEST(SurfaceProxy, PlanesAnswerAFineMesh) {
   EXPECT_LT(lists, static_cast<std::ptrdiff_t>(proxy.leaves().size() / 50));
 }
 
+/// Lists hold spheres in floats, which are coarse far from the origin.
+TEST(SurfaceProxy, ListsAnswerExactlyFarFromTheOrigin) {
+  Random random(5);
+  for (const double offset : {0.0, 1e3, 1e5, 1e6, 1e8}) {
+    SCOPED_TRACE(offset);
+    const Eigen::Vector3d centre = offset * Eigen::Vector3d(1.0, -0.7, 0.3);
+    for (const auto& [body, half] :
+         {std::pair{boxMesh(centre.array() - 1.0, centre.array() + 1.0), 1.0},
+          std::pair{sphere(6, 9, centre, 1.0), 0.8}}) {
+      std::vector<Vector3d> points;
+      for (int i = 0; i < casesOf(4000); ++i) {
+        Vector3d at = randomPoint(random, -1, 1);
+        for (int k = 0; k <= i % 3; ++k)
+          at[k] = (at[k] < 0 ? -half : half) + 0.006 * uniform(random, -1, 1);
+        points.push_back(centre + at);
+      }
+      OctreeBasedCD detection;
+      const GeometryId particles = detection.addPointSet(points, 0.0),
+                       id = detection.addTriangleMesh(body.positions, body.triangles);
+      detection.addCollisionPair(
+          particles, id, {.method = Method::Proxy, .thickness = 0.02, .allowedError = 1e-3});
+      detection.detectCollision();
+      const CollisionData& data = detection.collisionData(particles, id);
+      const SpatialQueries queries = detection.queries();
+      EXPECT_GT(data.shape().size(), points.size() / 40);
+      for (const ShapeContact& contact : data.shape())
+        ASSERT_NEAR(contact.distance, queries.signedDistance(id, points[contact.id]).distance,
+                    data.errorBound());
+    }
+  }
+}
+
 TEST(SurfaceProxy, RefusesWhatIsTooLarge) {
   const auto codeOf = [](const Mesh& body, const ProxySettings& settings) {
     try {
