@@ -247,6 +247,10 @@ constexpr double kExitWeight = 0x1p-30;
 /// touch last. Any value well above the roundings of moved positions, some 2^-51, will do. Meshes
 /// whose vertices are in front of neighbouring faces by no more than this count as convex.
 constexpr double kExitSlack = 0x1p-40;
+/// Relative to the largest coordinate: how far beside a point of a surface it is asked whether a
+/// body ends there. Points where triangles intersect are right to some 2^-50, and triangles within
+/// kExitSlack of such a point count as triangles at it.
+constexpr double kOuterAside = 0x1p-32;
 /// Relative to the largest coordinate: a translation of convex meshes is minimal if none is shorter
 /// by more than this. It covers kExitSlack, and vertices in front of faces by that.
 constexpr double kMinimalSlack = 0x1p-36;

@@ -2,11 +2,13 @@
 
 #include <palpate/Error.h>
 
-#include "Queries/Embedding.h"
-#include "Queries/PointDistances.h"
 #include "Core/Text.h"
 #include "Math/RayCrossing.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Queries/Embedding.h"
+#include "Queries/OuterSurface.h"
+#include "Queries/PointDistances.h"
 
 #include <algorithm>
 #include <bit>
@@ -29,9 +31,9 @@ class BodyQuery {
         m_stack(stack),
         m_frame(geometry) {}
 
-  /// The winding number of the surface about p; 0 on the surface. Counted along the axis, or
+  /// The winding number of the surface about p; none on the surface. Counted along the axis, or
   /// against it, that leaves the octree first.
-  int windingNumber(const Eigen::Vector3d& p) {
+  std::optional<int> windingNumber(const Eigen::Vector3d& p) {
     FloatBox ray = m_frame.boxOf(p);
     int axis = 0;
     bool against = false;
@@ -70,20 +72,39 @@ class BodyQuery {
       for (const std::uint32_t i : m_stack.found) count(i);
     }
     m_stack.exactDecisions += counts.undecided;
-    return on ? 0 : number;
+    return on ? std::nullopt : std::optional(number);
   }
 
-  /// The nearest point of the surface. If several triangles are equally near, on the lowest.
+  /// The nearest point of the surface. If several triangles are equally near, on the lowest. Of a
+  /// closed surface, the nearest point of its outer surface.
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
     const PointDistances distances(m_geometry, p, m_bruteForce);
     const auto near = distances.nearest(kInfinity, m_last);
     m_last = near->place;
+    const InsideVertex result{vertex,
+                              near->element,
+                              m_geometry.tree.ordered()[near->place],
+                              near->closest.barycentric,
+                              -near->closest.normal,
+                              near->closest.distance,
+                              true};
+    if (m_geometry.mesh.topology.closed != true || !(result.depth > 0)) return result;
+    const int number = windingNumber(p).value_or(0);
+    const OuterSurface outer(m_geometry, m_bruteForce,
+                             [this](const Eigen::Vector3d& q) { return windingNumber(q); });
+    if (number == 0 || outer.holds(p, distances, *near, number)) return result;
+    const auto way = outer.nearest(p, result.depth);
+    if (!way) return result;
+    const Triangle& corners = m_geometry.mesh.topology.triangles[way->element];
+    const Positions& now = m_geometry.mesh.now;
+    const double depth = stableLength(way->point - p);
     return {vertex,
-            near->element,
-            m_geometry.tree.ordered()[near->place],
-            near->closest.barycentric,
-            -near->closest.normal,
-            near->closest.distance,
+            way->element,
+            corners,
+            vertexTriangleDistance(way->point, now[corners[0]], now[corners[1]], now[corners[2]])
+                .barycentric,
+            (way->point - p).stableNormalized(),
+            depth,
             true};
   }
 
@@ -118,10 +139,10 @@ class InsideQuery {
           m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
       // That of a closed surface is an integer, which is exact where rounding leaves the sum open.
       if (found.decided || m_body.mesh.topology.closed != true) return found;
-      return {m_surface.windingNumber(p) != 0, true};
+      return {m_surface.windingNumber(p).value_or(0) != 0, true};
     }
     if (m_solid) return {m_solid->lowest(p).has_value(), true};
-    return {m_surface.windingNumber(p) != 0, true};
+    return {m_surface.windingNumber(p).value_or(0) != 0, true};
   }
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
     return m_surface.nearest(vertex, p);
@@ -147,7 +168,7 @@ bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point,
 int windingNumber(const SearchableGeometry& body, const Eigen::Vector3d& point, Engine engine,
                   PointQueryStack& stack) {
   if (body.tree.octree().size() == 0) return 0;
-  return BodyQuery(body, engine, stack).windingNumber(point);
+  return BodyQuery(body, engine, stack).windingNumber(point).value_or(0);
 }
 
 void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
@@ -169,7 +190,8 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
 }
 
 bool isClosed(SearchableGeometry& body) {
-  return body.solid || hasClosedSurface(body);  // tetrahedra define their inside
+  const bool hasClosed = hasClosedSurface(body);  // remembered for BodyQuery
+  return body.solid || hasClosed;                 // tetrahedra define their inside
 }
 
 bool hasClosedSurface(SearchableGeometry& body) {

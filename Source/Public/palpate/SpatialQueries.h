@@ -326,8 +326,11 @@ class PALPATE_EXPORT SpatialQueries {
   /// InsideRule::WindingNumber also takes bodies with holes, and any set of triangles.
   ///
   /// Each vertex comes with its surface point: the nearest point of the surface, of several equally
-  /// near ones that on the lowest triangle. Depth and surface point have the accuracy of
-  /// vertexTriangleDistance().
+  /// near ones that on the lowest triangle. Where parts of a closed body overlap, it is the nearest
+  /// point of the outer surface, beside which the winding number is 0. If more than two parts meet
+  /// in one point, a nearer one may be missed. Depth and surface point have the accuracy of
+  /// vertexTriangleDistance(), or are within 2^-36 of the largest coordinate where two triangles
+  /// intersect.
   ///
   /// Order    by vertex, ascending.
   /// Errors   NotClosed if the body has no inside: it is not a mesh, or with InsideRule::Closed it

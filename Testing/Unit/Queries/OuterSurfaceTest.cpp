@@ -1,0 +1,153 @@
+// findInsideVertices() of bodies whose parts overlap: each vertex leaves by the outer surface.
+#include <palpate/OctreeBasedCD.h>
+
+#include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace palpate::testing {
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// A union of turned boxes, for which distances inside are known.
+struct Boxes {
+  struct Part {
+    Eigen::Matrix3d rotation;
+    Vector3d centre, half;
+    /// How far inside, along the axes, a point is; negative outside.
+    double margin(const Vector3d& p) const {
+      return (half - (rotation.transpose() * (p - centre)).cwiseAbs()).minCoeff();
+    }
+  };
+  std::vector<Part> parts;
+
+  bool contains(const Vector3d& p, double margin) const {
+    return std::any_of(parts.begin(), parts.end(),
+                       [&](const Part& part) { return part.margin(p) > margin; });
+  }
+  Mesh mesh() const {
+    Mesh result;
+    for (const Part& part : parts) {
+      Mesh box = boxMesh(-part.half, part.half);
+      for (Vector3d& p : box.positions) p = part.rotation * p + part.centre;
+      append(result, box);
+    }
+    return result;
+  }
+  /// The distance of the outer surface, from the distances of points of it that are dense. It is
+  /// too large by at most about `spacing`.
+  double depth(const Vector3d& p, double spacing) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Part& part : parts)
+      for (int axis = 0; axis < 3; ++axis)
+        for (const double side : {-1.0, 1.0}) {
+          const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+          const auto count = [&](int k) { return std::ceil(2.0 * part.half[k] / spacing); };
+          for (double i = 0; i <= count(u); ++i)
+            for (double j = 0; j <= count(v); ++j) {
+              Vector3d at;
+              at[axis] = side * part.half[axis];
+              at[u] = (2.0 * i / count(u) - 1.0) * part.half[u];
+              at[v] = (2.0 * j / count(v) - 1.0) * part.half[v];
+              const Vector3d q = part.rotation * at + part.centre;
+              if ((q - p).norm() < least && !contains(q, 1e-9)) least = (q - p).norm();
+            }
+        }
+    return least;
+  }
+};
+
+std::vector<InsideVertex> insideOf(const std::vector<Vector3d>& points, const Mesh& body,
+                                   Engine engine, const InsideSettings& settings = {}) {
+  Settings all;
+  all.engine = engine;
+  OctreeBasedCD detection(all);
+  const GeometryId vertices = detection.addPointSet(points),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  std::vector<InsideVertex> inside;
+  detection.queries().findInsideVertices(vertices, id, inside, settings);
+  return inside;
+}
+
+void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
+  constexpr double kSpacing = 0.02;
+  const Mesh mesh = boxes.mesh();
+  const std::vector<InsideVertex> inside = insideOf(points, mesh, Engine::Octree);
+  EXPECT_EQ(inside, insideOf(points, mesh, Engine::BruteForce));
+  EXPECT_EQ(inside, insideOf(points, mesh, Engine::Octree, {.rule = InsideRule::WindingNumber}));
+  std::size_t count = 0;
+  for (const Vector3d& p : points) count += boxes.contains(p, 0.0);
+  EXPECT_EQ(inside.size(), count);
+  for (const InsideVertex& each : inside) {
+    const Vector3d &p = points[each.vertex], end = p + each.depth * each.direction;
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(each.corners[i], mesh.triangles[each.triangle][i]);
+      point += each.barycentric[i] * mesh.positions[each.corners[i]];
+    }
+    ASSERT_LT((point - end).norm(), 1e-12);
+    ASSERT_FALSE(boxes.contains(end, 1e-12));
+    const double depth = boxes.depth(p, kSpacing);
+    ASSERT_LE(each.depth, depth + 1e-12);
+    ASSERT_GE(each.depth, depth - kSpacing);
+  }
+}
+
+TEST(OuterSurface, VerticesInCrossingBarsLeaveByIt) {
+  // Both bars hide the middle of each other's faces: there, the nearest ways lead to the corners
+  // between them.
+  const Boxes bars{{{Eigen::Matrix3d::Identity(), {0, 0, 0}, {2, 0.5, 0.5}},
+                    {Eigen::Matrix3d::Identity(), {0, 0, 0}, {0.5, 2, 0.6}}}};
+  Random random(1);
+  std::vector<Vector3d> points{{0, 0, 0}, {0.1, 0.05, 0.02}};
+  for (int i = 0; i < casesOf(60); ++i)
+    points.push_back(randomPoint(random, -1, 1).cwiseProduct(Vector3d(1.0, 1.0, 0.6)));
+  expectWaysOut(bars, points);
+}
+
+TEST(OuterSurface, VerticesInTurnedOverlappingBoxesLeaveByIt) {
+  Random random(2);
+  for (int i = 0; i < casesOf(12); ++i) {
+    Boxes boxes;
+    for (int k = 0; k < 2; ++k)
+      boxes.parts.push_back(
+          {Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized())
+               .toRotationMatrix(),
+           0.3 * randomPoint(random, -1, 1),
+           Vector3d::Constant(0.4) + 0.5 * randomPoint(random, 0, 1)});
+    std::vector<Vector3d> points;
+    for (int k = 0; k < 20; ++k) points.push_back(randomPoint(random, -0.8, 0.8));
+    expectWaysOut(boxes, points);
+  }
+}
+
+/// A body without overlaps keeps the nearest point of its surface.
+TEST(OuterSurface, IsTheWholeSurfaceOfASimpleBody) {
+  Random random(3);
+  Mesh body = sphere(9, 14, {0, 0, 0}, 1.0);
+  for (Vector3d& p : body.positions) p *= uniform(random, 0.5, 1.0);
+  std::vector<Vector3d> points;
+  for (int i = 0; i < casesOf(2000); ++i) points.push_back(randomPoint(random, -1, 1));
+  OctreeBasedCD detection;
+  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles);
+  const std::vector<InsideVertex> inside = insideOf(points, body, Engine::Octree);
+  EXPECT_GT(inside.size(), points.size() / 20);
+  for (const InsideVertex& each : inside) {
+    const auto nearest = detection.queries().closestPoint(id, points[each.vertex]);
+    ASSERT_EQ(each.triangle, nearest->element);
+    ASSERT_EQ(each.depth, nearest->distance);
+  }
+}
+
+}  // namespace
+
+}  // namespace palpate::testing
