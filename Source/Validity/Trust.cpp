@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <vector>
 
 namespace palpate {
 
@@ -60,6 +61,16 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
     return std::numeric_limits<double>::infinity();
   return plan.method == Method::Intersection ? std::min(a.smallestHeight, b.smallestHeight)
                                              : settings.thickness;
+}
+
+/// Whether no two triangles share a vertex, and some have vertices at the same place.
+bool isUnwelded(const TriangleMesh& mesh) {
+  const MeshTopology& topology = mesh.topology;
+  if (!topology.hasFaces() || topology.triangles.size() < 2) return false;
+  for (std::uint32_t v = 0; v < topology.vertexCount; ++v)
+    if (topology.vertexTriangles[v].size() > 1) return false;
+  const std::vector<Eigen::Vector3d> positions = mesh.now.all();
+  return weld(positions, topology.triangles).positions.size() < positions.size();
 }
 
 /// L: rounding errors of distances.
@@ -135,8 +146,13 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
 
   const std::array<Revision, 4> topologies{a.topology, a.enabled, b.topology, b.enabled};
   const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
-  m_checkCredit = m_topologies.isCurrent(topologies) ? std::min(m_checkCredit + 1, most) : most;
-  m_topologies.commit(topologies);
+  if (m_topologies.isCurrent(topologies)) {
+    m_checkCredit = std::min(m_checkCredit + 1, most);
+  } else {
+    m_checkCredit = most;
+    m_isUnwelded = &a.mesh == &b.mesh && isUnwelded(a.mesh);
+    m_topologies.commit(topologies);
+  }
   if (!mayPierce(a, b) || startsApart || plan.method == Method::Intersection ||
       plan.method == Method::DistanceField ||
       (plan.method == Method::Proximity && plan.motion > 0.0 && plan.step.motion == 0.0))
@@ -200,7 +216,9 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   const bool trustedIfStraight = meetsConditions(
       settings, a, b, plan, facts, validity, !nearby || !contents.intersectingTriangles.empty());
   validity.arcDeviation = plan.arcDeviation;
-  validity.trusted = trustedIfStraight && validity.arcDeviation <= settings.thickness;
+  validity.unwelded = m_isUnwelded;
+  validity.trusted =
+      trustedIfStraight && validity.arcDeviation <= settings.thickness && !validity.unwelded;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
   const bool findsImpacts = plan.swept() || plan.step.reportsImpacts;
   m_atEnd = {};

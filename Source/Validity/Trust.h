@@ -41,6 +41,7 @@ class Trust {
 
   KnownState m_atStart, m_atEnd;  ///< of the step last detected
   DerivedFrom<4> m_topologies;
+  bool m_isUnwelded = false;  ///< Validity::unwelded, for these topologies
   int m_checkCredit = 0;  ///< initial intersection checks saved for later, times kFramesPerCheck
 };
 

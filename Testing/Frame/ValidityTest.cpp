@@ -282,6 +282,46 @@ TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
 }
 
 /// Read while positions are copied or later, it is the displacement of the same step.
+/// As an STL file has it: each triangle has three vertices of its own.
+TEST(Validity, OfAnUnweldedMeshWithItselfIsNotTrusted) {
+  const Mesh cube = boxMesh({0, 0, 0}, {1, 1, 1});
+  Mesh unwelded;
+  for (const Triangle& t : cube.triangles) {
+    const auto first = static_cast<std::uint32_t>(unwelded.positions.size());
+    for (const std::uint32_t v : t) unwelded.positions.push_back(cube.positions[v]);
+    unwelded.triangles.push_back({first, first + 1, first + 2});
+  }
+  const Welded welded = weld(unwelded.positions, unwelded.triangles);
+  for (const Method method : {Method::Auto, Method::Proximity, Method::Intersection}) {
+    OctreeBasedCD detection;
+    const GeometryId soup = detection.addTriangleMesh(unwelded.positions, unwelded.triangles),
+                     closed = detection.addTriangleMesh(welded.positions, welded.triangles);
+    for (const GeometryId id : {soup, closed})
+      detection.addCollisionPair(
+          id, id, {.method = method, .thickness = method == Method::Intersection ? 0.0 : 0.01});
+    for (int frame = 0; frame < 2; ++frame) {
+      detection.detectCollision();
+      const Validity &ofSoup = detection.collisionData(soup, soup).validity(),
+                     &ofClosed = detection.collisionData(closed, closed).validity();
+      EXPECT_TRUE(ofSoup.unwelded);
+      EXPECT_FALSE(ofSoup.trusted);
+      EXPECT_FALSE(ofClosed.unwelded);
+      EXPECT_TRUE(ofClosed.trusted);
+      detection.advance();
+    }
+  }
+  // Triangles that are apart are no mesh that was cut into pieces.
+  OctreeBasedCD detection;
+  const GeometryId apart = detection.addTriangleMesh(
+      std::vector<Eigen::Vector3d>{
+          {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+      std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}});
+  detection.addCollisionPair(apart, apart, {.method = Method::Proximity, .thickness = 0.01});
+  detection.detectCollision();
+  EXPECT_FALSE(detection.collisionData(apart, apart).validity().unwelded);
+  EXPECT_TRUE(detection.collisionData(apart, apart).validity().trusted);
+}
+
 TEST(Displacement, IsTheRelativeMotionOfTheStep) {
   for (const int threads : {1, 2}) {
     Random random(3);

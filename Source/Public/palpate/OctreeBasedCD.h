@@ -384,7 +384,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A capture that cannot be written is no exception: AuditFailure::fileError names the reason.
   std::span<const AuditFailure> auditFailures() const;
   /// A copy of everything that the next detectCollision() would compute its answers from. Directly
-  /// after a frame it is the problem of that frame.
+  /// after a frame it is the problem of that frame. It holds positions of placed deforming meshes
+  /// in the world. Where these exceed kLargestMeasure, capture() and the functions of
+  /// <palpate/Capture.h> that take a problem throw NonFinitePosition.
   CollisionProblem problem() const;
 
  private:

@@ -79,6 +79,11 @@ struct Validity {
   /// The normals of Intersection are never certified: those of vertices point to the front of the
   /// triangle, and those of edges to the side on which the surfaces at both edges are outside.
   bool sideMayBeWrong = true;
+  /// Whether the pair is of a mesh with itself, no two of whose triangles share a vertex although
+  /// some have vertices at the same place, as those of an STL file. Triangles that are neighbours
+  /// are then in contact, and the answer is not trusted. weld() joins them. Found when elements are
+  /// set or enabled, from the positions of that frame.
+  bool unwelded = false;
 
   /// The main method that answered. Auto stands for Proximity and Continuous, feature by feature.
   /// Single contacts of Auto may come from another method: see `atImpact`, and MethodReason. This
