@@ -49,7 +49,7 @@ class GeometryMotion {
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
 struct Geometry : SearchableGeometry {
-  explicit Geometry(GeometryId newId) : SearchableGeometry(newId), step(newId) {}
+  explicit Geometry(GeometryId newId) : SearchableGeometry(newId) {}
 
   CollisionFilter filter;
   GeometryStep step;          ///< writes the positions of both ends

@@ -20,22 +20,22 @@ constexpr std::size_t kCopyGrain = 16384, kPiece = 512;  ///< kPiece fits in the
 constexpr std::size_t kMostElements = std::size_t{1} << 28;
 constexpr std::size_t kMostTetrahedra = kMostElements / 4;  // of four faces each
 
-void checkIndices(GeometryId id, const std::string& element, std::size_t index,
+void checkIndices(const GeometryLabel& label, const std::string& element, std::size_t index,
                   std::span<const std::uint32_t> vertices, std::size_t count) {
   for (const std::uint32_t vertex : vertices)
     if (vertex >= count)
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", " + element + " " + std::to_string(index) + ": vertex index " +
+                  nameOf(label) + ", " + element + " " + std::to_string(index) + ": vertex index " +
                       std::to_string(vertex) + " is out of range; the mesh has " +
                       std::to_string(count) + " vertices",
-                  id, index);
+                  label.id, index);
 }
 
 }  // namespace
 
-void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
-                    const char* which, const Threads& threads, const Eigen::Vector3d* before,
-                    MotionRange* moved) {
+void checkPositions(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
+                    Eigen::Vector3d* out, const char* which, const Threads& threads,
+                    const Eigen::Vector3d* before, MotionRange* moved) {
   std::atomic<std::size_t> first = positions.size();
   std::mutex mutex;
   threads.forChunks(positions.size(), kCopyGrain,
@@ -58,55 +58,56 @@ void checkPositions(GeometryId id, std::span<const Eigen::Vector3d> positions, E
   const std::size_t bad = first;
   if (bad == positions.size()) return;
   throw Error(ErrorCode::NonFinitePosition,
-              nameOf(id) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
+              nameOf(label) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
                   textOf(positions[bad]) + "; positions must be " + kRangeRule,
-              id, bad);
+              label.id, bad);
 }
 
-CountedVector<Eigen::Vector3d> checkedRest(GeometryId id,
+CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel& label,
                                            std::span<const Eigen::Vector3d> positions) {
   CountedVector<Eigen::Vector3d> rest(positions.size());
-  checkPositions(id, positions, rest.data(), "", Threads(1));
+  checkPositions(label, positions, rest.data(), "", Threads(1));
   return rest;
 }
 
-void checkCounts(GeometryId id, std::span<const Eigen::Vector3d> positions,
+void checkCounts(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
                  std::span<const Triangle> triangles, GeometryType type) {
   const bool lines = type == GeometryType::Lines;
   const std::string element = lines ? "segment" : "triangle";
   if (positions.size() > kMostElements || triangles.size() > kMostElements)
     throw Error(ErrorCode::TooLarge,
-                nameOf(id) + ": " + std::to_string(positions.size()) + " vertices and " +
+                nameOf(label) + ": " + std::to_string(positions.size()) + " vertices and " +
                     std::to_string(triangles.size()) + " " + element +
                     "s; at most 2^28 of each are supported",
-                id);
+                label.id);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    checkIndices(id, element, t, triangles[t], positions.size());
+    checkIndices(label, element, t, triangles[t], positions.size());
     if (lines && triangles[t][0] == triangles[t][1])
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", segment " + std::to_string(t) + " joins vertex " +
+                  nameOf(label) + ", segment " + std::to_string(t) + " joins vertex " +
                       std::to_string(triangles[t][0]) + " with itself",
-                  id, t);
+                  label.id, t);
   }
 }
 
-TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector3d> rest,
+TetrahedralTopology checkedTopology(const GeometryLabel& label,
+                                    std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron> tetrahedra) {
   if (rest.size() > kMostElements || tetrahedra.size() > kMostTetrahedra)
     throw Error(ErrorCode::TooLarge,
-                nameOf(id) + ": " + std::to_string(rest.size()) + " vertices and " +
+                nameOf(label) + ": " + std::to_string(rest.size()) + " vertices and " +
                     std::to_string(tetrahedra.size()) +
                     " tetrahedra; at most 2^28 and 2^26 are supported",
-                id);
+                label.id);
   for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-    checkIndices(id, "tetrahedron", t, tetrahedra[t], rest.size());
+    checkIndices(label, "tetrahedron", t, tetrahedra[t], rest.size());
     Tetrahedron sorted = tetrahedra[t];
     std::sort(sorted.begin(), sorted.end());
     if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ", tetrahedron " + std::to_string(t) + " has vertex " +
+                  nameOf(label) + ", tetrahedron " + std::to_string(t) + " has vertex " +
                       std::to_string(*twice) + " twice",
-                  id, t);
+                  label.id, t);
   }
   std::optional<OverusedFace> fault;
   TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault);
@@ -114,36 +115,36 @@ TetrahedralTopology checkedTopology(GeometryId id, std::span<const Eigen::Vector
   const auto& [a, b, c] = fault->face;
   const auto& [s, t, u] = fault->tetrahedra;
   throw Error(ErrorCode::SharedFace,
-              nameOf(id) + ", tetrahedron " + std::to_string(u) + ": its face with vertices " +
+              nameOf(label) + ", tetrahedron " + std::to_string(u) + ": its face with vertices " +
                   std::to_string(a) + ", " + std::to_string(b) + " and " + std::to_string(c) +
                   " already belongs to tetrahedra " + std::to_string(s) + " and " +
                   std::to_string(t),
-              id, u);
+              label.id, u);
 }
 
-void checkRadii(GeometryId id, std::span<const double> radii) {
+void checkRadii(const GeometryLabel& label, std::span<const double> radii) {
   for (std::size_t v = 0; v < radii.size(); ++v)
     if (!(radii[v] >= 0.0) || !isWithinRange(radii[v]))
       throw Error(ErrorCode::InvalidRadius,
-                  nameOf(id) + ", vertex " + std::to_string(v) + ": radius is " + textOf(radii[v]) +
-                      "; it must be " + kLengthRule,
-                  id, v);
+                  nameOf(label) + ", vertex " + std::to_string(v) + ": radius is " +
+                      textOf(radii[v]) + "; it must be " + kLengthRule,
+                  label.id, v);
 }
 
-void checkOnePerVertex(GeometryId id, std::span<const Eigen::Vector3d> positions,
+void checkOnePerVertex(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
                        std::span<const double> radii) {
   if (radii.size() != positions.size())
     throw Error(ErrorCode::InvalidRadius,
-                nameOf(id) + ": " + std::to_string(radii.size()) + " radii given for " +
+                nameOf(label) + ": " + std::to_string(radii.size()) + " radii given for " +
                     std::to_string(positions.size()) + " vertices",
-                id);
+                label.id);
 }
 
 void checkAttachable(const Geometry& geometry, const DistanceField& field) {
   const MeshTopology& topology = geometry.mesh.topology;
   const auto refuse = [&](const std::string& reason, ErrorCode code,
                           std::optional<std::size_t> element = {}) {
-    throw Error(code, nameOf(geometry.id) + reason, geometry.id, element);
+    throw Error(code, nameOf(geometry) + reason, geometry.id, element);
   };
   if (!topology.hasFaces())
     refuse(" is " + nameOf(topology.type) +
@@ -168,15 +169,14 @@ void checkProxy(const Geometry& geometry, const SurfaceProxySettings& settings) 
   const MeshTopology& topology = geometry.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(geometry.id) + " is " + nameOf(topology.type) +
+                nameOf(geometry) + " is " + nameOf(topology.type) +
                     "; attachSurfaceProxy() is for triangle and tetrahedral meshes",
                 geometry.id);
   const auto need = [&](const char* which, double value, double most, const std::string& rule) {
     if (!(value > 0.0 && value <= most))
-      throw Error(
-          ErrorCode::InvalidSettings,
-          nameOf(geometry.id) + ": " + which + " is " + textOf(value) + "; it must be " + rule,
-          geometry.id);
+      throw Error(ErrorCode::InvalidSettings,
+                  nameOf(geometry) + ": " + which + " is " + textOf(value) + "; it must be " + rule,
+                  geometry.id);
   };
   need("reach", settings.reach, kLargestMeasure, "positive and finite");
   need("errorBound", settings.errorBound, kLargestMeasure, "positive and finite");
@@ -187,7 +187,7 @@ void checkShapeMayChange(const Geometry& geometry, const char* call) {
   if (!geometry.isShapeFixed()) return;
   const bool hasField = geometry.field != nullptr;
   throw Error(ErrorCode::UnsupportedMethod,
-              nameOf(geometry.id) + " has " +
+              nameOf(geometry) + " has " +
                   (hasField ? "a distance field" : "the leaves of a proxy") +
                   " attached, so that " + call + " may not change it; detach " +
                   (hasField ? "the field by attachDistanceField() with null"
@@ -197,19 +197,17 @@ void checkShapeMayChange(const Geometry& geometry, const char* call) {
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
   if (geometry.shape)
+    throw Error(ErrorCode::WrongPositionCount,
+                nameOf(geometry) + " is a shape, which has no positions; setTransform() moves it",
+                geometry.id);
+  if (geometry.isField())
     throw Error(
         ErrorCode::WrongPositionCount,
-        nameOf(geometry.id) + " is a shape, which has no positions; setTransform() moves it",
+        nameOf(geometry) + " is a distance field, which has no positions; setTransform() moves it",
         geometry.id);
-  if (geometry.isField())
-    throw Error(ErrorCode::WrongPositionCount,
-                nameOf(geometry.id) +
-                    " is a distance field, which has no positions; setTransform() moves it",
-                geometry.id);
   if (count != geometry.mesh.topology.vertexCount)
     throw Error(ErrorCode::WrongPositionCount,
-                nameOf(geometry.id) + ": " + std::to_string(count) +
-                    " positions given, but it has " +
+                nameOf(geometry) + ": " + std::to_string(count) + " positions given, but it has " +
                     std::to_string(geometry.mesh.topology.vertexCount) + " vertices" +
                     (geometry.solid                      ? "; setTetrahedra() changes their number"
                      : geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number"

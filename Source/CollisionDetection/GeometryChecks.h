@@ -14,17 +14,18 @@ namespace palpate {
 /// Copies the positions to `out` while checking them. which: " before", " now" or nothing, for the
 /// message. If `before` is given, `moved` receives the motion from there; this costs half as much
 /// as reading both arrays again.
-void checkPositions(GeometryId, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
+void checkPositions(const GeometryLabel&, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
                     const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
                     MotionRange* moved = nullptr);
 /// Returns a copy of the positions of a new topology.
-CountedVector<Eigen::Vector3d> checkedRest(GeometryId, std::span<const Eigen::Vector3d>);
-void checkCounts(GeometryId, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
+CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
+void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
                  GeometryType);
-TetrahedralTopology checkedTopology(GeometryId, std::span<const Eigen::Vector3d> rest,
+TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron>);
-void checkRadii(GeometryId, std::span<const double>);
-void checkOnePerVertex(GeometryId, std::span<const Eigen::Vector3d>, std::span<const double> radii);
+void checkRadii(const GeometryLabel&, std::span<const double>);
+void checkOnePerVertex(const GeometryLabel&, std::span<const Eigen::Vector3d>,
+                       std::span<const double> radii);
 /// Throws unless the field is of this mesh, which may have one.
 void checkAttachable(const Geometry&, const DistanceField&);
 void checkProxy(const Geometry&, const SurfaceProxySettings&);

@@ -31,7 +31,8 @@ void GeometryStep::releaseMemory() {
 
 void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = shape; }
 
-Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> positions,
+Positions::Body GeometryStep::checkedBody(const GeometryLabel& label,
+                                          std::span<const Eigen::Vector3d> positions,
                                           const char* which, const Threads& threads,
                                           const Eigen::Vector3d* from, MotionRange* moved) {
   auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
@@ -39,7 +40,7 @@ Positions::Body GeometryStep::checkedBody(std::span<const Eigen::Vector3d> posit
   if (free == m_bodies.end())
     free = m_bodies.insert(free, std::make_shared<CountedVector<Eigen::Vector3d>>());
   (*free)->resize(positions.size());
-  checkPositions(m_id, positions, (*free)->data(), which, threads, from, moved);
+  checkPositions(label, positions, (*free)->data(), which, threads, from, moved);
   return *free;
 }
 
@@ -58,18 +59,18 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, Positions::Body b
   end.setBody(std::move(body), m_revisions.next());
 }
 
-void GeometryStep::setPositions(TriangleMesh& mesh,
+void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
                                 std::optional<std::span<const Eigen::Vector3d>> before,
                                 std::span<const Eigen::Vector3d> now, const Threads& threads,
                                 std::optional<MotionRange>* moved) {
   const bool isPlaced = mesh.now.isPlaced() || mesh.before.isPlaced();
-  const auto start = before ? checkedBody(*before, " before", threads) : nullptr;
+  const auto start = before ? checkedBody(label, *before, " before", threads) : nullptr;
   const bool followsNow = m_isNew && !m_bodyGiven && !before;
   const bool measures = moved && !isPlaced && !followsNow && !now.empty();
   const Eigen::Vector3d* const from =
       !measures ? nullptr : (start ? *start : mesh.before.body()).data();
   MotionRange motion;
-  auto end = checkedBody(now, before ? " now" : "", threads, from, &motion);
+  auto end = checkedBody(label, now, before ? " now" : "", threads, from, &motion);
   // Nothing below throws.
   if (start) {
     m_bodyGiven = true;
@@ -88,12 +89,12 @@ void GeometryStep::place(TriangleMesh& mesh, Positions& end,
   end.place(transform, m_revisions.next());
 }
 
-void GeometryStep::setTransform(TriangleMesh& mesh, PlacedShape* shape,
+void GeometryStep::setTransform(const GeometryLabel& label, TriangleMesh& mesh, PlacedShape* shape,
                                 const std::optional<RigidTransform>& givenBefore,
                                 const RigidTransform& givenNow) {
   const auto checked = [&](const RigidTransform& transform, const char* which) {
     if (const std::string fault = faultOf(transform); !fault.empty())
-      throw Error(ErrorCode::InvalidTransform, nameOf(m_id) + ": " + which + fault, m_id);
+      throw Error(ErrorCode::InvalidTransform, nameOf(label) + ": " + which + fault, label.id);
     return withExactRotation(transform);
   };
   std::optional<RigidTransform> before;

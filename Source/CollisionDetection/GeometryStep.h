@@ -7,6 +7,7 @@
 #include "Mesh/Positions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
+#include "Queries/SearchableGeometry.h"
 #include "Shapes/PlacedShape.h"
 
 #include <cstdint>
@@ -31,19 +32,18 @@ namespace palpate {
 /// Errors   a call that throws changes nothing.
 class GeometryStep {
  public:
-  explicit GeometryStep(GeometryId id) : m_id(id) {}
-
   /// Positions of a new geometry or topology, at both ends.
   void start(TriangleMesh&, Positions::Body) noexcept;
   /// The shape of a new analytical geometry, not placed.
   void startShape(const Shape&);
   /// moved: if not null, receives the motion of the step where both ends are unplaced.
-  void setPositions(TriangleMesh&, std::optional<std::span<const Eigen::Vector3d>> before,
+  void setPositions(const GeometryLabel&, TriangleMesh&,
+                    std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&,
                     std::optional<MotionRange>* moved);
   /// shape: null if there is none.
-  void setTransform(TriangleMesh&, PlacedShape* shape, const std::optional<RigidTransform>& before,
-                    const RigidTransform& now);
+  void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
+                    const std::optional<RigidTransform>& before, const RigidTransform& now);
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
@@ -59,12 +59,12 @@ class GeometryStep {
   bool isNew() const { return m_isNew; }
 
  private:
-  Positions::Body checkedBody(std::span<const Eigen::Vector3d>, const char* which, const Threads&,
+  Positions::Body checkedBody(const GeometryLabel&, std::span<const Eigen::Vector3d>,
+                              const char* which, const Threads&,
                               const Eigen::Vector3d* from = nullptr, MotionRange* moved = nullptr);
   void setBody(TriangleMesh&, Positions& end, Positions::Body) noexcept;
   void place(TriangleMesh&, Positions& end, const RigidTransform&) noexcept;
 
-  GeometryId m_id;
   Positions m_detected;
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step

@@ -161,7 +161,7 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
                                  const RigidTransform& now) {
   Geometry& geometry = at(id);
   // The positions in the body's frame, and the octree, stay as they are.
-  geometry.step.setTransform(geometry.mesh, shapeOf(geometry), before, now);
+  geometry.step.setTransform(geometry, geometry.mesh, shapeOf(geometry), before, now);
   ++m_state;
 }
 
@@ -206,7 +206,7 @@ void GeometryTable::setPositions(GeometryId id,
   if (before) checkPositionCount(geometry, before->size());
   checkPositionCount(geometry, now.size());
   std::optional<MotionRange> moved;
-  geometry.step.setPositions(geometry.mesh, before, now, threads,
+  geometry.step.setPositions(geometry, geometry.mesh, before, now, threads,
                              geometry.motion.shouldMeasure() ? &moved : nullptr);
   ++m_state;
   if (moved) geometry.motion.set(geometry.mesh, *moved);
@@ -217,8 +217,9 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTriangles()");
   checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
-  checkCounts(id, positions, triangles, GeometryType::Triangles);
-  setTopology(geometry, checkedRest(id, positions), {positions.size(), triangles}, {}, prepare);
+  checkCounts(geometry, positions, triangles, GeometryType::Triangles);
+  setTopology(geometry, checkedRest(geometry, positions), {positions.size(), triangles}, {},
+              prepare);
   ++m_state;
 }
 
@@ -228,9 +229,9 @@ void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTetrahedra()");
   checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
-  CountedVector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  CountedVector<Eigen::Vector3d> rest = checkedRest(geometry, positions);
   auto solid = std::make_unique<Solid>();
-  solid->topology = checkedTopology(id, rest, tetrahedra);
+  solid->topology = checkedTopology(geometry, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid->topology.surface);
   setTopology(geometry, std::move(rest), std::move(topology), std::move(solid), prepare);
   ++m_state;
@@ -251,18 +252,21 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.revisions.enabled = geometry.revisions.counter.next();
 }
 
+void GeometryTable::setName(GeometryId id, std::string name) { at(id).name = std::move(name); }
+
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);
   if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(id) + ": sidedness is " +
+                nameOf(geometry) + ": sidedness is " +
                     std::to_string(static_cast<int>(filter.sidedness)) +
                     "; it must be Both or Outer",
                 id);
   if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(id) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
-                id);
+    throw Error(
+        ErrorCode::InvalidSettings,
+        nameOf(geometry) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
+        id);
   geometry.filter = filter;
   geometry.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
   geometry.revisions.filter = geometry.revisions.counter.next();
@@ -275,7 +279,7 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   for (const std::uint32_t element : elements)
     if (element >= topology.triangles.size())
       throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(id) + ": element " + std::to_string(element) +
+                  nameOf(geometry) + ": element " + std::to_string(element) +
                       " is out of range; the geometry has " +
                       std::to_string(topology.triangles.size()) + " elements",
                   id, element);

@@ -40,6 +40,7 @@ class GeometryTable {
                     std::span<const Triangle>, const Preparation&);
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>, const Preparation&);
+  void setName(GeometryId, std::string name);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
 

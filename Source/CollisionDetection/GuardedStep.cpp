@@ -56,12 +56,12 @@ std::string elementOf(const Geometry& geometry, std::uint32_t index) {
   const char* name = type == GeometryType::Lines    ? ", segment "
                      : type == GeometryType::Points ? ", point "
                                                     : ", triangle ";
-  return nameOf(geometry.id) + name + std::to_string(index);
+  return nameOf(geometry) + name + std::to_string(index);
 }
 
 std::string edgeOf(const Geometry& geometry, const std::array<std::uint32_t, 2>& edge) {
-  return nameOf(geometry.id) + ", edge (" + std::to_string(edge[0]) + ", " +
-         std::to_string(edge[1]) + ")";
+  return nameOf(geometry) + ", edge (" + std::to_string(edge[0]) + ", " + std::to_string(edge[1]) +
+         ")";
 }
 
 /// A contact of a list, with the geometries of its vertices.
@@ -94,17 +94,17 @@ ImpactQuery queryOf(const Placed<EdgeEdgeContact>& placed) {
 }
 
 std::array<std::string, 2> namesOf(const Placed<VertexTriangleContact>& placed) {
-  return {nameOf(placed.first.id) + ", vertex " + std::to_string(placed.contact.vertex),
+  return {nameOf(placed.first) + ", vertex " + std::to_string(placed.contact.vertex),
           elementOf(placed.second, placed.contact.triangle)};
 }
 std::array<std::string, 2> namesOf(const Placed<EdgeEdgeContact>& placed) {
   return {edgeOf(placed.first, placed.contact.edgeA), edgeOf(placed.second, placed.contact.edgeB)};
 }
 std::array<std::string, 2> namesOf(const Placed<ShapeContact>& placed) {
-  return {elementOf(placed.first, placed.contact.id), nameOf(placed.second.id)};
+  return {elementOf(placed.first, placed.contact.id), nameOf(placed.second)};
 }
 std::array<std::string, 2> namesOf(const Placed<ShapeShapeContact>& placed) {
-  return {nameOf(placed.first.id), nameOf(placed.second.id)};
+  return {nameOf(placed.first), nameOf(placed.second)};
 }
 
 /// How a point of a placed geometry moves in the step as it is now.

@@ -554,8 +554,7 @@ void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vec
 void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.at(geometry);
-  all->pairs.checkRigid(geometry);
+  all->pairs.checkRigid(all->geometries.at(geometry));
   all->geometries.setTransform(geometry, {}, {rotation, translation});
 }
 
@@ -564,8 +563,7 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rot
                                  const Eigen::Matrix3d& rotation,
                                  const Eigen::Vector3d& translation) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->geometries.at(geometry);
-  all->pairs.checkRigid(geometry);
+  all->pairs.checkRigid(all->geometries.at(geometry));
   all->geometries.setTransform(geometry, RigidTransform{rotationBefore, translationBefore},
                                {rotation, translation});
 }
@@ -611,6 +609,15 @@ std::shared_ptr<StepSource> OctreeBasedCD::stepSource() {
   const Implementation::ChangeGuard all(m_implementation);
   if (!all->guardSource) all->guardSource = std::make_shared<Implementation::GuardSource>(*all);
   return all->guardSource;
+}
+
+void OctreeBasedCD::setName(GeometryId geometry, std::string name) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->geometries.setName(geometry, std::move(name));
+}
+
+const std::string& OctreeBasedCD::name(GeometryId geometry) const {
+  return read().geometries.at(geometry).name;
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
@@ -741,7 +748,8 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
   const PairRecord& record = all.pairs.inOrder(all.geometries, a, b);
   if (!record.hasData)
     throw Error(ErrorCode::NotAvailable,
-                nameOf(a, b) + " has no results yet: call detectCollision() first", a);
+                nameOf(*record.a, *record.b) + " has no results yet: call detectCollision() first",
+                a);
   return record.data;
 }
 
@@ -752,7 +760,7 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
   checkCandidates(record);
   if (!record.candidatesVersion.isValid())
     throw Error(ErrorCode::NotAvailable,
-                nameOf(a, b) +
+                nameOf(*record.a, *record.b) +
                     " has no candidates: call collectCandidates(), or set "
                     "Settings::keepCandidates before detectCollision()",
                 a);

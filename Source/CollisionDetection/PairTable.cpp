@@ -13,9 +13,8 @@
 
 namespace palpate {
 
-std::string nameOf(GeometryId a, GeometryId b) {
-  return "pair (" + std::to_string(static_cast<std::uint32_t>(a)) + ", " +
-         std::to_string(static_cast<std::uint32_t>(b)) + ")";
+std::string nameOf(const GeometryLabel& a, const GeometryLabel& b) {
+  return "pair (" + a.number() + ", " + b.number() + ")";
 }
 
 bool PairRecord::mayUseProxy() const {
@@ -64,8 +63,8 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
   if (proxyVersion.isValid() && proxyVersion.sources()[0] == sources[0] &&
       proxyVersion.sources()[2] != sources[2])
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(pair.a, pair.b) +
-                    ": Method::Proxy is for a rigid body, and the positions of " + nameOf(b->id) +
+                nameOf(*a, *b) + ": Method::Proxy is for a rigid body, and the positions of " +
+                    nameOf(*b) +
                     " were changed; move it by setTransform(), or set its elements again",
                 b->id);
   const auto shared = std::find_if(others.begin(), others.end(),
@@ -119,9 +118,10 @@ constexpr const char* kRigidWithItself =
 
 constexpr const char* kNoPredicate = "Method::DistanceField does not use contact predicates";
 
-[[noreturn]] void throwPredicate(GeometryId a, GeometryId b) {
+[[noreturn]] void throwPredicate(const PairRecord& record) {
   throw Error(ErrorCode::UnsupportedMethod,
-              nameOf(a, b) + ": contact predicates are not for Method::Proxy", a);
+              nameOf(*record.a, *record.b) + ": contact predicates are not for Method::Proxy",
+              record.a->id);
 }
 
 /// What a pair by Method::DistanceField lacks; empty if nothing. field: of its body, or null.
@@ -141,7 +141,7 @@ std::string faultOf(const DistanceField* field, const PairSettings& settings, do
 class Check {
  public:
   Check(const Geometry& a, const Geometry& b, const PairSettings& settings)
-      : m_id(a.id), m_name(nameOf(a.id, b.id)), m_method(settings.method) {
+      : m_id(a.id), m_name(nameOf(a, b)), m_method(settings.method) {
     range(a.mesh, b.mesh, settings);
     types(a, b);
     if (m_method == Method::DistanceField || a.isField() || b.isField()) {
@@ -266,7 +266,8 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   Check(first, second, settings);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
-                nameOf(a, b) + " was added before; setPairSettings() changes its settings", a);
+                nameOf(first, second) + " was added before; setPairSettings() changes its settings",
+                a);
   auto record = std::make_unique<PairRecord>();
   record->pair = {a, b, settings};
   record->a = &first;
@@ -291,16 +292,16 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
 PairRecord& PairTable::at(const GeometryTable& geometries, GeometryId a, GeometryId b) const {
   const auto found = m_byIds.find(keyOf(a, b));
   if (found != m_byIds.end()) return *found->second;
-  geometries.at(a);
-  geometries.at(b);
-  throw Error(ErrorCode::UnknownPair, nameOf(a, b) + " was never added, or was removed", a);
+  throw Error(ErrorCode::UnknownPair,
+              nameOf(geometries.at(a), geometries.at(b)) + " was never added, or was removed", a);
 }
 
 PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, GeometryId b) const {
   PairRecord& record = at(geometries, a, b);
   if (record.pair.a != a)
     throw Error(ErrorCode::UnknownPair,
-                nameOf(a, b) + " was added as " + nameOf(b, a) + "; its results are in that order",
+                nameOf(*record.b, *record.a) + " was added as " + nameOf(*record.a, *record.b) +
+                    "; its results are in that order",
                 a);
   return record;
 }
@@ -310,8 +311,9 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   PairRecord& record = at(geometries, a, b);
   Check(*record.a, *record.b, settings);
   if (record.predicate && settings.method == Method::DistanceField)
-    throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
-  if (settings.method == Method::Proxy && record.predicate) throwPredicate(a, b);
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(*record.a, *record.b) + ": " + kNoPredicate,
+                a);
+  if (settings.method == Method::Proxy && record.predicate) throwPredicate(record);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0)
     record.nearAtRest = verticesWithin(record.a->mesh.topology, record.a->mesh.rest,
                                        settings.restDistance, threads);
@@ -326,10 +328,10 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   record.candidatesVersion.invalidate();
 }
 
-void PairTable::checkRigid(GeometryId geometry) const {
-  if (m_byIds.contains(keyOf(geometry, geometry)))
+void PairTable::checkRigid(const Geometry& geometry) const {
+  if (m_byIds.contains(keyOf(geometry.id, geometry.id)))
     throw Error(ErrorCode::UnsupportedMethod, nameOf(geometry, geometry) + ": " + kRigidWithItself,
-                geometry);
+                geometry.id);
 }
 
 void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field) const {
@@ -342,21 +344,22 @@ void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field
     ErrorCode code;
     const std::string fault =
         faultOf(ofB ? ofB : ofA, settings, (ofB ? record->a : record->b)->mesh.largestRadius, code);
-    if (!fault.empty()) throw Error(code, nameOf(a, b) + ": " + fault, geometry);
+    if (!fault.empty()) throw Error(code, nameOf(*record->a, *record->b) + ": " + fault, geometry);
   }
 }
 
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
-  if (predicate && record.usesProxy()) throwPredicate(a, b);
+  if (predicate && record.usesProxy()) throwPredicate(record);
   if (predicate && record.hasShape())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(a, b) +
+                nameOf(*record.a, *record.b) +
                     ": contact predicates are for pairs of meshes, and one of the two is a shape",
                 a);
   if (predicate && record.needsField())
-    throw Error(ErrorCode::UnsupportedMethod, nameOf(a, b) + ": " + kNoPredicate, a);
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(*record.a, *record.b) + ": " + kNoPredicate,
+                a);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }

@@ -135,7 +135,7 @@ class PairTable {
   void setNearAtRest(GeometryId, IndexLists) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.
-  void checkRigid(GeometryId) const;
+  void checkRigid(const Geometry&) const;
   /// Throws if a pair by Method::DistanceField cannot do with this field of the geometry, or
   /// without one.
   void checkFieldChange(GeometryId, const DistanceField*) const;
@@ -160,6 +160,6 @@ class PairTable {
       m_byIds;
 };
 
-std::string nameOf(GeometryId a, GeometryId b);  ///< "pair (3, 4)"
+std::string nameOf(const GeometryLabel& a, const GeometryLabel& b);  ///< "pair (3, 4)"
 
 }  // namespace palpate

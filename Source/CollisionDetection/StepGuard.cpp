@@ -17,7 +17,7 @@ void checkVertex(const Geometry& geometry, std::uint32_t vertex) {
   const std::size_t count = geometry.shape ? 0 : geometry.mesh.now.size();
   if (vertex == kNoElement || vertex < count) return;
   throw Error(ErrorCode::IndexOutOfRange,
-              nameOf(geometry.id) + ": vertex " + std::to_string(vertex) +
+              nameOf(geometry) + ": vertex " + std::to_string(vertex) +
                   " is out of range; the geometry has " + std::to_string(count) + " vertices",
               geometry.id, vertex);
 }
@@ -43,7 +43,7 @@ struct StepGuard::Implementation {
         if (geometry->isField())
           throw Error(ErrorCode::UnsupportedMethod,
                       nameOf(record->pair.a, record->pair.b) + ": a StepGuard cannot guard " +
-                          nameOf(geometry->id) + ", which is a distance field; leave the pair out",
+                          nameOf(*geometry) + ", which is a distance field; leave the pair out",
                       geometry->id);
       if (count == pairs.size()) pairs.emplace_back();
       std::unique_ptr<PairRecord>& own = pairs[count++];

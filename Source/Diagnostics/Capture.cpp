@@ -374,6 +374,7 @@ void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
     if (mesh.analytical || mesh.field || mesh.proxy)
       detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
                              mesh.translation);
+    detection.setName(id, mesh.name);
     detection.setCollisionFilter(id, mesh.filter);
     detection.setDisabledElements(id, mesh.disabled);
     if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);

@@ -17,6 +17,7 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   const TriangleMesh& mesh = geometry.mesh;
   CollisionProblem::Geometry copy;
   copy.id = geometry.id;
+  copy.name = geometry.name;
   copy.type = mesh.topology.type;
   copyTo<double>(copy.radii, mesh.radii);
   copy.filter = geometry.filter;

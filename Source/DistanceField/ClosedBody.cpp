@@ -66,7 +66,7 @@ void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads,
                      SearchableGeometry& out) {
   checkMesh(mesh, out.id);
   if (mesh.triangles.empty())
-    throw Error(ErrorCode::NotClosed, nameOf(out.id) + " has no triangles", out.id);
+    throw Error(ErrorCode::NotClosed, nameOf(out) + " has no triangles", out.id);
   makeBody(mesh.positions, mesh.triangles, threads, out);
 }
 

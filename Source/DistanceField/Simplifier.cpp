@@ -420,13 +420,13 @@ void Simplifier::giveUp() const {
   const std::string place = textOf(m_failure.place);
   if (const auto pair = findCrossing())
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(m_body.id) + " crosses or touches itself: triangles " +
+                nameOf(m_body) + " crosses or touches itself: triangles " +
                     std::to_string(pair->a) + " and " + std::to_string(pair->b) +
                     " have a common point, and there is no certified simplification near " + place,
                 m_body.id, pair->a);
   throw Error(
       ErrorCode::NotAvailable,
-      nameOf(m_body.id) + " has no certified simplification within maxDistance " +
+      nameOf(m_body) + " has no certified simplification within maxDistance " +
           textOf(m_settings.maxDistance) + ": the proof fails near " + place +
           (m_failure.stuck ? "; no displacement of vertex " + std::to_string(*m_failure.stuck) +
                                  " moves all of its triangles outward"

@@ -204,12 +204,12 @@ bool hasClosedSurface(SearchableGeometry& body) {
 void checkSettings(const SearchableGeometry& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(body.id) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
+                nameOf(body) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
                     "; it must be Closed or WindingNumber",
                 body.id);
   if (!(settings.margin >= 0.0 && settings.margin < 0.5))
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(body.id) + ": margin is " + textOf(settings.margin) +
+                nameOf(body) + ": margin is " + textOf(settings.margin) +
                     "; it must be at least 0 and below 0.5",
                 body.id);
 }
@@ -218,8 +218,7 @@ void checkInside(SearchableGeometry& body, InsideRule rule) {
   const MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::NotClosed,
-                nameOf(body.id) + " is " + nameOf(topology.type) + ", which has no inside",
-                body.id);
+                nameOf(body) + " is " + nameOf(topology.type) + ", which has no inside", body.id);
   if (rule == InsideRule::WindingNumber) {
     hasClosedSurface(body);  // remembered for evaluate()
     return;
@@ -232,7 +231,7 @@ void checkInside(SearchableGeometry& body, InsideRule rule) {
            std::to_string(edges[0][0]) + ", " + std::to_string(edges[0][1]) + ")";
   };
   throw Error(ErrorCode::NotClosed,
-              nameOf(body.id) + " has no inside: it is not closed and consistently oriented" +
+              nameOf(body) + " has no inside: it is not closed and consistently oriented" +
                   describe(defects.open, "belong to one triangle only") +
                   describe(defects.flipped, "have the same direction in both of their triangles") +
                   describe(defects.shared, "belong to three triangles or more") +

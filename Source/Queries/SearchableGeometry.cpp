@@ -161,14 +161,17 @@ TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, doubl
   return trees;
 }
 
-std::string nameOf(GeometryId id) {
-  return "geometry " + std::to_string(static_cast<std::uint32_t>(id));
+std::string GeometryLabel::number() const {
+  const std::string number = std::to_string(static_cast<std::uint32_t>(id));
+  return name.empty() ? number : number + " \"" + std::string(name) + "\"";
 }
+
+std::string nameOf(const GeometryLabel& label) { return "geometry " + label.number(); }
 
 SearchableGeometry& searchable(SearchableGeometry& geometry) {
   if (!geometry.isField()) return geometry;
   throw Error(ErrorCode::UnsupportedMethod,
-              nameOf(geometry.id) +
+              nameOf(geometry) +
                   " is a distance field, which queries do not support; use DistanceField::value()",
               geometry.id);
 }
@@ -182,7 +185,7 @@ std::string nameOf(GeometryType type) {
 void checkMeshType(const SearchableGeometry& geometry, bool tetrahedra, const char* call) {
   if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
   throw Error(ErrorCode::UnsupportedMethod,
-              nameOf(geometry.id) + " is " +
+              nameOf(geometry) + " is " +
                   (geometry.solid ? "a tetrahedral mesh" : nameOf(geometry.mesh.topology.type)) +
                   "; " + call,
               geometry.id);

@@ -23,6 +23,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace palpate {
 
@@ -66,6 +67,7 @@ struct SearchableGeometry : CountedObject {
   explicit SearchableGeometry(GeometryId newId) : id(newId) {}
 
   GeometryId id;
+  std::string name;  ///< OctreeBasedCD::setName()
   GeometryRevisions revisions;
   TriangleMesh mesh;                 ///< of a shape: no elements, and its corners as positions
   std::optional<PlacedShape> shape;  ///< of an analytical geometry
@@ -111,8 +113,17 @@ enum class BoxFrame {
 TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
                  bool wholeStep, BoxFrame frame = BoxFrame::World);
 
-std::string nameOf(GeometryId);    ///< "geometry 3"
-std::string nameOf(GeometryType);  ///< "a line mesh"
+/// A geometry in a message. An id alone is that of a geometry that is not there yet, or unknown.
+struct GeometryLabel {
+  GeometryLabel(GeometryId newId) : id(newId) {}
+  GeometryLabel(const SearchableGeometry& geometry) : id(geometry.id), name(geometry.name) {}
+  std::string number() const;  ///< "3", or "3 \"liver\"" where it has a name
+
+  GeometryId id;
+  std::string_view name;
+};
+std::string nameOf(const GeometryLabel&);  ///< "geometry 3"
+std::string nameOf(GeometryType);          ///< "a line mesh"
 /// Throws UnsupportedMethod unless the geometry is a triangle mesh or, with `tetrahedra`, a
 /// tetrahedral mesh. call: the end of the message.
 void checkMeshType(const SearchableGeometry&, bool tetrahedra, const char* call);

@@ -30,7 +30,7 @@ DerivedFrom<7>::Sources stateOf(const SearchableGeometry& geometry) {
 }  // namespace
 
 bool GeometryCopy::isCurrent(const SearchableGeometry& original) const {
-  return m_version.isCurrent(stateOf(original)) &&
+  return m_version.isCurrent(stateOf(original)) && geometry.name == original.name &&
          geometry.tree.updates() == original.tree.updates();
 }
 
@@ -60,6 +60,7 @@ void GeometryCopy::update(const SearchableGeometry& original) {
   mesh.before = original.mesh.before;
   mesh.outerSideOnly = original.mesh.outerSideOnly;
   geometry.shape = original.shape;
+  geometry.name = original.name;
   geometry.tree.copy(original.tree);
   m_version.commit(stateOf(original));
 }
@@ -283,12 +284,12 @@ Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double t
   const std::size_t size = positionsOf(geometry, geometry.mesh.now).size();
   if (vertex >= size)
     throw Error(ErrorCode::IndexOutOfRange,
-                nameOf(id) + ": vertex " + std::to_string(vertex) +
+                nameOf(geometry) + ": vertex " + std::to_string(vertex) +
                     " is out of range; the geometry has " + std::to_string(size) + " vertices",
                 id, vertex);
   if (!std::isfinite(time))
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(id) + ": time is " + textOf(time) + "; it must be finite", id);
+                nameOf(geometry) + ": time is " + textOf(time) + "; it must be finite", id);
   const StandardFloatingPoint standard;
   const Eigen::Vector3d now = geometry.mesh.now[vertex], before = geometry.mesh.before[vertex];
   if (time == 0.0 || time == 1.0) return time == 0.0 ? before : now;

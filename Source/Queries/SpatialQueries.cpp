@@ -125,12 +125,13 @@ void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
 
 void checkVertices(const SearchableGeometry& vertices, GeometryId body) {
   if (vertices.id == body)
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(body) + " is both the body and the owner of the vertices; these must differ",
-                body);
+    throw Error(
+        ErrorCode::InvalidSettings,
+        nameOf(vertices) + " is both the body and the owner of the vertices; these must differ",
+        body);
   if (vertices.shape)
     throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(vertices.id) + " is a shape, which has no vertices", vertices.id);
+                nameOf(vertices) + " is a shape, which has no vertices", vertices.id);
 }
 
 SpatialQueries::SpatialQueries(std::shared_ptr<Source> source)
@@ -156,8 +157,8 @@ void checkLength(double length, const char* name, bool finite) {
 
 void checkHasElements(const SearchableGeometry& geometry) {
   if (geometry.shape)
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(geometry.id) + " is a shape: it has no elements", geometry.id);
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(geometry) + " is a shape: it has no elements",
+                geometry.id);
 }
 
 RigidTransform checkedPose(const RigidTransform& pose, const char* what) {
@@ -442,7 +443,7 @@ void SpatialQueries::signedDistances(GeometryId id, std::span<const Eigen::Vecto
   SearchableGeometry& body = source.at(id);
   source.prepareInside(body, settings);
   if (body.tree.ordered().empty())
-    throw Error(ErrorCode::NotClosed, nameOf(id) + " has no triangles and so no surface", id);
+    throw Error(ErrorCode::NotClosed, nameOf(body) + " has no triangles and so no surface", id);
   const bool bruteForce = source.engine() == Engine::BruteForce;
   // Only these sides never change but at the surface: the winding number of an open mesh changes
   // everywhere, and inverted tetrahedra end inside.
@@ -573,7 +574,7 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
   const StandardFloatingPoint standard;
   const SearchableGeometry &a = source.at(idA), &b = source.at(idB);
   if (idA == idB)
-    throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(idA) + " twice",
+    throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(a) + " twice",
                 idA);
   const bool bruteForce = source.engine() == Engine::BruteForce;
   const Source::Loan scratch(source);
@@ -585,8 +586,8 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
   }
   const Shape &first = a.shape->now, &second = b.shape->now;
   if (first.isPlane() && second.isPlane())
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
+                idA);
   return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
 }
 
@@ -595,19 +596,19 @@ Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
   const StandardFloatingPoint standard;
   SearchableGeometry &a = source.at(idA), &b = source.at(idB);
   if (idA == idB)
-    throw Error(ErrorCode::InvalidSettings,
-                "penetration() was called for " + nameOf(idA) + " twice", idA);
+    throw Error(ErrorCode::InvalidSettings, "penetration() was called for " + nameOf(a) + " twice",
+                idA);
   for (SearchableGeometry* const body : {&a, &b}) {
     if (body->shape && body->shape->now.isTwoSided())
       throw Error(ErrorCode::NotClosed,
-                  nameOf(body->id) + " is a two-sided plane, which has no inside", body->id);
+                  nameOf(*body) + " is a two-sided plane, which has no inside", body->id);
     if (!body->shape && !body->solid) source.prepareInside(*body, {});
   }
   const Source::Loan scratch(source);
   if (!a.shape && !b.shape) return penetrationOf(a, b, source.engine(), scratch->penetration);
   if (a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane())
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(idA) + " and " + nameOf(idB) + " are both planes", idA);
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
+                idA);
   return shapePenetration(a, b, source.engine(), source.octreeSettings(), scratch->penetration,
                           scratch->shapeContacts.shapePair);
 }
@@ -700,7 +701,7 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
   checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!isWithinRange(point))
     throw Error(ErrorCode::NonFinitePosition,
-                nameOf(body) + ": the point is " + textOf(point) + "; it must be " + kRangeRule,
+                nameOf(solid) + ": the point is " + textOf(point) + "; it must be " + kRangeRule,
                 body);
   source.prepareTetrahedra(solid);
   const Source::Loan scratch(source);

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace palpate {
@@ -39,6 +40,7 @@ struct CollisionProblem {
     /// The field of an added distance field, or of a mesh that has one; the poses above place it.
     std::shared_ptr<const DistanceField> field{};
     std::optional<SurfaceProxySettings> proxy{};  ///< of the leaves that are attached to a mesh
+    std::string name{};                           ///< OctreeBasedCD::setName(); not in a file
   };
   /// A collision pair.
   struct Pair {

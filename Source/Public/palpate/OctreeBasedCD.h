@@ -21,6 +21,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <type_traits>
 
 namespace palpate {
@@ -230,6 +231,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The pose now, with the rotation that counts; the identity if setTransform() has not placed the
   /// geometry.
   Pose transform(GeometryId) const;
+  /// Names a geometry, for messages: "geometry 3" becomes `geometry 3 "liver"`. Any text, also one
+  /// that another geometry has; none by default. A capture file does not hold it.
+  void setName(GeometryId, std::string name);
+  const std::string& name(GeometryId) const;
   /// Sets which geometries this one collides with, and from which sides. Two geometries collide
   /// only if the mask of each contains a group of the other. A pair that does not collide has no
   /// contacts, no candidates and no cost, and is not trusted.

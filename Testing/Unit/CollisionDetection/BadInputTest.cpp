@@ -212,6 +212,45 @@ void expectPossible(Call call) {
   refuse({.thickness = 1, .contacts = static_cast<Contacts>(99)}, {ErrorCode::InvalidSettings, {}});
 }
 
+TEST(BadInput, IsReportedWithTheNameOfTheGeometry) {
+  OctreeBasedCD detection;
+  const testing::Mesh ball = testing::sphere(5, 8, {0, 0, 0}, 1.0);
+  const GeometryId liver = detection.addTriangleMesh(ball.positions, ball.triangles),
+                   tool = detection.addTriangleMesh(ball.positions, ball.triangles);
+  EXPECT_EQ(detection.name(liver), "");
+  detection.setName(liver, "liver");
+  EXPECT_EQ(detection.name(liver), "liver");
+  const std::string name = "geometry 0 \"liver\"", pair = "pair (0 \"liver\", 1)";
+  auto bad = ball.positions;
+  bad[3][1] = std::numeric_limits<double>::quiet_NaN();
+  using testing::expectRefused;
+  expectRefused(ErrorCode::NonFinitePosition, name + ", vertex 3",
+                [&] { detection.setPositions(liver, bad); });
+  expectRefused(ErrorCode::NonFinitePosition, name + ", vertex 3",
+                [&] { detection.setTriangles(liver, bad, ball.triangles); });
+  expectRefused(ErrorCode::WrongPositionCount, name,
+                [&] { detection.setPositions(liver, std::span(bad).first(3)); });
+  expectRefused(ErrorCode::InvalidTransform, name, [&] {
+    detection.setTransform(liver, 2.0 * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+  });
+  expectRefused(ErrorCode::UnknownPair, pair, [&] { detection.collisionData(liver, tool); });
+  detection.addCollisionPair(liver, tool);
+  expectRefused(ErrorCode::NotAvailable, pair, [&] { detection.collisionData(liver, tool); });
+  expectRefused(ErrorCode::UnknownPair, "pair (1, 0 \"liver\") was added as " + pair,
+                [&] { detection.collisionData(tool, liver); });
+  detection.detectCollision();
+  expectRefused(ErrorCode::InvalidSettings, name,
+                [&] { detection.queries().distance(liver, liver); });
+  detection.publish();
+  const auto snapshot = detection.latestSnapshot();
+  detection.setName(liver, "");
+  expectRefused(ErrorCode::IndexOutOfRange, name, [&] { snapshot->position(liver, 1000, 1.0); });
+  expectRefused(ErrorCode::NonFinitePosition, "geometry 0, vertex 3",
+                [&] { detection.setPositions(liver, bad); });
+  expectRefused(ErrorCode::UnknownGeometry, "geometry 7",
+                [&] { detection.setName(GeometryId{7}, "x"); });
+}
+
 TEST(BadInput, SettingsOutOfRange) {
   const auto refuse = [](const Settings& settings, const std::string& named) {
     try {
