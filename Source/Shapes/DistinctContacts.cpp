@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 
 namespace palpate {
@@ -27,8 +28,10 @@ double sizeOf(const Shape& shape, const RigidTransform& pose) {
   return box.sizes().maxCoeff() + 2.0 * shape.radius();
 }
 
+}  // namespace
+
 /// One pair's mesh, and its shape at the step's end.
-class Step {
+class DistinctContacts::Step {
  public:
   Step(const TriangleMesh& mesh, const Shape& shape, const RigidTransform& before,
        const RigidTransform& now, const PairSettings& settings)
@@ -41,17 +44,47 @@ class Step {
 
   /// Whether elements around the vertex or edge that holds the contact's point exclude its normal.
   bool isExcluded(const ShapeContact& c) const {
-    Segment feature{};
-    std::size_t count = 0;
-    for (int i = 0; i < 3; ++i) {
-      if (c.weights[i] <= 2 * kEdgeWeight) continue;
-      if (count == 2) return false;  // in the triangle's interior
-      feature[count++] = c.vertices[static_cast<std::size_t>(i)];
-    }
-    if (count == 1) feature[1] = feature[0];
-    return excludesDirection(m_mesh, feature, -c.normal, c.timeOfImpact);
+    const auto feature = featureOf(c);
+    return feature && excludesDirection(m_mesh, *feature, -c.normal, c.timeOfImpact);
   }
-
+  /// The plane in which all triangles around the vertex or edge lie that holds the contact's point,
+  /// at the step's end. None if there are fewer than two, or if areas are too small or too large to
+  /// be squared twice.
+  std::optional<FlatPart> flatPartOf(const ShapeContact& c) const {
+    const auto feature = featureOf(c);
+    if (!feature) return {};
+    Vector3d corner = Vector3d::Zero(), first = corner;  // of the first triangle
+    std::size_t count = 0;
+    for (const std::uint32_t triangle : m_mesh.topology.vertexTriangles[(*feature)[0]]) {
+      const Triangle& corners = m_mesh.topology.triangles[triangle];
+      if (std::find(corners.begin(), corners.end(), (*feature)[1]) == corners.end()) continue;
+      const Vector3d a = m_mesh.now[corners[0]],
+                     across = (m_mesh.now[corners[1]] - a).cross(m_mesh.now[corners[2]] - a);
+      if (count++ == 0) corner = a, first = across;
+      const double most = first.squaredNorm() * across.squaredNorm();
+      if (!(most > 0.0 &&
+            first.cross(across).squaredNorm() <= kNormalConeError * kNormalConeError * most))
+        return {};
+    }
+    if (count < 2) return {};
+    const Vector3d normal = first.stableNormalized();
+    return FlatPart{normal, normal.dot(corner)};
+  }
+  double slackAt(const Vector3d& x) const {
+    return kPlaneShare * m_settings.thickness + kNormalConeError * x.lpNorm<1>();
+  }
+  bool isIn(const FlatPart& part, const ShapeContact& c) const {
+    return std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
+      const Vector3d x = m_mesh.now[v];
+      return std::abs(part.normal.dot(x) - part.height) <= slackAt(x);
+    });
+  }
+  bool areSame(const FlatPart& a, const FlatPart& b) const {
+    const bool areOpposite = a.normal.dot(b.normal) < 0;
+    return a.normal.cross(b.normal).norm() <= kNormalConeError &&
+           std::abs(a.height - (areOpposite ? -b.height : b.height)) <=
+               kNormalConeError * std::abs(a.height);
+  }
   TangentPlane planeOf(const ShapeContact& c) const {
     Vector3d point = Vector3d::Zero();
     for (int i = 0; i < 3; ++i) point += c.weights[i] * m_mesh.now[c.vertices[i]];
@@ -80,12 +113,26 @@ class Step {
     return (a.normal - b.normal).norm() <= kSamePartAngle &&
            (pointOnShape(a) - pointOnShape(b)).norm() > kSamePartShare * m_size;
   }
+  /// Whether `s` is early enough to stand for `c`.
   bool isInTime(const ShapeContact& s, const ShapeContact& c) const {
     return isFirst(s, c) || (s.element == ShapeElement::Face &&
                              s.timeOfImpact <= c.timeOfImpact + m_settings.timeTolerance);
   }
 
  private:
+  /// The vertex {v, v} or the edge that holds the contact's point; none in a triangle's interior.
+  static std::optional<Segment> featureOf(const ShapeContact& c) {
+    Segment feature{};
+    std::size_t count = 0;
+    for (int i = 0; i < 3; ++i) {
+      if (c.weights[i] <= 2 * kEdgeWeight) continue;
+      if (count == 2) return {};
+      feature[count++] = c.vertices[static_cast<std::size_t>(i)];
+    }
+    if (count == 1) feature[1] = feature[0];
+    return feature;
+  }
+
   const TriangleMesh& m_mesh;
   const Shape& m_shape;
   const RigidTransform &m_before, &m_now;
@@ -93,7 +140,47 @@ class Step {
   const double m_size;  ///< L: of the shape
 };
 
-}  // namespace
+void DistinctContacts::dropAlongFlatParts(const Step& step,
+                                          std::span<const ShapeContact> contacts) {
+  m_parts.clear();
+  m_partOf.resize(contacts.size());
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    m_partOf[i] = kNone;
+    if (m_states[i] != State::Excluded) continue;
+    const std::optional<FlatPart> part = step.flatPartOf(contacts[i]);
+    if (!part) continue;
+    m_partOf[i] = 0;
+    while (m_partOf[i] < m_parts.size() && !step.areSame(m_parts[m_partOf[i]], *part))
+      ++m_partOf[i];
+    if (m_partOf[i] == m_parts.size()) m_parts.push_back(*part);
+  }
+  for (std::size_t k = 0; k < m_parts.size(); ++k) {
+    const FlatPart& part = m_parts[k];
+    const auto steepnessOf = [&](std::size_t i) {
+      return std::abs(part.normal.dot(contacts[i].normal));
+    };
+    m_leading.clear();
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const bool isProper = m_states[i] == State::Proper || m_states[i] == State::OnPlane;
+      if (isProper && contacts[i].distance < 0 && step.isIn(part, contacts[i]))
+        m_leading.push_back({i, steepnessOf(i)});
+    }
+    // The steepest come first: few others are looked at.
+    std::sort(m_leading.begin(), m_leading.end(), [](const InPart& a, const InPart& b) {
+      return std::tuple(-a.steepness, a.contact) < std::tuple(-b.steepness, b.contact);
+    });
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      if (m_partOf[i] != k) continue;
+      const double least = steepnessOf(i) + kSamePartAngle;
+      for (const InPart& other : m_leading) {
+        if (!(other.steepness > least)) break;
+        if (!step.isInTime(contacts[other.contact], contacts[i])) continue;
+        m_states[i] = State::Dropped;
+        break;
+      }
+    }
+  }
+}
 
 std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
                                    const RigidTransform& before, const RigidTransform& now,
@@ -130,6 +217,12 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
       --excluded;
     }
   }
+  // Of spheres and capsules, the nearest contact alone stands for all others of a flat floor.
+  const bool hasSides = shape.isCylinder() || shape.radius() == 0.0;
+  if (excluded > 0 && hasSides &&
+      std::any_of(contacts.begin(), contacts.end(),
+                  [](const ShapeContact& c) { return c.distance < 0; }))
+    dropAlongFlatParts(step, contacts);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (m_states[i] != State::Dropped) contacts[kept++] = contacts[i];

@@ -29,11 +29,17 @@ namespace palpate {
 /// A contact stays if it has the normal of the one that stands for it, at another point of the
 /// shape. A body that lies on a floor needs contacts at all its corners.
 ///
+/// Where a box, a cylinder or a hull has sunk into the mesh, no row holds it in front of a plane. A
+/// contact that is excluded, and around which all elements lie in one plane, is then also dropped
+/// if a contact that is not, in which the shape is inside the mesh, (1) is in time, as above, (2)
+/// has its vertices in that plane, and (3) leads out of it more steeply.
+///
 /// Laws     (1) The first and nearest contact stays, or a triangle that is at most timeTolerance
 ///          later stands for it. (2) What is dropped does not depend on the order of the pair, nor
 ///          on how the contacts were found.
 /// Cost     linear in the contacts for each of at most kMostPlanes planes: those of the first and
-///          nearest contacts.
+///          nearest contacts. Where the shape has sunk in, the same for each plane of the mesh in
+///          which contacts are excluded.
 class DistinctContacts {
  public:
   static constexpr int kMostPlanes = 8;
@@ -48,7 +54,24 @@ class DistinctContacts {
  private:
   /// Proper: not excluded. OnPlane: the same, and its tangent plane has been used.
   enum class State : std::uint8_t { Proper, OnPlane, Excluded, Dropped };
+  class Step;
+  /// A plane of the mesh.
+  struct FlatPart {
+    Eigen::Vector3d normal;
+    double height;  ///< L
+  };
+  /// A contact whose vertices are in a flat part.
+  struct InPart {
+    std::size_t contact;
+    double steepness;  ///< cosine of the angle between the contact's normal and the part's
+  };
+  void dropAlongFlatParts(const Step&, std::span<const ShapeContact>);
+
   Buffer<State> m_states;  ///< per contact
+  Buffer<FlatPart> m_parts;
+  Buffer<std::size_t> m_partOf;  ///< per contact: its flat part, or kNone
+  Buffer<InPart> m_leading;      ///< out of one part
+  static constexpr std::size_t kNone = ~std::size_t{0};
 };
 
 }  // namespace palpate

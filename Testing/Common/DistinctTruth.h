@@ -98,10 +98,48 @@ struct DistinctTruth {
         return true;
       });
     }
+    if (!std::holds_alternative<Sphere>(atEnd.geometry) &&
+        !std::holds_alternative<Capsule>(atEnd.geometry))
+      dropAlongFlatParts(all, excluded, isFirst, stays);
     return stays;
   }
 
  private:
+  /// Drops excluded contacts around which all elements lie in one plane, where the shape has sunk
+  /// in.
+  template <class IsFirst>
+  void dropAlongFlatParts(std::span<const ShapeContact> all,
+                          const std::vector<std::size_t>& excluded, const IsFirst& isFirst,
+                          std::vector<char>& stays) const {
+    for (const std::size_t c : excluded) {
+      Vector3d normal = Vector3d::Zero();
+      double height = 0;
+      int count = 0;
+      bool isFlat = true;
+      for (const Triangle& element : elements) {
+        bool isThere = true;
+        for (int i = 0; i < 3; ++i)
+          isThere = isThere && (all[c].weights[i] <= 0x1p-49 || has(element, all[c].vertices[i]));
+        if (!isThere) continue;
+        const auto& [p, q, r] = element;
+        const Vector3d own = (now[q] - now[p]).cross(now[r] - now[p]).normalized();
+        if (count++ == 0) normal = own, height = own.dot(now[p]);
+        isFlat = isFlat && own.norm() > 0.5 && own.cross(normal).norm() <= 1e-12;
+      }
+      if (!isFlat || count < 2) continue;
+      for (std::size_t s = 0; s < all.size(); ++s) {
+        const bool isIn =
+            std::all_of(all[s].vertices.begin(), all[s].vertices.end(), [&](std::uint32_t v) {
+              return std::abs(normal.dot(now[v]) - height) <= thickness / 128 + 1e-12;
+            });
+        if (isIn && all[s].distance < 0 && !isExcluded(all[s]) &&
+            std::abs(normal.dot(all[s].normal)) > std::abs(normal.dot(all[c].normal)) + 0x1p-10 &&
+            (isFirst(s, c) || (all[s].element == ShapeElement::Face &&
+                               all[s].timeOfImpact <= all[c].timeOfImpact + timeTolerance)))
+          stays[c] = false;
+      }
+    }
+  }
   /// The contact's point on the shape, at the step's end.
   Vector3d endOnShape(const ShapeContact& c) const {
     const double t = c.timeOfImpact;
