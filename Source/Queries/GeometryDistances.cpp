@@ -119,6 +119,7 @@ class NearestPair {
         m_tests > kTestsPerElement * (m_a.tree.ordered().size() + m_b.tree.ordered().size())) {
       m_lowestA = lowestOfCoincident(m_a);
       m_lowestB = lowestOfCoincident(m_b);
+      findVertices();
     }
     std::array<Element, NearElements::kSide> all;
     std::uint32_t read = 0;
@@ -179,6 +180,59 @@ class NearestPair {
     return lowest;
   }
 
+  /// Whether an element holds the vertex of the nearest pair, and lies behind the plane through it
+  /// across the way to the other vertex, decided exactly. Two such elements are as near as the
+  /// vertices are. place: in the octree's order.
+  struct AtVertex {
+    std::uint32_t vertex = kNoElement;
+    enum class Answer : std::uint8_t { Unknown, No, Yes };
+    std::vector<Answer> known{};  ///< by place
+
+    bool holds(std::uint32_t place, const SearchableGeometry& geometry, const Vector3d& other) {
+      if (known[place] == Answer::Unknown) {
+        const Triangle& corners = geometry.tree.ordered()[place];
+        const Vector3d at = geometry.mesh.now[vertex];
+        const bool isBehind =
+            std::find(corners.begin(), corners.end(), vertex) != corners.end() &&
+            std::none_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+              return corner != vertex && comesNearer(other, at, geometry.mesh.now[corner]);
+            });
+        known[place] = isBehind ? Answer::Yes : Answer::No;
+      }
+      return known[place] == Answer::Yes;
+    }
+  };
+  /// Sets the vertices of the nearest pair, if its points are vertices without radii.
+  void findVertices() {
+    if (m_lowestA.empty() || m_radii > 0.0 || !std::isfinite(m_best.distance)) return;
+    const auto set = [](AtVertex& side, const SearchableGeometry& geometry, std::uint32_t element,
+                        const Vector3d& weights) {
+      Eigen::Index corner = 0;
+      const bool isVertex = weights.maxCoeff(&corner) == 1.0;
+      const std::uint32_t vertex =
+          isVertex ? geometry.mesh.topology.triangles[element][static_cast<std::size_t>(corner)]
+                   : kNoElement;
+      if (vertex == side.vertex) return false;
+      side.vertex = vertex;
+      return true;
+    };
+    const bool a = set(m_atA, m_a, m_elementA, m_best.weightsA),
+               b = set(m_atB, m_b, m_elementB, m_best.weightsB);
+    if (!a && !b) return;
+    m_atA.known.assign(m_a.tree.ordered().size(), AtVertex::Answer::Unknown);
+    m_atB.known.assign(m_b.tree.ordered().size(), AtVertex::Answer::Unknown);
+  }
+  bool areAtVertices(std::uint32_t placeA, std::uint32_t placeB) {
+    return m_atA.vertex != kNoElement && m_atB.vertex != kNoElement &&
+           m_atA.holds(placeA, m_a, m_b.mesh.now[m_atB.vertex]) &&
+           m_atB.holds(placeB, m_b, m_a.mesh.now[m_atA.vertex]);
+  }
+  static Vector3d weightsAt(const SearchableGeometry& geometry, std::uint32_t place,
+                            std::uint32_t vertex) {
+    const Triangle& corners = geometry.tree.ordered()[place];
+    return Vector3d::Unit(std::find(corners.begin(), corners.end(), vertex) - corners.begin());
+  }
+
   static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
     return {geometry.mesh, geometry.tree.ordered()[place]};
   }
@@ -189,6 +243,14 @@ class NearestPair {
       return std::pair(elementA, elementB) < std::pair(m_elementA, m_elementB);
     };
     if (m_best.distance == 0.0 && !precedes()) return;
+    if (areAtVertices(placeA, placeB)) {
+      if (!precedes()) return;
+      m_best.weightsA = weightsAt(m_a, placeA, m_atA.vertex);
+      m_best.weightsB = weightsAt(m_b, placeB, m_atB.vertex);
+      m_elementA = elementA;
+      m_elementB = elementB;
+      return;
+    }
     if (isFurther(a, b)) return;
     ++m_tests;
     const ElementDistance found = elementDistance(a, b);
@@ -197,6 +259,7 @@ class NearestPair {
     m_best = found;
     m_elementA = elementA;
     m_elementB = elementB;
+    findVertices();
     m_direction = b.point(found.weightsB) - a.point(found.weightsA);
     const double length = stableLength(m_direction);
     if (length > 0 && std::isfinite(length))
@@ -237,6 +300,7 @@ class NearestPair {
   const double m_radii;  ///< L: the largest ones of both
   double m_tests = 0;
   std::vector<std::uint8_t> m_lowestA, m_lowestB;  ///< by place; empty: all are tested
+  AtVertex m_atA, m_atB;
   ElementDistance m_best;
   std::uint32_t m_elementA = kNoElement, m_elementB = kNoElement;
   Vector3d m_direction = Vector3d::Zero();  ///< from a to b: unit, or 0

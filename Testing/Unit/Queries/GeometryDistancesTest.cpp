@@ -469,6 +469,31 @@ TEST(GeometryDistances, CoincidentTrianglesAnswerAsBruteForce) {
     }
 }
 
+/// So are all pairs of triangles of two fans whose tips are nearest.
+TEST(GeometryDistances, FansAnswerAsBruteForce) {
+  Random random(214);
+  for (int round = 0; round < 12; ++round) {
+    std::array<Mesh, 2> fans;
+    for (int side = 0; side < 2; ++side) {
+      Mesh& fan = fans[static_cast<std::size_t>(side)];
+      const double up = side == 0 ? 1.0 : -1.0, open = round % 3 == 0 ? 0.02 : 1.0;
+      fan.positions.emplace_back(0.02 * side, 0.01 * side, side == 0 ? 0.0 : 0.3);
+      for (std::uint32_t i = 0; i < 90; ++i) {
+        const double angle = 0.07 * i, radius = uniform(random, 0.5, 1.0);
+        fan.positions.emplace_back(radius * std::cos(angle), radius * std::sin(angle),
+                                   fan.positions[0][2] - up * open * uniform(random, 0.5, 1.0));
+      }
+      for (std::uint32_t i = 1; i < 90; ++i) fan.triangles.push_back({0, i, i + 1});
+      std::shuffle(fan.triangles.begin(), fan.triangles.end(), random);
+      for (Triangle& corners : fan.triangles)
+        std::rotate(corners.begin(), corners.begin() + random() % 3, corners.end());
+    }
+    TwoBodies both(testGeometry(fans[0]), testGeometry(fans[1]));
+    expectSameAnswers(both, 0.0, 5.0);
+    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
+  }
+}
+
 TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
   Random random(209);
   std::size_t apart = 0, touching = 0;
