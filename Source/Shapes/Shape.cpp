@@ -236,6 +236,23 @@ Vector3d Shape::directionFromAxis(const Vector3d& normal) const {
   return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
 }
 
+/// Where an edge turns from falling to rising that is nearest to the lateral surface of a cylinder
+/// in all its points. Further away than `error` from there, the sign of the slope is certain,
+/// however rounded. NaN if the edge is not such, or if squares of its lengths lose bits.
+Shape::Turn Shape::turnBesideAxis(const Vector3d& from, const Vector3d& along) const {
+  const Turn unknown{std::numeric_limits<double>::quiet_NaN(), 0.0};
+  if (!isCylinder()) return unknown;
+  const double square = along[0] * along[0] + along[1] * along[1],
+               start = from[0] * from[0] + from[1] * from[1];
+  if (!(square > 0x1p-900 && square < 0x1p900 && start < 0x1p900)) return unknown;
+  const double at = -(from[0] * along[0] + from[1] * along[1]) / square,
+               t = std::clamp(at, 0.0, 1.0);
+  const double least = std::hypot(from[0] + t * along[0], from[1] + t * along[1]) - m_sizes[0],
+               ends = std::max(std::abs(from[2]), std::abs(from[2] + along[2])) - m_sizes[1];
+  if (!(ends < std::min(0.0, least) - kOnSurface * m_magnitude)) return unknown;
+  return {at, kTurnError * (1.0 + std::sqrt(start / square))};
+}
+
 NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const {
   if (m_type == Type::Capsule) {
     const EdgeEdgeDistance axis = finiteEdgeEdgeDistance(p, q, m_p0, m_p1);
@@ -255,7 +272,11 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
   const Vector3d from = inBody(p), along = inBody(q) - from;
   // Over a cylinder's flat end, rounding is no slope.
   const bool isLevel = isCylinder() && std::abs(along[2]) <= kOnSurface * m_magnitude;
+  const Turn turn = turnBesideAxis(from, along);
+  // Its sign is right; the value may be another one.
   const auto slope = [&](double t) {
+    if (t < turn.at - turn.error) return -1.0;
+    if (t > turn.at + turn.error) return 1.0;
     const Vector3d normal = atBody(from + t * along, 0).normal;
     return isLevel && std::abs(normal[2]) == 1.0 ? 0.0 : normal.dot(along);
   };

@@ -150,6 +150,11 @@ class Shape {
   /// inside, that most nearly parallel to the element counts. All in the body's frame.
   PointShapeDistance leastAtBody(const Eigen::Vector3d& u,
                                  std::span<const Eigen::Vector3d> sides) const;
+  /// A weight on an edge, and by how much it may be off.
+  struct Turn {
+    double at, error;
+  };
+  Turn turnBesideAxis(const Eigen::Vector3d& from, const Eigen::Vector3d& along) const;
   Eigen::Vector3d nearestOfPlane(const Eigen::Vector3d& normal, double height,
                                  double& supportHeight) const;
   std::optional<NearestToShape> nearestToHull(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
