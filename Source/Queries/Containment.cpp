@@ -77,7 +77,7 @@ class BodyQuery {
 
   /// The nearest point of the surface. If several triangles are equally near, on the lowest. Of a
   /// closed surface, the nearest point of its outer surface.
-  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
+  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p, const OuterSurface& outer) {
     const PointDistances distances(m_geometry, p, m_bruteForce);
     const auto near = distances.nearest(kInfinity, m_last);
     m_last = near->place;
@@ -90,10 +90,9 @@ class BodyQuery {
                               true};
     if (m_geometry.mesh.topology.closed != true || !(result.depth > 0)) return result;
     const int number = windingNumber(p).value_or(0);
-    const OuterSurface outer(m_geometry, m_bruteForce,
-                             [this](const Eigen::Vector3d& q) { return windingNumber(q); });
-    if (number == 0 || outer.holds(p, distances, *near, number)) return result;
-    const auto way = outer.nearest(p, result.depth);
+    const auto numberAt = [this](const Eigen::Vector3d& q) { return windingNumber(q); };
+    if (number == 0 || outer.holds(p, *near, number, numberAt)) return result;
+    const auto way = outer.nearest(p, number, numberAt);
     if (!way) return result;
     const Triangle& corners = m_geometry.mesh.topology.triangles[way->element];
     const Positions& now = m_geometry.mesh.now;
@@ -144,8 +143,8 @@ class InsideQuery {
     if (m_solid) return {m_solid->lowest(p).has_value(), true};
     return {m_surface.windingNumber(p).value_or(0) != 0, true};
   }
-  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p) {
-    return m_surface.nearest(vertex, p);
+  InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p, const OuterSurface& outer) {
+    return m_surface.nearest(vertex, p, outer);
   }
 
  private:
@@ -175,13 +174,14 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
                 const InsideSettings& settings, Engine engine, const Threads& threads,
                 VertexSearch<InsideVertex>& scratch, std::vector<InsideVertex>& out) {
   if (body.tree.octree().size() == 0) return out.clear();
+  const OuterSurface outer(body, engine == Engine::BruteForce);
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
     return [&, query = InsideQuery(body, settings, engine, stack)](
                std::uint32_t v) mutable -> std::optional<InsideVertex> {
       const Eigen::Vector3d& p = vertices.mesh.now[v];
       const WindingNumbers::Result result = query.evaluate(p);
       if (!result.inside) return {};
-      InsideVertex inside = query.nearest(v, p);
+      InsideVertex inside = query.nearest(v, p, outer);
       inside.decided = result.decided;
       if (!(inside.depth > 0)) return {};
       return inside;

@@ -6,22 +6,29 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/TriangleIntersection.h"
+#include "Queries/GeometryDistances.h"
+#include "Queries/PairTraversal.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <memory>
+#include <span>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 namespace palpate {
 
 using Eigen::Vector3d;
 
 namespace {
+
+/// Directions at a point in which the outside is looked for. At most points few faces meet. At the
+/// tip of a fan one is enough.
+constexpr std::size_t kMostNormals = 32, kFewNormals = 6;
 
 /// Along the line in which two triangles intersect, all points of both, or one. The ends are
 /// within rounding.
@@ -58,74 +65,14 @@ Vector3d closestOnSegment(const Vector3d& p, const Vector3d& a, const Vector3d& 
 
 }  // namespace
 
-/// Triangles near a point, and the points of them and of their intersections that are nearest.
-struct OuterSurface::Candidates {
-  struct Triangle {
-    std::uint32_t element;
-    Corners corners;
-    Eigen::AlignedBox3d box;
-    Vector3d normal;
-  };
-  struct Point {
-    double distance;
-    std::uint32_t element;
-    Vector3d point;
-  };
-  std::vector<Triangle> triangles;
-  std::vector<Point> points;  ///< by ascending distance
+OuterSurface::OuterSurface(const SearchableGeometry& geometry, bool bruteForce)
+    : m_geometry(geometry), m_bruteForce(bruteForce) {}
 
-  Candidates(const SearchableGeometry& geometry, const std::vector<std::uint32_t>& elements,
-             const Vector3d& p) {
-    for (const std::uint32_t element : elements) {
-      const auto& [i, j, k] = geometry.mesh.topology.triangles[element];
-      const Positions& now = geometry.mesh.now;
-      Triangle triangle{element, {now[i], now[j], now[k]}, {}, {}};
-      for (const Vector3d& corner : triangle.corners) triangle.box.extend(corner);
-      const auto& [a, b, c] = triangle.corners;
-      triangle.normal = windingNormal(a, b, c);
-      triangles.push_back(triangle);
-    }
-    std::sort(triangles.begin(), triangles.end(), [](const Triangle& a, const Triangle& b) {
-      return std::pair(a.box.min()[0], a.element) < std::pair(b.box.min()[0], b.element);
-    });
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      const Triangle& triangle = triangles[i];
-      const auto& [a, b, c] = triangle.corners;
-      add(p, triangle.element, p - finiteVertexTriangleDistance(p, a, b, c).difference);
-      for (const auto& [start, end] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
-        add(p, triangle.element, closestOnSegment(p, start, end));
-      for (std::size_t j = i + 1; j < triangles.size(); ++j) {
-        if (triangles[j].box.min()[0] > triangle.box.max()[0]) break;
-        if (triangle.box.intersects(triangles[j].box)) addCommon(p, triangle, triangles[j]);
-      }
-    }
-    std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
-      return std::tuple(a.distance, a.element, a.point[0], a.point[1], a.point[2]) <
-             std::tuple(b.distance, b.element, b.point[0], b.point[1], b.point[2]);
-    });
-  }
-
- private:
-  void add(const Vector3d& p, std::uint32_t element, const Vector3d& point) {
-    points.push_back({stableLength(p - point), element, point});
-  }
-  void addCommon(const Vector3d& p, const Triangle& a, const Triangle& b) {
-    SignCounts counts;
-    const TriangleIntersection found = intersectTriangles(a.corners, b.corners, counts);
-    if (!found.intersect()) return;
-    std::vector<Vector3d> common;
-    addCommonPoints(a.corners, b.corners, found, common);
-    const Vector3d along = a.normal.cross(b.normal);
-    const auto [first, last] = std::minmax_element(
-        common.begin(), common.end(),
-        [&](const Vector3d& l, const Vector3d& r) { return along.dot(l) < along.dot(r); });
-    add(p, std::min(a.element, b.element), closestOnSegment(p, *first, *last));
-  }
-};
-
-OuterSurface::OuterSurface(const SearchableGeometry& geometry, bool bruteForce,
-                           WindingNumber windingNumber)
-    : m_geometry(geometry), m_bruteForce(bruteForce), m_windingNumber(std::move(windingNumber)) {}
+std::array<Vector3d, 3> OuterSurface::cornersOf(std::uint32_t element) const {
+  const auto& [i, j, k] = m_geometry.mesh.topology.triangles[element];
+  const Positions& now = m_geometry.mesh.now;
+  return {now[i], now[j], now[k]};
+}
 
 /// L: how far beside the surface winding numbers are asked for.
 double OuterSurface::aside(const Vector3d& p) const {
@@ -138,73 +85,179 @@ double OuterSurface::aside(const Vector3d& p) const {
                         p.cwiseAbs().maxCoeff());
 }
 
-bool OuterSurface::holds(const Vector3d& p, const PointDistances& distances,
-                         const PointDistances::Near& near, int number) const {
+bool OuterSurface::isOutside(const Vector3d& q, const Vector3d& direction,
+                             const WindingNumber& windingNumber) const {
+  const double length = stableLength(direction);
+  return length > 0.0 && windingNumber(q + aside(q) / length * direction) == 0;
+}
+
+bool OuterSurface::holds(const Vector3d& p, const PointDistances::Near& near, int number,
+                         const WindingNumber& windingNumber) const {
   const VertexTriangleDistance& closest = near.closest;
   if (closest.feature == TriangleFeature::Face && std::abs(number) == 1) {
-    const auto& [i, j, k] = m_geometry.mesh.topology.triangles[near.element];
-    const Positions& now = m_geometry.mesh.now;
+    const auto [a, b, c] = cornersOf(near.element);
     // Of a closed surface the number falls by 1 where a face is left through its front.
-    if ((windingNormal(now[i], now[j], now[k]).dot(closest.normal) < 0) == (number > 0))
-      return true;
+    if ((windingNormal(a, b, c).dot(closest.normal) < 0) == (number > 0)) return true;
   }
   const Vector3d q = p - closest.difference;
   if (!(aside(q) > 0x1p-900)) return true;  // nothing can be told so near to the smallest double
-  std::vector<std::uint32_t> elements;
-  distances.within(near.distance + kExitSlack / kOuterAside * aside(q), elements);
-  return holdsPoint(q, p, Candidates(m_geometry, elements, p));
+  return holdsPoint(q, p, number, windingNumber);
 }
 
 /// Whether some point beside q is outside. Tried are those in front of the triangles at q, and of
 /// pairs of them, and the one beyond q.
-bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from,
-                              const Candidates& candidates) const {
-  const double step = aside(q), touch = kExitSlack / kOuterAside * step;
-  const auto isOutside = [&](const Vector3d& direction) {
-    const double length = stableLength(direction);
-    return length > 0.0 && m_windingNumber(q + step / length * direction) == 0;
-  };
-  if (isOutside(q - from)) return true;
+bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int number,
+                              const WindingNumber& windingNumber) const {
+  if (isOutside(q, q - from, windingNumber)) return true;
+  std::vector<std::uint32_t> elements;
+  PointDistances(m_geometry, q, m_bruteForce).within(kExitSlack / kOuterAside * aside(q), elements);
+  std::sort(elements.begin(), elements.end());
   std::vector<Vector3d> normals;
-  for (const Candidates::Triangle& triangle : candidates.triangles) {
-    const auto& [a, b, c] = triangle.corners;
-    if (triangle.box.squaredExteriorDistance(q) > touch * touch) continue;
-    if (finiteVertexTriangleDistance(q, a, b, c).distance > touch) continue;
-    const auto isKnown = [&](const Vector3d& normal) {
-      return (normal - triangle.normal).squaredNorm() < 0x1p-40;
-    };
-    if (std::none_of(normals.begin(), normals.end(), isKnown)) normals.push_back(triangle.normal);
-  }
   Vector3d sum = Vector3d::Zero();
-  for (const Vector3d& normal : normals) sum += normal;
+  for (const std::uint32_t element : elements) {
+    const auto [a, b, c] = cornersOf(element);
+    const Vector3d normal = windingNormal(a, b, c);
+    const auto isKnown = [&](const Vector3d& other) {
+      return (normal - other).squaredNorm() < 0x1p-40;
+    };
+    if (std::any_of(normals.begin(), normals.end(), isKnown)) continue;
+    normals.push_back(normal);
+    sum += normal;
+  }
   // A body that is inside out has its outside behind its faces.
-  for (const double side : {1.0, -1.0}) {
-    if (isOutside(side * sum)) return true;
-    for (std::size_t i = 0; i < normals.size(); ++i) {
-      if (isOutside(side * normals[i])) return true;
-      for (std::size_t j = 0; j < i; ++j)
-        if (isOutside(side * (normals[i] + normals[j]))) return true;
-    }
+  const double side = number > 0 ? 1.0 : -1.0;
+  if (isOutside(q, side * sum, windingNumber)) return true;
+  if (normals.size() < 2) return false;
+  for (std::size_t i = 0; i < std::min(normals.size(), kMostNormals); ++i) {
+    if (isOutside(q, side * normals[i], windingNumber)) return true;
+    for (std::size_t j = 0; j < i && normals.size() > 2 && normals.size() <= kFewNormals; ++j)
+      if (isOutside(q, side * (normals[i] + normals[j]), windingNumber)) return true;
   }
   return false;
 }
 
-std::optional<OuterSurface::Near> OuterSurface::nearest(const Vector3d& p, double nearest) const {
-  const PointDistances distances(m_geometry, p, m_bruteForce);
-  std::vector<std::uint32_t> elements;
-  const std::size_t all = m_geometry.tree.ordered().size();
-  for (double radius = 2.0 * nearest;; radius *= 2.0) {
-    distances.within(radius, elements);
-    const Candidates candidates(m_geometry, elements, p);
-    const Vector3d* rejected = nullptr;
-    for (const Candidates::Point& point : candidates.points) {
-      if (point.distance > radius && elements.size() < all) break;
-      if (rejected && *rejected == point.point) continue;
-      if (holdsPoint(point.point, p, candidates)) return Near{point.element, point.point};
-      rejected = &point.point;
+/// Finds the triangles that have points in common with others that share no vertex with them.
+void OuterSurface::findCreases() const {
+  SignCounts counts;
+  const auto test = [&](std::uint32_t i, std::uint32_t j) {
+    const Triangle &a = m_geometry.mesh.topology.triangles[i],
+                   &b = m_geometry.mesh.topology.triangles[j];
+    if (std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end()) return;
+    const Corners ofA = cornersOf(i), ofB = cornersOf(j);
+    const TriangleIntersection found = intersectTriangles(ofA, ofB, counts);
+    if (!found.intersect()) return;
+    std::vector<Vector3d> common;
+    addCommonPoints(ofA, ofB, found, common);
+    const Vector3d along =
+        windingNormal(ofA[0], ofA[1], ofA[2]).cross(windingNormal(ofB[0], ofB[1], ofB[2]));
+    const auto [first, last] = std::minmax_element(
+        common.begin(), common.end(),
+        [&](const Vector3d& l, const Vector3d& r) { return along.dot(l) < along.dot(r); });
+    m_parts.creases.push_back({std::min(i, j), {*first, *last}});
+    m_parts.mixed.push_back(i);
+    m_parts.mixed.push_back(j);
+  };
+  const std::span<const std::uint32_t> order = m_geometry.tree.octree().order();
+  const auto scratch = std::make_unique<PairScratch>();
+  PairBound bound;
+  bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_geometry, m_geometry)));
+  const PairSide side = sideOf(m_geometry, {});
+  forNearElements(side, side, bound, *scratch, [&](const NearElements& near) {
+    for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
+      for (std::uint32_t bits = near.near[i]; bits; bits &= bits - 1) {
+        const std::uint32_t a = near.placeA + i,
+                            b = near.placeB + static_cast<std::uint32_t>(std::countr_zero(bits));
+        if (a < b) test(order[a], order[b]);
+      }
+    return bound;
+  });
+  std::sort(m_parts.mixed.begin(), m_parts.mixed.end());
+  m_parts.mixed.erase(std::unique(m_parts.mixed.begin(), m_parts.mixed.end()), m_parts.mixed.end());
+  std::sort(m_parts.creases.begin(), m_parts.creases.end(), [](const Crease& l, const Crease& r) {
+    const auto keyOf = [](const Crease& c) {
+      return std::tuple(c.element, c.ends[0][0], c.ends[0][1], c.ends[0][2], c.ends[1][0],
+                        c.ends[1][1], c.ends[1][2]);
+    };
+    return keyOf(l) < keyOf(r);
+  });
+}
+
+/// Triangles that no others intersect are of one kind with their neighbours.
+std::vector<std::uint32_t> OuterSurface::outerTriangles(const WindingNumber& windingNumber) const {
+  const MeshTopology& topology = m_geometry.mesh.topology;
+  enum class Kind : std::uint8_t { Unknown, Mixed, Outer, Inner };
+  std::vector<Kind> kinds(topology.triangles.size(), Kind::Unknown);
+  for (const std::uint32_t element : m_parts.mixed) kinds[element] = Kind::Mixed;
+  std::vector<std::uint32_t> outer, open;
+  for (const std::uint32_t first : m_geometry.tree.octree().order()) {
+    if (kinds[first] != Kind::Unknown) continue;
+    const auto [a, b, c] = cornersOf(first);
+    const Vector3d middle = (a + b + c) / 3.0, normal = windingNormal(a, b, c);
+    const bool isOuter =
+        isOutside(middle, normal, windingNumber) || isOutside(middle, -normal, windingNumber);
+    kinds[first] = isOuter ? Kind::Outer : Kind::Inner;
+    open.push_back(first);
+    while (!open.empty()) {
+      const std::uint32_t element = open.back();
+      open.pop_back();
+      if (isOuter) outer.push_back(element);
+      for (const std::uint32_t edge : topology.triangleEdges[element]) {
+        if (edge == kNoEdge) continue;
+        for (const std::uint32_t other : topology.edgeTriangles[edge]) {
+          if (kinds[other] != Kind::Unknown) continue;
+          kinds[other] = kinds[first];
+          open.push_back(other);
+        }
+      }
     }
-    if (elements.size() == all || !(radius < kLargestMeasure)) return {};
   }
+  std::sort(outer.begin(), outer.end());
+  return outer;
+}
+
+void OuterSurface::find(const WindingNumber& windingNumber) const {
+  findCreases();
+  m_parts.elementOf = outerTriangles(windingNumber);
+  if (m_parts.elementOf.empty()) return;
+  m_parts.outer = std::make_unique<SearchableGeometry>(m_geometry.id);
+  SearchableGeometry& outer = *m_parts.outer;
+  outer.mesh.now = Positions(m_geometry.mesh.now.all());
+  outer.mesh.before = outer.mesh.now;
+  outer.mesh.topology.vertexCount = outer.mesh.now.size();
+  for (const std::uint32_t element : m_parts.elementOf)
+    outer.mesh.topology.triangles.push_back(m_geometry.mesh.topology.triangles[element]);
+  outer.revisions.topology = outer.revisions.counter.next();
+  const double spread = outer.tree.sampleFrame(outer.mesh, outer.revisions.topology);
+  outer.tree.update(outer.mesh, outer.revisions.topology, frameScale(spread), {}, Threads(1));
+}
+
+std::optional<OuterSurface::Near> OuterSurface::nearest(const Vector3d& p, int number,
+                                                        const WindingNumber& windingNumber) const {
+  std::call_once(m_isFound, [&] { find(windingNumber); });
+  std::optional<Near> best;
+  double distance = kInfinity;
+  if (m_parts.outer) {
+    const auto near = PointDistances(*m_parts.outer, p, m_bruteForce).nearest(kInfinity, 0);
+    best = Near{m_parts.elementOf[near->element], p - near->closest.difference};
+    distance = near->closest.distance;
+  }
+  const auto add = [&](std::uint32_t element, const Vector3d& q) {
+    const double length = stableLength(p - q);
+    if (!(length < distance) || !holdsPoint(q, p, number, windingNumber)) return;
+    best = Near{element, q};
+    distance = length;
+  };
+  for (const std::uint32_t element : m_parts.mixed) {
+    const auto [a, b, c] = cornersOf(element);
+    const VertexTriangleDistance closest = finiteVertexTriangleDistance(p, a, b, c);
+    if (!(closest.distance < distance)) continue;
+    add(element, p - closest.difference);
+    for (const auto& [start, end] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
+      add(element, closestOnSegment(p, start, end));
+  }
+  for (const Crease& crease : m_parts.creases)
+    add(crease.element, closestOnSegment(p, crease.ends[0], crease.ends[1]));
+  return best;
 }
 
 }  // namespace palpate

@@ -1,5 +1,8 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
+#include "Common/RandomMeshes.h"
+
 #include <gtest/gtest.h>
 
 #include <functional>
