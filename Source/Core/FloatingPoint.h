@@ -87,7 +87,7 @@ class StandardFloatingPoint {
 };
 
 /// The float nearest to a value. g++ 12 takes `double(float(x))` for x where it vectorises two of
-/// them: an error bound that is computed from the rounded value must come through here.
+/// them. Take this where an error bound is computed from the rounded value.
 inline float roundedToFloat(double x) {
   auto rounded = static_cast<float>(x);
   asm("" : "+m"(rounded));

@@ -246,7 +246,8 @@ class FieldBuilder {
         if (m_cells[i].state == State::Split) open.push_back(static_cast<std::uint32_t>(i));
       m_representedCells += m_eachStandsFor * static_cast<double>(end - first);
       const std::size_t count = std::min(open.size(), m_mostSplit);
-      m_eachStandsFor *= static_cast<double>(open.size()) / static_cast<double>(count);
+      if (count > 0)
+        m_eachStandsFor *= static_cast<double>(open.size()) / static_cast<double>(count);
       for (std::size_t i = 0; i < count; ++i) split(open[i * open.size() / count]);
       first = end;
     }

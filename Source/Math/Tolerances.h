@@ -135,8 +135,8 @@ constexpr int kMostClearances = 32;
 /// near to an end counts as the end. The least distance varies by the square of this.
 constexpr double kEdgeWeight = 0x1p-50;
 /// Weight on an edge, of 1 and the ratio of its start's distance from a cylinder's axis to its
-/// length: from how far beside the weight of its point nearest to the axis on the sign of a computed
-/// slope is right. The slope has some ten roundings.
+/// length: from how far beside the weight of its point nearest to the axis on the sign of a
+/// computed slope is right. The slope has some ten roundings.
 constexpr double kTurnError = 0x1p-46;
 /// Relative to a shape's magnitude. A point this near to a capsule's axis, or this little outside a
 /// face, has a direction that is only rounding. Two faces whose distances differ by no more than
