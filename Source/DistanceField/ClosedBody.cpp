@@ -41,20 +41,6 @@ void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
                     id, t);
 }
 
-void buildTree(const Threads& threads, SearchableGeometry& out) {
-  out.revisions.topology = out.revisions.counter.next();
-  const double spread = out.tree.sampleFrame(out.mesh, out.revisions.topology);
-  out.tree.update(out.mesh, out.revisions.topology, frameScale(spread), {}, threads);
-}
-
-void setMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
-             SearchableGeometry& out) {
-  out.mesh.now = Positions(std::vector(positions.begin(), positions.end()));
-  out.mesh.before = out.mesh.now;
-  out.mesh.topology.vertexCount = positions.size();
-  out.mesh.topology.triangles.assign(triangles.begin(), triangles.end());
-}
-
 }  // namespace
 
 void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, SearchableGeometry& out) {
@@ -68,12 +54,6 @@ void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads,
   if (mesh.triangles.empty())
     throw Error(ErrorCode::NotClosed, nameOf(out) + " has no triangles", out.id);
   makeBody(mesh.positions, mesh.triangles, threads, out);
-}
-
-void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
-              const Threads& threads, SearchableGeometry& out) {
-  setMesh(positions, triangles, out);
-  buildTree(threads, out);
 }
 
 void checkPositive(double length, const char* name) {

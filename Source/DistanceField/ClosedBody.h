@@ -14,9 +14,6 @@ namespace palpate {
 void makeClosedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
 /// The same for a mesh that may be open. Throws NotClosed only for one without triangles.
 void makeCheckedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
-/// The same without checks.
-void makeBody(std::span<const Eigen::Vector3d>, std::span<const Triangle>, const Threads&,
-              SearchableGeometry& out);
 
 /// Throws InvalidSettings unless a setting is positive and at most kLargestMeasure.
 void checkPositive(double length, const char* name);

@@ -86,10 +86,10 @@ class FieldBuilder {
     float allowed = 0;  ///< units: the deviation of corners up to which the bound is proven
     std::uint8_t level = 0;
     State state = State::Split;
-    bool isOff = false;         ///< the deviation of its corners is larger than allowed
-    bool isReliable = false;    ///< the sign in all of it; otherwise its values have none
-    bool isUnreliable = false;  ///< the sign in all of it
-    bool isSplitForSign = false;
+    bool isOff = false;           ///< the deviation of its corners is larger than allowed
+    bool isReliable = false;      ///< the sign in all of it; otherwise its values have none
+    bool isUnreliable = false;    ///< the sign in all of it
+    bool isSplitForSign = false;  ///< only some of its points may have a reliable sign
 
     bool isLeaf() const { return state == State::Certified || state == State::Adjusted; }
     /// Whether its neighbours have the same values where they meet.

@@ -19,6 +19,7 @@
 #include <span>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 namespace palpate {
 
@@ -50,7 +51,8 @@ void addCommonPoints(const Corners& a, const Corners& b, const TriangleIntersect
     if (found.cornersOfAOnB >> i & 1) points.push_back(a[i]);
     if (found.cornersOfBOnA >> i & 1) points.push_back(b[i]);
     for (std::size_t j = 0; j < 3; ++j)
-      if (found.touchingEdges & TriangleIntersection::edgesBit(int(i), int(j))) {
+      if (found.touchingEdges &
+          TriangleIntersection::edgesBit(static_cast<int>(i), static_cast<int>(j))) {
         const EdgeEdgeDistance touch =
             finiteEdgeEdgeDistance(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]);
         points.push_back(a[i] + touch.weightA * (a[(i + 1) % 3] - a[i]));
@@ -138,6 +140,7 @@ bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int numbe
 
 /// Finds the triangles that have points in common with others that share no vertex with them.
 void OuterSurface::findCreases() const {
+  m_parts = {};  // an earlier call may have found no memory
   SignCounts counts;
   const auto test = [&](std::uint32_t i, std::uint32_t j) {
     const Triangle &a = m_geometry.mesh.topology.triangles[i],
@@ -158,19 +161,24 @@ void OuterSurface::findCreases() const {
     m_parts.mixed.push_back(j);
   };
   const std::span<const std::uint32_t> order = m_geometry.tree.octree().order();
-  const auto scratch = std::make_unique<PairScratch>();
-  PairBound bound;
-  bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_geometry, m_geometry)));
-  const PairSide side = sideOf(m_geometry, {});
-  forNearElements(side, side, bound, *scratch, [&](const NearElements& near) {
-    for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
-      for (std::uint32_t bits = near.near[i]; bits; bits &= bits - 1) {
-        const std::uint32_t a = near.placeA + i,
-                            b = near.placeB + static_cast<std::uint32_t>(std::countr_zero(bits));
-        if (a < b) test(order[a], order[b]);
-      }
-    return bound;
-  });
+  if (m_bruteForce) {
+    for (std::size_t i = 0; i < order.size(); ++i)
+      for (std::size_t j = i + 1; j < order.size(); ++j) test(order[i], order[j]);
+  } else {
+    const auto scratch = std::make_unique<PairScratch>();
+    PairBound bound;
+    bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_geometry, m_geometry)));
+    const PairSide side = sideOf(m_geometry, {});
+    forNearElements(side, side, bound, *scratch, [&](const NearElements& near) {
+      for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
+        for (std::uint32_t bits = near.near[i]; bits; bits &= bits - 1) {
+          const std::uint32_t a = near.placeA + i,
+                              b = near.placeB + static_cast<std::uint32_t>(std::countr_zero(bits));
+          if (a < b) test(order[a], order[b]);
+        }
+      return bound;
+    });
+  }
   std::sort(m_parts.mixed.begin(), m_parts.mixed.end());
   m_parts.mixed.erase(std::unique(m_parts.mixed.begin(), m_parts.mixed.end()), m_parts.mixed.end());
   std::sort(m_parts.creases.begin(), m_parts.creases.end(), [](const Crease& l, const Crease& r) {
@@ -183,12 +191,13 @@ void OuterSurface::findCreases() const {
 }
 
 /// Triangles that no others intersect are of one kind with their neighbours.
-std::vector<std::uint32_t> OuterSurface::outerTriangles(const WindingNumber& windingNumber) const {
+CountedVector<std::uint32_t> OuterSurface::outerTriangles(
+    const WindingNumber& windingNumber) const {
   const MeshTopology& topology = m_geometry.mesh.topology;
   enum class Kind : std::uint8_t { Unknown, Mixed, Outer, Inner };
   std::vector<Kind> kinds(topology.triangles.size(), Kind::Unknown);
   for (const std::uint32_t element : m_parts.mixed) kinds[element] = Kind::Mixed;
-  std::vector<std::uint32_t> outer, open;
+  CountedVector<std::uint32_t> outer, open;
   for (const std::uint32_t first : m_geometry.tree.octree().order()) {
     if (kinds[first] != Kind::Unknown) continue;
     const auto [a, b, c] = cornersOf(first);
@@ -220,15 +229,10 @@ void OuterSurface::find(const WindingNumber& windingNumber) const {
   m_parts.elementOf = outerTriangles(windingNumber);
   if (m_parts.elementOf.empty()) return;
   m_parts.outer = std::make_unique<SearchableGeometry>(m_geometry.id);
-  SearchableGeometry& outer = *m_parts.outer;
-  outer.mesh.now = Positions(m_geometry.mesh.now.all());
-  outer.mesh.before = outer.mesh.now;
-  outer.mesh.topology.vertexCount = outer.mesh.now.size();
+  std::vector<Triangle> triangles;
   for (const std::uint32_t element : m_parts.elementOf)
-    outer.mesh.topology.triangles.push_back(m_geometry.mesh.topology.triangles[element]);
-  outer.revisions.topology = outer.revisions.counter.next();
-  const double spread = outer.tree.sampleFrame(outer.mesh, outer.revisions.topology);
-  outer.tree.update(outer.mesh, outer.revisions.topology, frameScale(spread), {}, Threads(1));
+    triangles.push_back(m_geometry.mesh.topology.triangles[element]);
+  makeBody(m_geometry.mesh.now.all(), triangles, Threads(1), *m_parts.outer);
 }
 
 std::optional<OuterSurface::Near> OuterSurface::nearest(const Vector3d& p, int number,

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <palpate/CountedVector.h>
+
 #include "Queries/PointDistances.h"
 #include "Queries/SearchableGeometry.h"
 
@@ -11,7 +13,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <vector>
 
 namespace palpate {
 
@@ -54,13 +55,13 @@ class OuterSurface {
   /// What the first search finds.
   struct Parts {
     std::unique_ptr<SearchableGeometry> outer;  ///< triangles on the outer surface, whole
-    std::vector<std::uint32_t> elementOf;       ///< of the body, by elements of `outer`
-    std::vector<std::uint32_t> mixed;           ///< triangles that intersect others, ascending
-    std::vector<Crease> creases;
+    CountedVector<std::uint32_t> elementOf;     ///< of the body, by elements of `outer`
+    CountedVector<std::uint32_t> mixed;         ///< triangles that intersect others, ascending
+    CountedVector<Crease> creases;
   };
   void find(const WindingNumber&) const;
   void findCreases() const;
-  std::vector<std::uint32_t> outerTriangles(const WindingNumber&) const;
+  CountedVector<std::uint32_t> outerTriangles(const WindingNumber&) const;
   bool isOutside(const Eigen::Vector3d& q, const Eigen::Vector3d& direction,
                  const WindingNumber&) const;
   bool holdsPoint(const Eigen::Vector3d& q, const Eigen::Vector3d& from, int number,

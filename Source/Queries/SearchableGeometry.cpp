@@ -168,6 +168,17 @@ std::string GeometryLabel::number() const {
 
 std::string nameOf(const GeometryLabel& label) { return "geometry " + label.number(); }
 
+void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
+              const Threads& threads, SearchableGeometry& out) {
+  out.mesh.now = Positions(std::vector(positions.begin(), positions.end()));
+  out.mesh.before = out.mesh.now;
+  out.mesh.topology.vertexCount = positions.size();
+  out.mesh.topology.triangles.assign(triangles.begin(), triangles.end());
+  out.revisions.topology = out.revisions.counter.next();
+  const double spread = out.tree.sampleFrame(out.mesh, out.revisions.topology);
+  out.tree.update(out.mesh, out.revisions.topology, frameScale(spread), {}, threads);
+}
+
 SearchableGeometry& searchable(SearchableGeometry& geometry) {
   if (!geometry.isField()) return geometry;
   throw Error(ErrorCode::UnsupportedMethod,

@@ -22,6 +22,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -87,6 +88,10 @@ struct SearchableGeometry : CountedObject {
   bool isPlaced() const { return mesh.now.isPlaced(); }
   bool isField() const { return mesh.topology.type == GeometryType::Field; }
 };
+
+/// Makes a geometry at rest of triangles, with its octree, for queries of points.
+void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
+              const Threads&, SearchableGeometry& out);
 
 /// The geometry, for queries. Throws UnsupportedMethod for a distance field that is a geometry.
 SearchableGeometry& searchable(SearchableGeometry&);

@@ -73,17 +73,20 @@ class DistinctContacts::Step {
   double slackAt(const Vector3d& x) const {
     return kPlaneShare * m_settings.thickness + kNormalConeError * x.lpNorm<1>();
   }
-  bool isIn(const FlatPart& part, const ShapeContact& c) const {
-    return std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
-      const Vector3d x = m_mesh.now[v];
-      return std::abs(part.normal.dot(x) - part.height) <= slackAt(x);
-    });
+  Vector3d firstVertexOf(const ShapeContact& c) const { return m_mesh.now[c.vertices[0]]; }
+  bool isIn(const FlatPart& part, const Vector3d& x) const {
+    return std::abs(part.normal.dot(x) - part.height) <= slackAt(x);
   }
-  bool areSame(const FlatPart& a, const FlatPart& b) const {
-    const bool areOpposite = a.normal.dot(b.normal) < 0;
-    return a.normal.cross(b.normal).norm() <= kNormalConeError &&
-           std::abs(a.height - (areOpposite ? -b.height : b.height)) <=
-               kNormalConeError * std::abs(a.height);
+  bool isIn(const FlatPart& part, const ShapeContact& c) const {
+    return std::all_of(c.vertices.begin(), c.vertices.end(),
+                       [&](std::uint32_t v) { return isIn(part, m_mesh.now[v]); });
+  }
+  static bool areSame(const FlatPart& a, const FlatPart& b) {
+    const double cosine = a.normal.dot(b.normal);
+    if (!(std::abs(cosine) > 0.5)) return false;
+    return std::abs(a.height - (cosine < 0 ? -b.height : b.height)) <=
+               kNormalConeError * std::abs(a.height) &&
+           a.normal.cross(b.normal).norm() <= kNormalConeError;
   }
   TangentPlane planeOf(const ShapeContact& c) const {
     Vector3d point = Vector3d::Zero();
@@ -143,36 +146,40 @@ class DistinctContacts::Step {
 void DistinctContacts::dropAlongFlatParts(const Step& step,
                                           std::span<const ShapeContact> contacts) {
   m_parts.clear();
-  m_partOf.resize(contacts.size());
+  m_flat.clear();
+  m_sunk.clear();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    m_partOf[i] = kNone;
+    const bool isProper = m_states[i] == State::Proper || m_states[i] == State::OnPlane;
+    if (isProper && contacts[i].distance < 0)
+      m_sunk.push_back({i, step.firstVertexOf(contacts[i])});
     if (m_states[i] != State::Excluded) continue;
     const std::optional<FlatPart> part = step.flatPartOf(contacts[i]);
     if (!part) continue;
-    m_partOf[i] = 0;
-    while (m_partOf[i] < m_parts.size() && !step.areSame(m_parts[m_partOf[i]], *part))
-      ++m_partOf[i];
-    if (m_partOf[i] == m_parts.size()) m_parts.push_back(*part);
+    std::size_t number = 0;
+    while (number < m_parts.size() && !step.areSame(m_parts[number], *part)) ++number;
+    if (number == m_parts.size()) m_parts.push_back(*part);
+    m_flat.push_back({number, i});
   }
-  for (std::size_t k = 0; k < m_parts.size(); ++k) {
-    const FlatPart& part = m_parts[k];
+  std::sort(m_flat.begin(), m_flat.end());
+  for (auto first = m_flat.begin(), last = first; first != m_flat.end(); first = last) {
+    const std::size_t number = (*first)[0];
+    last = std::find_if(first, m_flat.end(), [&](const auto& flat) { return flat[0] != number; });
+    const FlatPart& part = m_parts[number];
     const auto steepnessOf = [&](std::size_t i) {
       return std::abs(part.normal.dot(contacts[i].normal));
     };
     m_leading.clear();
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      const bool isProper = m_states[i] == State::Proper || m_states[i] == State::OnPlane;
-      if (isProper && contacts[i].distance < 0 && step.isIn(part, contacts[i]))
-        m_leading.push_back({i, steepnessOf(i)});
-    }
+    for (const Sunk& sunk : m_sunk)
+      if (step.isIn(part, sunk.vertex) && step.isIn(part, contacts[sunk.contact]))
+        m_leading.push_back({steepnessOf(sunk.contact), sunk.contact});
     // The steepest come first: few others are looked at.
-    std::sort(m_leading.begin(), m_leading.end(), [](const InPart& a, const InPart& b) {
+    std::sort(m_leading.begin(), m_leading.end(), [](const Leading& a, const Leading& b) {
       return std::tuple(-a.steepness, a.contact) < std::tuple(-b.steepness, b.contact);
     });
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      if (m_partOf[i] != k) continue;
+    for (; first != last; ++first) {
+      const std::size_t i = (*first)[1];
       const double least = steepnessOf(i) + kSamePartAngle;
-      for (const InPart& other : m_leading) {
+      for (const Leading& other : m_leading) {
         if (!(other.steepness > least)) break;
         if (!step.isInTime(contacts[other.contact], contacts[i])) continue;
         m_states[i] = State::Dropped;

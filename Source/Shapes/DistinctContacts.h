@@ -7,6 +7,7 @@
 #include "Mesh/TriangleMesh.h"
 #include "Shapes/Shape.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -38,8 +39,9 @@ namespace palpate {
 ///          later stands for it. (2) What is dropped does not depend on the order of the pair, nor
 ///          on how the contacts were found.
 /// Cost     linear in the contacts for each of at most kMostPlanes planes: those of the first and
-///          nearest contacts. Where the shape has sunk in, the same for each plane of the mesh in
-///          which contacts are excluded.
+///          nearest contacts. Where the shape has sunk in, also the product of the planes of the
+///          mesh in which contacts are excluded and the contacts that are sunk, some nanoseconds
+///          each.
 class DistinctContacts {
  public:
   static constexpr int kMostPlanes = 8;
@@ -60,18 +62,22 @@ class DistinctContacts {
     Eigen::Vector3d normal;
     double height;  ///< L
   };
-  /// A contact whose vertices are in a flat part.
-  struct InPart {
+  /// A contact that is not excluded, in which the shape is inside the mesh.
+  struct Sunk {
     std::size_t contact;
+    Eigen::Vector3d vertex;  ///< one of the contact's
+  };
+  struct Leading {
     double steepness;  ///< cosine of the angle between the contact's normal and the part's
+    std::size_t contact;
   };
   void dropAlongFlatParts(const Step&, std::span<const ShapeContact>);
 
   Buffer<State> m_states;  ///< per contact
   Buffer<FlatPart> m_parts;
-  Buffer<std::size_t> m_partOf;  ///< per contact: its flat part, or kNone
-  Buffer<InPart> m_leading;      ///< out of one part
-  static constexpr std::size_t kNone = ~std::size_t{0};
+  Buffer<std::array<std::size_t, 2>> m_flat;  ///< a flat part, and an excluded contact of it
+  Buffer<Sunk> m_sunk;
+  Buffer<Leading> m_leading;  ///< sunk contacts with all vertices in one part
 };
 
 }  // namespace palpate

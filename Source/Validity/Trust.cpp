@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -63,14 +64,22 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
                                              : settings.thickness;
 }
 
-/// Whether no two triangles share a vertex, and some have vertices at the same place.
+/// Whether no two enabled triangles share a vertex, and some would if equal positions were joined.
 bool isUnwelded(const TriangleMesh& mesh) {
   const MeshTopology& topology = mesh.topology;
-  if (!topology.hasFaces() || topology.triangles.size() < 2) return false;
+  if (!topology.hasFaces()) return false;
   for (std::uint32_t v = 0; v < topology.vertexCount; ++v)
     if (topology.vertexTriangles[v].size() > 1) return false;
-  const std::vector<Eigen::Vector3d> positions = mesh.now.all();
-  return weld(positions, topology.triangles).positions.size() < positions.size();
+  const Welded welded = weld(mesh.now.all(), topology.triangles);
+  std::vector<std::uint32_t> holders(welded.positions.size(), kNoElement);
+  for (std::uint32_t t = 0; t < welded.triangles.size(); ++t) {
+    if (!topology.isEnabled(t)) continue;
+    for (const std::uint32_t v : welded.triangles[t])
+      if (const std::uint32_t holder = std::exchange(holders[v], t);
+          holder != kNoElement && holder != t)
+        return true;
+  }
+  return false;
 }
 
 /// L: rounding errors of distances.

@@ -310,11 +310,11 @@ TEST(Validity, OfAnUnweldedMeshWithItselfIsNotTrusted) {
       detection.advance();
     }
   }
-  // Triangles that are apart are no mesh that was cut into pieces.
+  // Triangles that are apart are no mesh that was cut into pieces. Two vertices are in none.
   OctreeBasedCD detection;
   const GeometryId apart = detection.addTriangleMesh(
       std::vector<Eigen::Vector3d>{
-          {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}},
+          {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {5, 5, 5}, {5, 5, 5}},
       std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}});
   detection.addCollisionPair(apart, apart, {.method = Method::Proximity, .thickness = 0.01});
   detection.detectCollision();

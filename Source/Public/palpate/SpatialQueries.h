@@ -329,8 +329,8 @@ class PALPATE_EXPORT SpatialQueries {
   /// near ones that on the lowest triangle. Where parts of a closed body overlap, it is the nearest
   /// point of the outer surface, beside which the winding number is 0. If more than two parts meet
   /// in one point, a nearer one may be missed. Depth and surface point have the accuracy of
-  /// vertexTriangleDistance(), or are within 2^-36 of the largest coordinate where two triangles
-  /// intersect.
+  /// vertexTriangleDistance(). Where two triangles intersect they are computed in double, and are
+  /// less accurate if the triangles are almost parallel.
   ///
   /// Order    by vertex, ascending.
   /// Errors   NotClosed if the body has no inside: it is not a mesh, or with InsideRule::Closed it

@@ -1,6 +1,8 @@
 // findInsideVertices() of bodies whose parts overlap: each vertex leaves by the outer surface.
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/FailingAllocation.h"
+#include "Common/QueryCalls.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
@@ -10,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <vector>
 
 namespace palpate::testing {
@@ -73,9 +76,7 @@ std::vector<InsideVertex> insideOf(const std::vector<Vector3d>& points, const Me
   OctreeBasedCD detection(all);
   const GeometryId vertices = detection.addPointSet(points),
                    id = detection.addTriangleMesh(body.positions, body.triangles);
-  std::vector<InsideVertex> inside;
-  detection.queries().findInsideVertices(vertices, id, inside, settings);
-  return inside;
+  return insideVertices(detection, vertices, id, settings);
 }
 
 void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
@@ -128,6 +129,37 @@ TEST(OuterSurface, VerticesInTurnedOverlappingBoxesLeaveByIt) {
     for (int k = 0; k < 20; ++k) points.push_back(randomPoint(random, -0.8, 0.8));
     expectWaysOut(boxes, points);
   }
+}
+
+/// The outer surface is found while vertices are searched. If memory ends there, nothing is lost.
+TEST(OuterSurface, SurvivesFailingAllocations) {
+  const Mesh body = Boxes{{{Eigen::Matrix3d::Identity(), {0, 0, 0}, {2, 0.5, 0.5}},
+                           {Eigen::Matrix3d::Identity(), {0, 0, 0}, {0.5, 2, 0.6}}}}
+                        .mesh();
+  Settings settings;
+  settings.threads = 1;
+  OctreeBasedCD detection(settings);
+  const GeometryId vertices =
+                       detection.addPointSet(std::vector<Vector3d>{{0, 0, 0}, {0.2, 0.1, 0}}),
+                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  const SpatialQueries queries = detection.queries();
+  std::vector<InsideVertex> expected;
+  queries.findInsideVertices(vertices, id, expected);
+  EXPECT_EQ(expected.size(), 2u);
+  std::size_t failures = 0;
+  for (bool hasFailed = true; hasFailed; ++failures) {
+    std::vector<InsideVertex> found;
+    hasFailed = false;
+    FailingAllocation::arm(failures + 1);
+    try {
+      queries.findInsideVertices(vertices, id, found);
+    } catch (const std::bad_alloc&) {
+      hasFailed = true;
+    }
+    FailingAllocation::disarm();
+    EXPECT_EQ(found, hasFailed ? std::vector<InsideVertex>() : expected);
+  }
+  EXPECT_GT(failures, 10u);
 }
 
 /// A body without overlaps keeps the nearest point of its surface.
