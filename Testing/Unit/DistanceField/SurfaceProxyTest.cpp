@@ -230,7 +230,7 @@ TEST(SurfaceProxy, ListsAnswerExactlyFarFromTheOrigin) {
       detection.detectCollision();
       const CollisionData& data = detection.collisionData(particles, id);
       const SpatialQueries queries = detection.queries();
-      EXPECT_GT(data.shape().size(), points.size() / 40);
+      EXPECT_GT(data.shape().size(), points.size() / 100);
       for (const ShapeContact& contact : data.shape())
         ASSERT_NEAR(contact.distance, queries.signedDistance(id, points[contact.id]).distance,
                     data.errorBound());
