@@ -33,6 +33,8 @@ namespace palpate {
 ///          dropped impact of a vertex one of the same vertex stays. (3) For a dropped impact of an
 ///          edge one of the same edge or of one of its ends stays.
 class ExcludedImpacts {
+  using Vector3d = Eigen::Vector3d;
+
  public:
   explicit ExcludedImpacts(const MeshPair& pair) : m_pair(pair) {}
 
@@ -59,26 +61,23 @@ class ExcludedImpacts {
            isExcludedBy(m_pair.a, c.edgeA, c.featureA, -c.normal, c.timeOfImpact);
   }
 
-  // Whether another impact stands for an excluded one. anyOf(f): whether f is true for an impact
-  // that is not excluded, of the same vertex; or for an edge pair, of the same edge of a line or of
-  // one of its ends.
+  // Whether another impact stands for an excluded one. anyOf(f): whether f(s, planeOf(s)) is true
+  // for an impact s that is not excluded, of the same vertex; or for an edge pair, of the same edge
+  // of a line or of one of its ends.
 
   template <class AnyOf>
   bool isReplaced(const VertexTriangleContact& c, bool swapped, AnyOf&& anyOf) const {
-    return anyOf([&](const VertexTriangleContact& s) {
-      return isInTime(s, c) &&
-             areInPlane(planeOf(s, swapped), swapped ? m_pair.a : m_pair.b, c.corners);
+    return anyOf([&](const auto& s, const TangentPlane& plane) {
+      return isInTime(s, c) && areInPlane(plane, swapped ? m_pair.a : m_pair.b, c.corners);
     });
   }
   template <class AnyOf>
   bool isReplaced(const EdgeEdgeContact& c, AnyOf&& anyOf) const {
-    return anyOf([&](const auto& s) {
-      if (!isInTime(s, c)) return false;
-      TangentPlane plane = planeOf(s, linesAreSecond());
-      if (!areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB)) return false;
-      anyOf([&](const auto& other) {
-        const TangentPlane itsPlane = planeOf(other, linesAreSecond());
-        if (plane.isSameAs(itsPlane)) plane.gap = std::min(plane.gap, itsPlane.gap);
+    return anyOf([&](const auto& s, TangentPlane plane) {
+      if (!isInTime(s, c) || !areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB))
+        return false;
+      anyOf([&](const auto&, const TangentPlane& other) {
+        if (other.gap < plane.gap && plane.isSameAs(other)) plane.gap = other.gap;
         return false;
       });
       const Segment& edge = lineEdge(c);
@@ -88,9 +87,29 @@ class ExcludedImpacts {
     });
   }
 
- private:
-  using Vector3d = Eigen::Vector3d;
+  /// Of the element that an impact meets. swapped: the vertex is of MeshPair::b.
+  TangentPlane planeOf(const VertexTriangleContact& s, bool swapped) const {
+    const TriangleMesh &vertices = swapped ? m_pair.b : m_pair.a,
+                       &mesh = swapped ? m_pair.a : m_pair.b;
+    Vector3d point = Vector3d::Zero();
+    for (int i = 0; i < 3; ++i) point += s.barycentric[i] * mesh.now[s.corners[i]];
+    return planeAt(s.normal, point, mesh.radius(s.corners, s.barycentric), vertices.now[s.vertex],
+                   vertices.radius(s.vertex));
+  }
+  /// Of the mesh near lines.
+  TangentPlane planeOf(const EdgeEdgeContact& s) const {
+    const auto pointOf = [](const TriangleMesh& mesh, const Segment& edge, double weight) {
+      return Vector3d((1.0 - weight) * mesh.now[edge[0]] + weight * mesh.now[edge[1]]);
+    };
+    const Vector3d a = pointOf(m_pair.a, s.edgeA, s.weightA),
+                   b = pointOf(m_pair.b, s.edgeB, s.weightB);
+    const double radiusA = m_pair.a.radius(s.edgeA, s.weightA),
+                 radiusB = m_pair.b.radius(s.edgeB, s.weightB);
+    return linesAreSecond() ? planeAt(-s.normal, a, radiusA, b, radiusB)
+                            : planeAt(s.normal, b, radiusB, a, radiusA);
+  }
 
+ private:
   // Of lines near a triangle mesh.
   const TriangleMesh& mesh() const { return linesAreSecond() ? m_pair.a : m_pair.b; }
   const TriangleMesh& lines() const { return linesAreSecond() ? m_pair.b : m_pair.a; }
@@ -110,25 +129,6 @@ class ExcludedImpacts {
     return std::tie(s.timeOfImpact, s.distance) < std::tie(c.timeOfImpact, c.distance);
   }
 
-  TangentPlane planeOf(const VertexTriangleContact& s, bool swapped) const {
-    const TriangleMesh &vertices = swapped ? m_pair.b : m_pair.a,
-                       &mesh = swapped ? m_pair.a : m_pair.b;
-    Vector3d point = Vector3d::Zero();
-    for (int i = 0; i < 3; ++i) point += s.barycentric[i] * mesh.now[s.corners[i]];
-    return planeAt(s.normal, point, mesh.radius(s.corners, s.barycentric), vertices.now[s.vertex],
-                   vertices.radius(s.vertex));
-  }
-  TangentPlane planeOf(const EdgeEdgeContact& s, bool second) const {
-    const auto pointOf = [](const TriangleMesh& mesh, const Segment& edge, double weight) {
-      return Vector3d((1.0 - weight) * mesh.now[edge[0]] + weight * mesh.now[edge[1]]);
-    };
-    const Vector3d a = pointOf(m_pair.a, s.edgeA, s.weightA),
-                   b = pointOf(m_pair.b, s.edgeB, s.weightB);
-    const double radiusA = m_pair.a.radius(s.edgeA, s.weightA),
-                 radiusB = m_pair.b.radius(s.edgeB, s.weightB);
-    return second ? planeAt(-s.normal, a, radiusA, b, radiusB)
-                  : planeAt(s.normal, b, radiusB, a, radiusA);
-  }
   TangentPlane planeAt(const Vector3d& up, const Vector3d& point, double radius,
                        const Vector3d& other, double otherRadius) const {
     return {up, point, radius, up.dot(other - point) - radius - otherRadius,

@@ -94,20 +94,29 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
   std::partial_sum(m_starts.begin(), m_starts.end(), m_starts.begin());
   forEachProper([&](std::size_t n, Place place) { m_proper[m_starts[n + 1]++] = place; });
 
-  const auto anyAt = [&](std::size_t n, auto&& f) {
-    return std::any_of(m_proper.begin() + m_starts[n], m_proper.begin() + m_starts[n + 1], f);
+  const auto vertexImpact = [&](Place place) -> const VertexTriangleContact& {
+    return (place.list == 0 ? contents.vertexTriangle : contents.triangleVertex)[place.index];
   };
-  // Whether f holds for an impact of the vertex, or of the edge.
+  m_planes.clear();
+  for (const Place place : m_proper)
+    m_planes.push_back(place.list == 2 ? rule.planeOf(contents.edgeEdge[place.index])
+                                       : rule.planeOf(vertexImpact(place), place.list == 1));
+
+  const auto anyAt = [&](std::size_t n, auto&& f) {
+    for (std::uint32_t i = m_starts[n]; i < m_starts[n + 1]; ++i)
+      if (f(m_proper[i], m_planes[i])) return true;
+    return false;
+  };
+  // Whether f holds for an impact of the vertex, or of the edge, and its plane.
   const auto anyOfVertex = [&](std::uint32_t list, std::uint32_t vertex, auto&& f) {
-    return anyAt(numberOf(list, vertex), [&](Place s) {
-      return s.list != 2 &&
-             f((s.list == 0 ? contents.vertexTriangle : contents.triangleVertex)[s.index]);
+    return anyAt(numberOf(list, vertex), [&](Place s, const TangentPlane& plane) {
+      return s.list != 2 && f(vertexImpact(s), plane);
     });
   };
   const auto anyOfEdge = [&](const Segment& edge, auto&& f) {
-    return anyAt(numberOf(lines, edge[0]), [&](Place s) {
+    return anyAt(numberOf(lines, edge[0]), [&](Place s, const TangentPlane& plane) {
       return s.list == 2 && rule.lineEdge(contents.edgeEdge[s.index]) == edge &&
-             f(contents.edgeEdge[s.index]);
+             f(contents.edgeEdge[s.index], plane);
     });
   };
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {

@@ -4,6 +4,7 @@
 
 #include "CollisionDetection/Order.h"
 #include "Core/Buffer.h"
+#include "Math/NormalCone.h"
 
 #include <array>
 #include <cstdint>
@@ -58,6 +59,7 @@ class FirstImpacts {
   };
   Buffer<Entry> m_entries;
   Buffer<Place> m_proper;                         ///< impacts that are not excluded, by vertex
+  Buffer<TangentPlane> m_planes;                  ///< of m_proper
   Buffer<std::uint32_t> m_starts;                 ///< of each vertex, in m_proper
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index
 };

@@ -184,8 +184,9 @@ class ExcludedByBruteForce {
     for (const std::uint32_t end : edge) addImpactsOf(end, swapped);
     findImpactsOf(edge);
     return m_rule.isReplaced(c, [&](auto&& f) {
-      return std::any_of(m_ofEdge.edgeEdge.begin(), m_ofEdge.edgeEdge.end(),
-                         [&](const auto& s) { return !m_rule.isExcluded(s) && f(s); }) ||
+      return std::any_of(
+                 m_ofEdge.edgeEdge.begin(), m_ofEdge.edgeEdge.end(),
+                 [&](const auto& s) { return !m_rule.isExcluded(s) && f(s, m_rule.planeOf(s)); }) ||
              anyOfVertices(swapped, f);
     });
   }
@@ -194,8 +195,9 @@ class ExcludedByBruteForce {
   template <class F>
   bool anyOfVertices(bool swapped, F&& f) const {
     const auto& impacts = swapped ? m_ofVertices.triangleVertex : m_ofVertices.vertexTriangle;
-    return std::any_of(impacts.begin(), impacts.end(),
-                       [&](const auto& s) { return !m_rule.isExcluded(s, swapped) && f(s); });
+    return std::any_of(impacts.begin(), impacts.end(), [&](const auto& s) {
+      return !m_rule.isExcluded(s, swapped) && f(s, m_rule.planeOf(s, swapped));
+    });
   }
   void addImpactsOf(std::uint32_t vertex, bool swapped) {
     const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
