@@ -18,8 +18,7 @@ namespace {
 bool mayBeBodies(const PairRecord& record) {
   const PairSettings& settings = record.pair.settings;
   if (settings.method != Method::Auto || settings.earliestTimeOnly || record.a == record.b ||
-      record.hasShape() || record.usesField() || record.plan.byProxy || record.anyDisabled() ||
-      record.meshes().hasFilters())
+      record.plan.kind != PairKind::Meshes || record.anyDisabled() || record.meshes().hasFilters())
     return false;
   return !record.a->mesh.topology.triangles.empty() && !record.b->mesh.topology.triangles.empty() &&
          hasClosedSurface(*record.a) && hasClosedSurface(*record.b);

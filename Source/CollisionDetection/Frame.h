@@ -3,30 +3,24 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/Settings.h>
 
-#include "CollisionDetection/BodyContacts.h"
-#include "CollisionDetection/FirstImpacts.h"
-#include "CollisionDetection/Order.h"
+#include "CollisionDetection/JobScratch.h"
+#include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/PairWork.h"
 #include "Core/Threads.h"
-#include "NarrowPhase/NarrowPhase.h"
-#include "NarrowPhase/Piercing.h"
 #include "Octree/Traversal.h"
-#include "Shapes/DistinctContacts.h"
 
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <vector>
 
 namespace palpate {
 
-/// Takes the pairs through a frame: from octrees to candidates to contacts. Its scratch remembers
-/// its peak.
+/// Takes the pairs through a frame: from octrees to candidates to contacts. How a pair is answered
+/// is left to its PairWork. Its scratch remembers its peak.
 class Frame {
  public:
-  Frame();
-  ~Frame();
-  Frame& operator=(Frame&&) noexcept;
-
   /// Writes the candidates of each pair, unsorted, to its record.
   void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
   using BatchFunction = void (*)(void* context, const CollisionPair&, std::span<const ElementPair>);
@@ -39,36 +33,31 @@ class Frame {
   void detectByBruteForce(std::span<PairRecord* const>, const Settings&, FrameStatistics&);
 
  private:
-  struct Job;
-  void start(std::span<PairRecord* const>, const Threads&, bool adjacentPairs, BoxFrame);
-  void startField(PairRecord&, const Threads&);
-  void prepareFields(const Threads&);
-  void run(Job&) const;
-  void startProxy(PairRecord&, std::size_t grain);
-  void describeProxy(std::span<const std::unique_ptr<Job>>, PairRecord&);
-  void writeProxyContacts(std::span<const std::unique_ptr<Job>>, const Threads&, PairRecord&);
-  void finish(PairRecord&, bool nearby, bool candidatesSorted, const Settings&, FrameStatistics&);
-  std::size_t preferBodies(PairRecord&, Engine, std::size_t preferred);
-  void findMissedIntersections(const Threads&);
-  Job& newJob(PairRecord&);
+  struct Pair {
+    PairRecord* record;
+    PairWork work;
+    std::size_t firstJob, jobCount = 0;
+    bool runs = false;  ///< in the present round
+  };
+  /// The pair of a job, by its index in m_pairs, and the job's number in it.
+  struct Place {
+    std::size_t pair, job;
+  };
+  template <class Start>
+  void start(std::span<PairRecord* const>, const Threads&, bool keepsCandidates, Start&&);
+  Jobs jobsOf(const Pair& pair) const {
+    return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
+  }
+  void runRounds(const Threads&);
+  void join(Pair&, const FrameJoin&, bool keepsCandidates);
 
-  std::vector<std::unique_ptr<Job>>
-      m_jobs;  ///< the first m_jobCount are in use, those of a pair together
-  std::size_t m_jobCount = 0;
-  bool m_usesFields = false;
+  std::vector<Pair> m_pairs;
+  std::vector<Place> m_places;  ///< of the jobs in use
+  std::vector<std::unique_ptr<JobScratch>>
+      m_jobs;  ///< those in use first, those of a pair together
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
-  std::vector<ContactBuffers*> m_buffers, m_intersections;  ///< of the pair that finish() handles
-  ContactBuffers m_impacts;
-  ContactBuffers m_pierced, m_leaving;  ///< of PiercingContacts, at the step's end and start
-  PiercingContacts m_piercingContacts;
-  KnownSides m_knownSides;
-  std::unique_ptr<BodyContacts> m_bodies;  ///< null before a pair first needs it
-  StepFacts m_facts;
-  OrderScratch m_orderScratch;
-  FirstImpacts m_firstImpacts;
-  DistinctContacts m_distinctContacts;
-  Buffer<std::uint8_t> m_flags;  ///< scratch
+  PairResults m_results;
 };
 
 }  // namespace palpate

@@ -37,7 +37,6 @@ double extentOf(const Geometry& geometry) {
 
 GeometryInStep Geometry::inStep() const {
   return {mesh,
-          shape.has_value(),
           smallestHeight,
           motion.range(),
           motion.correction(),

@@ -6,6 +6,7 @@
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "CollisionDetection/StepSource.h"
 #include "Core/Stopwatch.h"
@@ -44,12 +45,13 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
 }  // namespace
 
 void checkCandidates(const PairRecord& record) {
-  if (!record.hasCandidates())
+  const PairKind kind = record.kind();
+  if (kind != PairKind::Meshes)
     throw Error(ErrorCode::NotAvailable,
                 nameOf(record.pair.a, record.pair.b) +
-                    (record.hasShape()    ? " includes a shape"
-                     : record.usesProxy() ? " uses Method::Proxy"
-                                          : " uses Method::DistanceField") +
+                    (kind == PairKind::Proxy   ? " uses Method::Proxy"
+                     : kind == PairKind::Field ? " uses Method::DistanceField"
+                                               : " includes a shape") +
                     " and has no candidate pairs",
                 record.pair.a);
 }
@@ -142,14 +144,7 @@ struct OctreeBasedCD::Implementation {
     }
     Stopwatch watch;
     for (const auto& record : records) {
-      const Method method = record->pair.settings.method;
-      const bool moves =
-          (detecting || method == Method::Auto) && method != Method::Proxy && !record->needsField();
-      if (moves)
-        for (Geometry* geometry : {record->a, record->b}) geometry->motion.update(*geometry);
-      record->plan = planOf(record->pair.settings, record->a->inStep(), record->b->inStep(), moves);
-      if (detecting && mayUseProxy(*record))
-        record->plan = planByProxy(record->pair.settings, record->plan);
+      planStep(*record, detecting, !settings.keepCandidates);
       if (record->plan.swept())
         for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
     }
@@ -179,11 +174,8 @@ struct OctreeBasedCD::Implementation {
     if (explicitly) publish(updates);
   }
 
-  bool mayUseProxy(const PairRecord& record) const {
-    return !settings.keepCandidates && record.mayUseProxy();
-  }
   bool needsNoOctree(const PairRecord& record) const {
-    return record.usesProxy() || mayUseProxy(record);
+    return record.kind() == PairKind::Proxy || (!settings.keepCandidates && mayUseLeaves(record));
   }
 
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
@@ -195,7 +187,7 @@ struct OctreeBasedCD::Implementation {
       if (needsNoOctree(*record)) record->a->skipsOctree = true;
     for (const auto& record : pairs.records()) {
       if (!needsNoOctree(*record)) record->a->skipsOctree = false;
-      if (!record->usesProxy()) record->b->skipsOctree = false;
+      if (record->kind() != PairKind::Proxy) record->b->skipsOctree = false;
     }
     return std::any_of(geometries.all().begin(), geometries.all().end(),
                        [](const auto& geometry) { return geometry->skipsOctree; });
@@ -246,7 +238,7 @@ struct OctreeBasedCD::Implementation {
       frame.collect(records, threadsFor(records), next);
     } else {
       for (PairRecord* record : records) {
-        if (record->hasCandidates() && !record->usesField())
+        if (record->hasCandidates())
           findCandidatesByBruteForce(record->meshes(), record->candidates);
         else
           record->candidates.clear();
@@ -266,7 +258,7 @@ struct OctreeBasedCD::Implementation {
     const MemoryScope memory(MemoryStage::Octrees);
     bool built = false;
     for (PairRecord* record : records)
-      if (record->usesProxy()) built |= record->updateProxy(pairs.records(), threads);
+      if (record->kind() == PairKind::Proxy) built |= record->updateProxy(pairs.records(), threads);
     return built;
   }
 
@@ -292,7 +284,7 @@ struct OctreeBasedCD::Implementation {
     const MemoryScope memory(MemoryStage::Pairs);
     update(false, true);
     for (const auto& record : pairs.records())
-      if (!settings.keepCandidates) record->useField(settings.engine);
+      if (!settings.keepCandidates) planByFieldIfProven(*record, settings.engine);
     FrameStatistics next = updates;
     const auto records = outdatedPairs(&PairRecord::dataVersion);
     for (const auto& record : pairs.records()) record->statistics = {};
@@ -800,7 +792,9 @@ CollisionProblem OctreeBasedCD::problem() const {
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {
-  if (settings.method == Method::Continuous)
+  const Support* const support =
+      supportOf(settings.method, GeometryType::Triangles, GeometryType::Triangles, false);
+  if (support && support->has(kNeedsStep))
     throw Error(ErrorCode::UnsupportedMethod,
                 "Method::Continuous needs a step: use OctreeBasedCD and two sets of positions");
   OctreeBasedCD detection({.threads = 1});

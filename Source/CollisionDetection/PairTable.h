@@ -59,14 +59,11 @@ struct PairRecord : CountedObject {
             guarded != nullptr};
   }
   /// Whether a distance field answers in this frame.
-  bool usesField() const { return plan.method == Method::DistanceField; }
+  bool usesField() const { return plan.kind == PairKind::Field; }
   const Geometry& body() const { return bodyWithField(*a, *b); }                ///< if usesField()
   PlacedField placedField() const { return {*body().field, body().mesh.now}; }  ///< if usesField()
   /// If usesField(): for the contacts with the field. Allocates fieldScratch when first called.
   FieldContacts fieldContacts(const PlacedField&);
-  /// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
-  /// nothing touched in the step. The octrees must be updated.
-  void useField(Engine);
   bool collides() const { return a->meets(*b); }
   bool anyDisabled() const {
     return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
@@ -79,17 +76,14 @@ struct PairRecord : CountedObject {
 
   void releaseMemory();  ///< keeps the result, and candidates that are valid
 
-  bool hasShape() const { return a->shape || b->shape; }
-  /// Whether a distance field answers in every frame.
-  bool needsField() const {
-    return pair.settings.method == Method::DistanceField || a->isField() || b->isField();
+  /// How the settings have the pair answered. Auto's plan of a frame may have another kind.
+  PairKind kind() const {
+    return supportOf(pair.settings.method, a->mesh.topology.type, b->mesh.topology.type, a == b)
+        ->kind;
   }
-  bool usesProxy() const { return pair.settings.method == Method::Proxy; }
-  /// Auto: whether the settings allow the leaves that are attached to b.
-  bool mayUseProxy() const;
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
   /// ask for candidates.
-  bool hasCandidates() const { return !hasShape() && !usesProxy() && !needsField(); }
+  bool hasCandidates() const { return kind() == PairKind::Meshes; }
   /// Makes `proxy` for the body and the settings if it is another one, or takes that of `others`.
   /// Returns whether leaves were built.
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);
@@ -118,7 +112,7 @@ struct PairRecord : CountedObject {
   bool candidatesSorted = false;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
-  std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, if usesProxy(); pairs may share it
+  std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, for PairKind::Proxy; pairs may share it
   ProxySettings proxySettings;
   DerivedFrom<3> proxyVersion;  ///< topology, enabled elements and positions of b
 };

@@ -54,7 +54,8 @@ struct StepGuard::Implementation {
         own->b = record->b;
       }
       own->pair = {record->pair.a, record->pair.b, settingsOf(record->pair.settings)};
-      if (!own->hasShape() && own->a->mesh.largestRadius + own->b->mesh.largestRadius == 0.0)
+      if (!own->a->shape && !own->b->shape &&
+          own->a->mesh.largestRadius + own->b->mesh.largestRadius == 0.0)
         own->pair.settings.timeTolerance = kTouchTolerance;
       own->settingsRevision = record->settingsRevision;
     }

@@ -483,7 +483,9 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
   for (const auto& pair : pairs.records()) {
     // Brute force over features does not reproduce proxies, whose contacts have an error, nor
     // what bodies tell about contacts.
-    if (!pair->collides() || pair->usesProxy() || pair->plan.byProxy || pair->byBodies) continue;
+    if (!pair->collides() || pair->byBodies || pair->plan.kind == PairKind::Proxy ||
+        pair->plan.kind == PairKind::ParticlesByLeaves)
+      continue;
     const std::size_t first = failures.size();
     audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, pair->sidesAreKnown,
           failures);

@@ -17,12 +17,11 @@ bool mayPierce(const GeometryInStep& a, const GeometryInStep& b) {
   return (a.mesh.topology.hasFaces() && hasEdges(b)) || (b.mesh.topology.hasFaces() && hasEdges(a));
 }
 
-bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b) {
-  return a.mesh.radii.empty() && b.mesh.radii.empty();
-}
-
-bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness) {
-  return a.isShape || b.isShape || thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0;
+bool answers(Method method, double thickness, const GeometryInStep& a, const GeometryInStep& b) {
+  const Support* const row = supportOf(method, a.type(), b.type(), &a.mesh == &b.mesh);
+  return row && (!row->has(kOneRadius) || (a.mesh.radii.empty() && b.mesh.radii.empty())) &&
+         (!row->has(kNeedsReach) ||
+          thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0);
 }
 
 /// Auto with lines, points or shapes. At rest it chooses Proximity, which costs least. In a step
@@ -30,9 +29,10 @@ bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thick
 /// it.
 static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
                          const GeometryInStep& b, PairPlan& plan) {
-  const bool proximity = hasProximity(a, b, settings.thickness);
-  const bool still = plan.motion == 0.0 && proximity;
-  plan.method = still || !hasContinuous(a, b) ? Method::Proximity : Method::Continuous;
+  const bool still = plan.motion == 0.0 && answers(Method::Proximity, settings.thickness, a, b);
+  plan.method = still || !answers(Method::Continuous, settings.thickness, a, b)
+                    ? Method::Proximity
+                    : Method::Continuous;
   plan.reason = still ? MethodReason::Still : MethodReason::NoAlternative;
 }
 
@@ -61,6 +61,7 @@ static void examineProximity(double thickness, PairPlan& plan) {
 PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves) {
   PairPlan plan;
+  plan.kind = supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh)->kind;
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;
@@ -68,13 +69,9 @@ PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const Geo
     plan.motion = largestMotion(a.range, b.range);
     plan.arcDeviation = a.arcDeviation + b.arcDeviation;
   }
-  if (settings.method == Method::DistanceField) return plan;
-  const auto isField = [](const GeometryInStep& each) {
-    return each.mesh.topology.type == GeometryType::Field;
-  };
-  if (isField(a) || isField(b)) {
+  if (plan.kind == PairKind::Field) {
+    if (settings.method == Method::Auto) plan.reason = MethodReason::NoAlternative;
     plan.method = Method::DistanceField;
-    plan.reason = MethodReason::NoAlternative;
     return plan;
   }
   if (!haveTriangles(a, b)) {
@@ -124,17 +121,19 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
                                     const GeometryInStep& b, const PairPlan& exact) {
   const GeometryInStep& body = bodyWithField(a, b);
   const GeometryInStep& other = &body == &b ? a : b;
-  if (settings.method != Method::Auto || exact.method == Method::DistanceField || !body.field ||
-      &a.mesh == &b.mesh || other.isShape ||
+  if (settings.method != Method::Auto || exact.kind != PairKind::Meshes || !body.field ||
+      !supportOf(Method::DistanceField, a.type(), b.type(), &a.mesh == &b.mesh) ||
       !(settings.allowedError > 0.0 && body.field->errorBound() <= settings.allowedError))
     return {};
   // A field knows only sides of its own.
   if (other.mesh.outerSideOnly || (body.mesh.outerSideOnly && !body.field->isClosed())) return {};
   const double tolerance = motionToleranceOf(settings);
-  const bool isAnswered = exact.motion == 0.0
-                              ? exact.method == Method::Proximity
-                              : hasProximity(a, b, settings.thickness) && exact.motion <= tolerance;
+  const bool isAnswered =
+      exact.motion == 0.0
+          ? exact.method == Method::Proximity
+          : answers(Method::Proximity, settings.thickness, a, b) && exact.motion <= tolerance;
   PairPlan plan;
+  plan.kind = PairKind::Field;
   plan.method = Method::DistanceField;
   plan.reason = MethodReason::AllowedError;
   plan.motion = exact.motion;
@@ -147,8 +146,8 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
   return plan;
 }
 
-PairPlan planByProxy(const PairSettings& settings, PairPlan exact) {
-  exact.byProxy = true;
+PairPlan planByLeaves(const PairSettings& settings, PairPlan exact) {
+  exact.kind = PairKind::ParticlesByLeaves;
   exact.motionTolerance = motionToleranceOf(settings);
   exact.proxyThickness = settings.thickness +
                          extraThicknessOf(settings, std::min(exact.motion, exact.motionTolerance));

@@ -8,6 +8,7 @@
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Validity/Support.h"
 
 #include <optional>
 
@@ -16,7 +17,6 @@ namespace palpate {
 /// The data of one geometry from which a method is chosen and Validity::trusted is decided.
 struct GeometryInStep {
   const TriangleMesh& mesh;
-  bool isShape;
   double smallestHeight;       ///< L: of all triangles with area, in the shape at rest
   MotionRange range;           ///< from before to now
   MotionRange correction;      ///< from `detected` to before
@@ -25,10 +25,12 @@ struct GeometryInStep {
   Revision topology, enabled;  ///< GeometryRevisions
   const Positions& detected;   ///< the end `now` of the last detection
   const DistanceField* field;  ///< null if there is none
+  GeometryType type() const { return mesh.topology.type; }
 };
 
 /// The method of a pair in this frame, and what the narrow phase must find out for it.
 struct PairPlan {
+  PairKind kind = PairKind::Meshes;
   Method method = Method::Intersection;  ///< Auto: Proximity and Continuous
   MethodReason reason = MethodReason::Requested;
   double motion = 0;           ///< L: largest motion of two features relative to each other
@@ -38,20 +40,15 @@ struct PairPlan {
   /// there are any, but no intersections, the answer is not trusted.
   double searchDistance = 0;
   StepPlan step;
-  bool runsIntersection = false;  ///< Auto: Intersection runs, too, if the start intersects
-  /// Auto: an attached proxy answers all particles but those that may have an impact in the step.
-  /// The method above answers the others.
-  bool byProxy = false;
-  double proxyThickness = 0;        ///< L: up to which it reports contacts
+  bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
+  double proxyThickness = 0;        ///< L: ParticlesByLeaves: up to which leaves report contacts
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
 };
 
-/// Whether Method::Continuous supports a pair of these geometries.
-bool hasContinuous(const GeometryInStep& a, const GeometryInStep& b);
-/// Whether Method::Proximity supports a pair of these geometries.
-bool hasProximity(const GeometryInStep& a, const GeometryInStep& b, double thickness);
+/// Whether a method answers the pair with this thickness and the radii of both.
+bool answers(Method, double thickness, const GeometryInStep& a, const GeometryInStep& b);
 /// Whether both geometries have triangles.
 bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
 /// Whether elements may intersect although no features touch: an edge pierces a triangle. All other
@@ -78,6 +75,6 @@ bool isWithinBand(const DistanceField&, double thickness, double largestRadius);
 std::optional<PairPlan> planByField(const PairSettings&, const GeometryInStep& a,
                                     const GeometryInStep& b, const PairPlan& exact);
 /// The same for the leaves of an attached proxy, which the settings allow.
-PairPlan planByProxy(const PairSettings&, PairPlan exact);
+PairPlan planByLeaves(const PairSettings&, PairPlan exact);
 
 }  // namespace palpate

@@ -90,7 +90,7 @@ double roundingOf(const StepPlan& step) { return step.motionWithRounding - step.
 /// knows only the motion of all.
 bool measuredApart(const MeshPair& meshes, const PairPlan& plan, const StepFacts& facts,
                    double earliestTime) {
-  if (plan.byProxy) return false;
+  if (plan.kind == PairKind::ParticlesByLeaves) return false;
   if (plan.method == Method::Continuous) {
     // Earliest times come without distances, and without features that a filter refuses.
     if (meshes.settings.earliestTimeOnly) return earliestTime > 0.0 && !meshes.hasFilters();
@@ -180,10 +180,11 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                    const MeshPair& meshes, CollisionData::Contents& contents,
                    ContactBuffers& counts) {
   Validity& validity = contents.validity;
-  validity.method = plan.byProxy ? Method::Proxy : plan.method;
-  validity.reason = plan.byProxy ? MethodReason::AllowedError : plan.reason;
+  const bool byLeaves = plan.kind == PairKind::ParticlesByLeaves;
+  validity.method = byLeaves ? Method::Proxy : plan.method;
+  validity.reason = byLeaves ? MethodReason::AllowedError : plan.reason;
   validity.displacement = plan.motion;
-  validity.effectiveThickness = plan.byProxy ? plan.proxyThickness
+  validity.effectiveThickness = byLeaves ? plan.proxyThickness
                                 : plan.method == Method::Intersection
                                     ? 0.0
                                     : settings.thickness + plan.step.extraThickness;

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <palpate/FrameStatistics.h>
+#include <palpate/Settings.h>
+
+#include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Threads.h"
+#include "DistanceField/PlacedProxy.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Octree/PointQueries.h"
+#include "Octree/Traversal.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+namespace palpate {
+
+/// What a job of a pair's work found, and its scratch, which remembers its peak.
+struct JobScratch : CountedObject {
+  ContactBuffers contacts;
+  ContactBuffers intersections;      ///< Auto: Intersection's, where the step starts intersecting
+  bool nearby = false;               ///< some boxes overlap at the thickness of the traversal
+  bool intersectionsMissed = false;  ///< they were not looked for in every batch
+  std::size_t candidateCount = 0;
+  Buffer<ElementPair> candidates;  ///< if they are kept
+  ProxyHits hits;
+  double milliseconds = 0, narrowMilliseconds = 0;
+
+  TraversalStack stack;
+  PairSink sink;
+  PointQueryStack queries;
+  Buffer<std::uint32_t> elements;
+  Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
+
+  void clear() {
+    contacts.clear();
+    intersections.clear();
+    nearby = intersectionsMissed = false;
+    candidateCount = 0;
+    candidates.clear();
+    hits.count = 0;
+    milliseconds = narrowMilliseconds = 0;
+  }
+};
+
+/// The jobs of one pair.
+using Jobs = std::span<const std::unique_ptr<JobScratch>>;
+
+/// What start() of a pair's work needs of the frame.
+struct FrameStart {
+  const Threads& threads;
+  bool keepsCandidates;
+  Buffer<NodePair>& nodePairs;  ///< of the traversals of all pairs
+  TraversalStack& stack;
+};
+
+/// The same of join().
+struct FrameJoin {
+  const Threads& threads;
+  Engine engine;
+  FrameStatistics& statistics;
+  class PairResults& results;
+};
+
+}  // namespace palpate

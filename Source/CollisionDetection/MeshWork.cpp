@@ -1,0 +1,303 @@
+#include "CollisionDetection/MeshWork.h"
+
+#include "CollisionDetection/DiagnosticsInterface.h"
+#include "Core/Stopwatch.h"
+#include "Math/Tolerances.h"
+#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/ElementBoxes.h"
+#include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Meeting.h"
+#include "NarrowPhase/StepCheck.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+/// Node pairs and jobs for each collision pair, where there is more than one thread.
+constexpr std::size_t kNodePairsWanted = 256, kJobsPerPair = 32;
+/// Below this many elements, splitting a pair among threads costs more than it saves.
+constexpr std::size_t kSharedSize = 8192;
+
+/// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
+/// method reports nothing but touching features: Continuous, without a thickness.
+bool reportsOnlyTouching(const PairRecord& record) {
+  return record.a == record.b && record.plan.method == Method::Continuous &&
+         record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
+}
+
+/// L: by how much more than the thickness Continuous may report features (TimeOfImpactSettings).
+/// Their boxes in the world overlap at the thickness, but those in another frame may not.
+double approachSlack(const PairRecord& record, double thickness) {
+  if (!record.plan.swept()) return 0.0;
+  const double motion = record.plan.motion,
+               largestDifference = record.a->inStep().extent + record.b->inStep().extent + motion;
+  return record.pair.settings.timeTolerance * motion +
+         kApproachError * (largestDifference + 2.0 * thickness);
+}
+
+FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
+  FloatPair floats{record.a->tree.floats(), record.b->tree.floats(), nullptr, nullptr,
+                   trees.shiftLower,        trees.shiftUpper};
+  if (record.plan.swept()) {
+    floats.beforeA = record.a->tree.floatsAtStart();
+    floats.beforeB = record.b->tree.floatsAtStart();
+  }
+  return floats;
+}
+
+bool sharesVertex(const Triangle& s, const Triangle& t) {
+  return std::any_of(s.begin(), s.end(),
+                     [&](std::uint32_t v) { return v == t[0] || v == t[1] || v == t[2]; });
+}
+
+}  // namespace
+
+std::size_t MeshWork::start(const FrameStart& frame) {
+  m_keepsCandidates = frame.keepsCandidates;
+  return startTraversal(frame, true, frame.keepsCandidates ? BoxFrame::World : BoxFrame::Body);
+}
+
+std::size_t MeshWork::startCandidates(const FrameStart& frame) {
+  return startTraversal(frame, false, BoxFrame::World);
+}
+
+std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs,
+                                     BoxFrame boxFrame) {
+  PairRecord& record = *m_record;
+  GeometryOctree &ofA = record.a->tree, &ofB = record.b->tree;
+  const std::size_t elements = ofA.octree().size() + ofB.octree().size();
+  if (ofA.octree().size() == 0 || ofB.octree().size() == 0) return 0;
+  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
+                                       ? ofA.findUnfoldedStars(record.a->mesh, frame.threads)
+                                       : nullptr;
+  m_thickness =
+      record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
+  const auto treesIn = [&](BoxFrame in, double distance) {
+    if (in == BoxFrame::Body) distance += approachSlack(record, m_thickness);
+    TreePair trees = treesOf(*record.a, *record.b, distance, record.plan.swept(), in);
+    if (trees.self() && !adjacentPairs) trees.adjacency = ofA.ordered().data();
+    if (unfolded) trees.adjacency = unfolded;
+    return trees;
+  };
+  m_floats = floatsOf(record, treesIn(BoxFrame::World, m_thickness));
+  // A search at the searchDistance is for boxes in the world.
+  const bool searches = adjacentPairs && record.plan.searchDistance > 0.0,
+             inWorld = searches || !record.a->isPlaced() || !record.b->isPlaced();
+  m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
+                    searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
+  const bool shared = frame.threads.count() > 1 && elements >= kSharedSize;
+  startPairs(m_trees, shared ? kNodePairsWanted : 1, frame.stack);
+  m_nodePairs = &frame.nodePairs;
+  m_first = frame.nodePairs.size(), m_count = frame.stack.pairs.size();
+  frame.nodePairs.insert(frame.nodePairs.end(), frame.stack.pairs.begin(), frame.stack.pairs.end());
+  m_grain = std::max<std::size_t>(1, (m_count + kJobsPerPair - 1) / kJobsPerPair);
+  return (m_count + m_grain - 1) / m_grain;
+}
+
+void MeshWork::traverseJob(std::size_t job, JobScratch& scratch) const {
+  const std::size_t begin = job * m_grain, size = std::min(m_count - begin, m_grain);
+  traverse(m_trees, std::span(*m_nodePairs).subspan(m_first + begin, size), scratch.stack,
+           scratch.sink);
+  scratch.sink.flush();
+}
+
+/// Whether the boxes of the traversal may be larger than those of the pair's method.
+bool MeshWork::hasWiderBoxes() const {
+  return m_record->hasWiderBoxes() || m_record->plan.searchDistance > 0.0;
+}
+
+bool MeshWork::isFiltered() const {
+  return hasWiderBoxes() || m_record->anyDisabled() || m_trees.isMapped();
+}
+
+/// Keeps the candidates of a batch of the traversal.
+std::span<const ElementPair> MeshWork::candidatesAmong(std::span<const ElementPair> pairs,
+                                                       JobScratch& scratch) const {
+  if (!isFiltered()) {
+    scratch.nearby = true;
+    return pairs;
+  }
+  const PairPlan& plan = m_record->plan;
+  const bool searches = plan.searchDistance > 0.0;
+  Buffer<ElementPair>& kept = scratch.kept;
+  kept.assign(pairs.begin(), pairs.end());
+  // First, pairs whose boxes overlap at the thickness of the traversal. That of mapped trees finds
+  // other pairs as well. So does a search if other pairs of the geometries need boxes over the
+  // step.
+  if (m_trees.isMapped() || (searches && m_record->hasWiderBoxes()))
+    keepInWorld(searches ? std::max(plan.step.motionWithRounding, m_thickness) : m_thickness,
+                scratch);
+  scratch.nearby |= !kept.empty();
+  const MeshTopology &a = m_record->a->mesh.topology, &b = m_record->b->mesh.topology;
+  if (m_record->anyDisabled())
+    std::erase_if(kept,
+                  [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
+  // Then those whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
+  // method: at the step's end, or over the whole step.
+  if (m_trees.isMapped()) {
+    if (plan.searchDistance > m_thickness) keepInWorld(m_thickness, scratch);
+  } else if (hasWiderBoxes()) {
+    keepOverlapping(a, b, m_floats, kept);
+  }
+  return kept;
+}
+
+void MeshWork::keepInWorld(double distance, JobScratch& scratch) const {
+  keepOverlapping(m_record->meshes(), m_record->plan.swept(), distance, scratch.kept);
+}
+
+bool MeshWork::repeats(const JobScratch& job) const {
+  return job.intersectionsMissed && m_record->plan.runsIntersection;
+}
+
+bool MeshWork::hasRound(int round, Jobs jobs) const {
+  if (round != 1) return round == 0;
+  bool startsIntersecting = m_record->plan.startsIntersecting, missed = false;
+  for (const auto& job : jobs) {
+    startsIntersecting |= job->contacts.facts.startsPiercing();
+    missed |= repeats(*job);
+  }
+  return startsIntersecting && missed;
+}
+
+void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
+  if (round == 0) {
+    forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) { detect(pairs, scratch); });
+    scratch.candidateCount = scratch.sink.total();
+  } else if (repeats(scratch)) {
+    Stopwatch watch;
+    forEachBatch(job, scratch,
+                 [&](std::span<const ElementPair> pairs) { detectIntersections(pairs, scratch); });
+    scratch.narrowMilliseconds += watch.lap();
+  }
+}
+
+void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) const {
+  const MeshPair meshes = m_record->meshes(m_trees.isMapped() ? nullptr : &m_floats);
+  {
+    const MemoryScope memory(MemoryStage::NarrowPhase);
+    Stopwatch watch;
+    StepFacts& facts = scratch.contacts.facts;
+    if (meshes.step.checksStart && !facts.startsPiercing())
+      facts.atStart =
+          std::max(facts.atStart, meetingOf(meshes, true, pairs, scratch.intersections).meeting);
+    if (m_record->plan.runsIntersection &&
+        (facts.startsPiercing() || m_record->plan.startsIntersecting))
+      detectIntersections(pairs, scratch);
+    else
+      scratch.intersectionsMissed = true;
+    if (meshes.settings.earliestTimeOnly)
+      findEarliest(meshes, pairs, scratch);
+    else
+      findContacts(meshes, pairs, scratch.contacts);
+    scratch.narrowMilliseconds += watch.lap();
+  }
+  if (!m_keepsCandidates) return;
+  const CountedVector<Triangle>& triangles = meshes.a.topology.triangles;
+  for (const ElementPair pair : pairs)
+    if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
+      scratch.candidates.push_back(pair);
+}
+
+/// Auto: finds intersections at the step's end.
+void MeshWork::detectIntersections(std::span<const ElementPair> pairs, JobScratch& scratch) const {
+  const MemoryScope memory(MemoryStage::NarrowPhase);
+  const MeshPair meshes = m_record->meshes();
+  findIntersections(meshes, pairs, scratch.intersections);
+  if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, scratch.intersections);
+}
+
+void MeshWork::findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs,
+                            JobScratch& scratch) const {
+  std::atomic<double>& earliest = m_record->earliest;
+  const double found = findEarliestImpact(meshes, pairs, earliest.load(), scratch.contacts);
+  double known = earliest.load();
+  while (found < known && !earliest.compare_exchange_weak(known, found)) {
+  }
+}
+
+void MeshWork::runByBruteForce(JobScratch& scratch) const {
+  detectPairByBruteForce(*m_record, scratch.contacts, scratch.intersections);
+  if (m_record->pair.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
+  scratch.nearby = true;
+}
+
+void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
+  PairRecord& record = *m_record;
+  PairResults& results = join.results;
+  auto& [pierced, leaving, piercingContacts, knownSides, bodies] = results.meshes;
+  pierced.clear();
+  results.start(jobs);
+  auto &found = results.found(), &intersections = results.intersections();
+  StepFacts& facts = results.facts();
+  const bool byIntersection = record.plan.method == Method::Intersection;
+  auto& atEnd = byIntersection ? found : intersections;
+  piercingContacts.find(record.meshes(), atEnd, pierced);
+  atEnd.push_back(&pierced);
+  for (const auto* buffers : {&found, &intersections})
+    for (const ContactBuffers* each : *buffers) facts.add(each->facts);
+  results.sortFacts(record);
+  if (record.plan.step.reportsImpacts && facts.clearance == 0.0) {
+    for (ContactBuffers* each : found)
+      replaceByImpacts(record.meshes(), facts, *each, results.impacts);
+    found.push_back(&results.impacts);
+  }
+  if (record.plan.startsIntersecting) facts.atStart = Meeting::Piercing;
+  record.plan.startsIntersecting = facts.startsPiercing();
+  std::size_t preferred = 0;
+  record.sidesAreKnown = facts.startsPiercing() && record.plan.runsIntersection;
+  if (record.sidesAreKnown) {
+    leaving.clear();
+    piercingContacts.findAtStart(record.meshes(), intersections, leaving);
+    knownSides.apply(record.meshes(), intersections, leaving, found);
+    preferred = intersections.size();
+    found.insert(found.begin(), intersections.begin(), intersections.end());
+  }
+  // A feature pair that Intersection reports is not reported by distance or impact as well: where
+  // the step starts intersecting only Intersection knows the side.
+  const std::size_t intersectionCount = results.order(record, preferBodies(join, preferred));
+  join.statistics.exactDecisions += pierced.exactDecisions;
+  CollisionData::Contents& contents = record.next.contents();
+  describeExact(contents);
+  const bool nearby =
+      std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });
+  results.assess(record, nearby, join.statistics);
+  // After assess(), which tests the triangles around every impact.
+  const bool mixes = record.plan.step.reportsImpacts,
+             continuous = record.plan.method == Method::Continuous;
+  if (mixes || continuous)
+    results.keepFirstImpacts(record, mixes ? 1.0 : std::numeric_limits<double>::infinity());
+  std::size_t atImpact = 0;
+  if (mixes)
+    forEachTimed(contents, [&](const auto& contacts) {
+      for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
+    });
+  else if (continuous)
+    atImpact = sizeOf(contents) - intersectionCount;
+  countContacts(atImpact, contents);
+}
+
+/// Auto: of closed bodies that intersect when the step begins, takes only contacts on outer sides.
+/// Returns the number of preferred buffers.
+std::size_t MeshWork::preferBodies(const FrameJoin& join, std::size_t preferred) const {
+  PairRecord& record = *m_record;
+  record.byBodies = false;
+  if (record.pair.settings.method != Method::Auto) return preferred;
+  auto &found = join.results.found(), &intersections = join.results.intersections();
+  std::unique_ptr<BodyContacts>& bodies = join.results.meshes.bodies;
+  if (!bodies) bodies = std::make_unique<BodyContacts>();
+  const bool byIntersection = record.plan.method == Method::Intersection;
+  const BodyContacts::Buffers all(found), local = byIntersection ? all : intersections;
+  const bool areDeep = bodies->find(record, join.engine, join.results.facts().startsPiercing(),
+                                    local, all.subspan(byIntersection ? all.size() : preferred));
+  record.byBodies = areDeep || bodies->hasTurned();
+  join.statistics.exactDecisions += bodies->exactDecisions();
+  if (!areDeep) return preferred;
+  found.assign(1, &bodies->contacts());
+  return 1;
+}
+
+}  // namespace palpate

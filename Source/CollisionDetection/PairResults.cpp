@@ -1,0 +1,99 @@
+#include "CollisionDetection/PairResults.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+namespace {
+
+/// Sorts ids, which are below `count`, and keeps each once.
+void sortUnique(Buffer<std::uint32_t>& ids, std::size_t count, Buffer<std::uint8_t>& flags) {
+  if (ids.size() < count) {
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return;
+  }
+  flags.assign(count, 0);
+  for (const std::uint32_t id : ids) flags[id] = 1;
+  ids.clear();
+  for (std::uint32_t id = 0; id < count; ++id)
+    if (flags[id]) ids.push_back(id);
+}
+
+}  // namespace
+
+void PairResults::start(Jobs jobs) {
+  m_facts.clear();
+  impacts.clear();
+  m_found.clear();
+  m_intersections.clear();
+  for (const auto& job : jobs) {
+    m_found.push_back(&job->contacts);
+    m_intersections.push_back(&job->intersections);
+  }
+}
+
+void PairResults::sortFacts(const PairRecord& record) {
+  const TriangleMesh &a = record.a->mesh, &b = record.b->mesh;
+  sortUnique(m_facts.verticesA, a.now.size(), m_flags);
+  sortUnique(m_facts.verticesB, b.now.size(), m_flags);
+  sortUnique(m_facts.degenerateA, a.topology.triangles.size(), m_flags);
+  sortUnique(m_facts.degenerateB, b.topology.triangles.size(), m_flags);
+}
+
+std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {
+  return orderContacts(m_found, preferred, m_orderScratch, record.next.contents());
+}
+
+void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& statistics) {
+  CollisionData::Contents& contents = record.next.contents();
+  contents.earliestTimeOfImpact = record.earliest.load();
+  if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
+  if (!record.guarded)
+    record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
+                        m_facts, nearby, record.meshes(), contents, impacts);
+  statistics.exactDecisions += impacts.exactDecisions;
+  statistics.validityPairs += impacts.validityPairs;
+}
+
+void PairResults::keepFirstImpacts(PairRecord& record, double end) {
+  if (record.pair.settings.contacts == Contacts::Distinct)
+    m_firstImpacts.keep(record.meshes(), end, m_orderScratch, record.next.contents());
+}
+
+void PairResults::keepDistinct(PairRecord& record) {
+  const MeshPair pair = record.meshes();
+  auto& contacts = record.next.contents().shape;
+  contacts.resize(m_distinctContacts.keep(pair.mesh(), pair.shape().now,
+                                          pair.poses().before.transform(),
+                                          pair.poses().now.transform(), pair.settings, contacts));
+}
+
+void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
+  forEachTimed(contacts, [&](auto& list) {
+    for (const auto& contact : list)
+      record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);
+    list.clear();
+  });
+}
+
+void describeExact(CollisionData::Contents& contents) {
+  Validity& validity = contents.validity;
+  validity.outsideBand.clear();
+  validity.nearThreshold.clear();
+  validity.unreliableSign.clear();
+  validity.proxyDepth = contents.errorBound = 0.0;
+}
+
+std::size_t sizeOf(const CollisionData::Contents& contents) {
+  std::size_t size = 0;
+  forEachTimed(contents, [&](const auto& list) { size += list.size(); });
+  return size;
+}
+
+void countContacts(std::size_t atImpact, CollisionData::Contents& contents) {
+  contents.validity.atImpact = atImpact;
+  contents.validity.atEnd = sizeOf(contents) - atImpact;
+}
+
+}  // namespace palpate

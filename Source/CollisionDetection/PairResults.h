@@ -1,0 +1,77 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/FrameStatistics.h>
+
+#include "CollisionDetection/BodyContacts.h"
+#include "CollisionDetection/FirstImpacts.h"
+#include "CollisionDetection/JobScratch.h"
+#include "CollisionDetection/Order.h"
+#include "CollisionDetection/PairTable.h"
+#include "Core/Buffer.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Piercing.h"
+#include "Shapes/DistinctContacts.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// From what the jobs of a pair found to the pair's results, in steps that the kinds of work share.
+/// Its scratch remembers its peak.
+class PairResults {
+ public:
+  using Buffers = std::span<ContactBuffers* const>;
+
+  /// Begins a pair: takes the facts of its jobs.
+  void start(Jobs);
+  StepFacts& facts() { return m_facts; }
+  /// Contacts of all jobs, and Auto's from Intersection.
+  std::vector<ContactBuffers*>& found() { return m_found; }
+  std::vector<ContactBuffers*>& intersections() { return m_intersections; }
+
+  /// Sorts the ids of the facts, each once.
+  void sortFacts(const PairRecord&);
+  /// Writes found(), sorted by element ids. Returns the number of contacts from the first
+  /// `preferred` buffers, which have precedence over others of the same elements.
+  std::size_t order(PairRecord&, std::size_t preferred = 0);
+  /// Writes Validity. nearby: as Trust::finish() has it. Writes no error bound.
+  void assess(PairRecord&, bool nearby, FrameStatistics&);
+  /// Contacts::Distinct for impacts before `end`.
+  void keepFirstImpacts(PairRecord&, double end);
+  /// Contacts::Distinct for a shape.
+  void keepDistinct(PairRecord&);
+
+  /// Of work on meshes.
+  struct Meshes {
+    ContactBuffers pierced, leaving;  ///< of PiercingContacts, at the step's end and start
+    PiercingContacts piercingContacts;
+    KnownSides knownSides;
+    std::unique_ptr<BodyContacts> bodies;  ///< null before a pair first needs it
+  } meshes;
+  ContactBuffers impacts;  ///< of touches in the step; its counts include those of assess()
+
+ private:
+  StepFacts m_facts;
+  std::vector<ContactBuffers*> m_found, m_intersections;
+  OrderScratch m_orderScratch;
+  FirstImpacts m_firstImpacts;
+  DistinctContacts m_distinctContacts;
+  Buffer<std::uint8_t> m_flags;
+};
+
+/// PairSettings::earliestTimeOnly: replaces a pair's contacts by the earliest of their times.
+void takeEarliest(PairRecord&, ContactBuffers&);
+
+/// The error bound and the lists of Validity of an answer without an error.
+void describeExact(CollisionData::Contents&);
+
+std::size_t sizeOf(const CollisionData::Contents&);  ///< number of contacts
+/// Writes the numbers of contacts at impact and at the step's end.
+void countContacts(std::size_t atImpact, CollisionData::Contents&);
+
+}  // namespace palpate

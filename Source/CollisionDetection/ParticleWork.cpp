@@ -1,0 +1,123 @@
+#include "CollisionDetection/ParticleWork.h"
+
+#include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/PairResults.h"
+#include "CollisionDetection/ProxyWork.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Stopwatch.h"
+#include "Queries/ElementsNearShape.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+/// Makes the contacts of the exact method such of a body, too. Both lists are in the order of
+/// particles.
+void describeAsShape(const TriangleMesh& points, CollisionData::Contents& contents) {
+  auto& exact = contents.vertexTriangle;
+  auto& all = contents.shape;
+  std::size_t byLeaves = all.size(), left = exact.size();
+  all.resize(byLeaves + left);
+  for (std::size_t place = all.size(); left > 0;) {
+    if (byLeaves > 0 && all[byLeaves - 1].id > exact[left - 1].vertex) {
+      all[--place] = all[--byLeaves];
+      continue;
+    }
+    const VertexTriangleContact& contact = exact[--left];
+    const std::uint32_t v = contact.vertex;
+    const double time = contact.timeOfImpact;
+    const Eigen::Vector3d point = (1.0 - time) * points.before[v] + time * points.now[v];
+    all[--place] = {ShapeElement::Vertex,
+                    v,
+                    {v, v, v},
+                    Eigen::Vector3d::UnitX(),
+                    point,
+                    point - (contact.distance + points.radius(v)) * contact.normal,
+                    contact.normal,
+                    contact.distance,
+                    time};
+  }
+  exact.clear();
+}
+
+}  // namespace
+
+void ParticleWork::place() {
+  m_proxy.emplace(*m_record->b->proxy, m_record->b->mesh, m_record->plan.proxyThickness);
+}
+
+std::size_t ParticleWork::start(const FrameStart&) {
+  place();
+  return (m_record->a->mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
+}
+
+void ParticleWork::run(int, std::size_t job, JobScratch& scratch) const {
+  const MemoryScope memory(MemoryStage::NarrowPhase);
+  Stopwatch watch;
+  const std::size_t begin = job * kParticlesPerJob;
+  findByLeaves(begin, std::min(m_record->a->mesh.now.size(), begin + kParticlesPerJob), false,
+               scratch);
+  findOthers(scratch);
+  scratch.narrowMilliseconds += watch.lap();
+}
+
+void ParticleWork::runByBruteForce(JobScratch& scratch) {
+  place();
+  findByLeaves(0, m_record->a->mesh.now.size(), true, scratch);
+  detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
+}
+
+void ParticleWork::findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce,
+                                JobScratch& scratch) const {
+  const TriangleMesh& points = m_record->a->mesh;
+  const PairPlan& plan = m_record->plan;
+  const ParticleStep step{m_record->b->motion.range(), m_record->pair.settings.thickness,
+                          plan.motionTolerance};
+  ProxyHits& hits = scratch.hits;
+  m_proxy->find(points, begin, end, byBruteForce, plan.motion > 0.0 ? &step : nullptr, hits);
+  scratch.contacts.featurePairs += hits.answered;
+  scratch.contacts.shape.resize(hits.count);
+  m_proxy->write(points, hits, scratch.contacts.shape.data());
+}
+
+void ParticleWork::findOthers(JobScratch& scratch) const {
+  const TriangleMesh& points = m_record->a->mesh;
+  const MeshPair meshes = m_record->meshes();
+  const bool swept = m_record->plan.swept();
+  const auto isDisabled = [&](const ElementPair& p) {
+    return !m_record->b->mesh.topology.isEnabled(p.b);
+  };
+  for (const std::uint32_t point : scratch.hits.others) {
+    Eigen::AlignedBox3d box(points.now[point]);
+    if (swept) box.extend(points.before[point]);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
+    findElementsNear(*m_record->b, {box.min() - margin, box.max() + margin}, swept, scratch.queries,
+                     scratch.elements);
+    scratch.kept.clear();
+    for (const std::uint32_t element : scratch.elements) scratch.kept.push_back({point, element});
+    std::erase_if(scratch.kept, isDisabled);
+    if (!scratch.kept.empty()) findContacts(meshes, scratch.kept, scratch.contacts);
+  }
+}
+
+void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
+  PairRecord& record = *m_record;
+  PairResults& results = join.results;
+  const bool continuous = record.plan.method == Method::Continuous;
+  results.start(jobs);
+  for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
+  results.sortFacts(record);
+  results.order(record);
+  CollisionData::Contents& contents = record.next.contents();
+  describeExact(contents);
+  describeProxy(*record.b->proxy, *m_proxy, jobs, contents);
+  results.assess(record, false, join.statistics);
+  if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
+  countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);
+  describeAsShape(record.a->mesh, contents);
+}
+
+}  // namespace palpate

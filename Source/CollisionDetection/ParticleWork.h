@@ -1,0 +1,33 @@
+#pragma once
+
+#include "CollisionDetection/JobScratch.h"
+#include "CollisionDetection/PairTable.h"
+#include "DistanceField/PlacedProxy.h"
+
+#include <cstddef>
+#include <optional>
+
+namespace palpate {
+
+/// Work of Auto on particles by attached leaves. The plan's method finds the contacts of particles
+/// that may have an impact in the step.
+class ParticleWork {
+ public:
+  explicit ParticleWork(PairRecord& record) : m_record(&record) {}
+
+  std::size_t start(const FrameStart&);
+  bool hasRound(int round, Jobs) const { return round == 0; }
+  void run(int round, std::size_t job, JobScratch&) const;
+  void runByBruteForce(JobScratch&);
+  void join(Jobs, const FrameJoin&) const;
+
+ private:
+  void place();
+  void findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce, JobScratch&) const;
+  void findOthers(JobScratch&) const;
+
+  PairRecord* m_record;
+  std::optional<PlacedProxy> m_proxy;
+};
+
+}  // namespace palpate

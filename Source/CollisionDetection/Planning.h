@@ -1,0 +1,28 @@
+#pragma once
+
+#include <palpate/Settings.h>
+
+#include "CollisionDetection/PairTable.h"
+
+namespace palpate {
+
+// The plan of a pair in a frame is made here and nowhere else, in two steps. The first comes before
+// the update of octrees, whose boxes have to enclose the step for some methods. The second comes
+// after it, because it searches octrees.
+
+/// The plan of a pair before anything is known about its motion.
+void planWithoutMotion(PairRecord&);
+
+/// Auto: whether the settings allow the leaves that are attached to b.
+bool mayUseLeaves(const PairRecord&);
+
+/// Plans by the motion in the step, which it updates. detecting: contacts are wanted; otherwise
+/// only the motion on which candidates depend is included. Whether the boxes of both octrees have
+/// to enclose the step is then PairPlan::swept().
+void planStep(PairRecord&, bool detecting, bool leavesAllowed);
+
+/// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
+/// nothing touched in the step. The octrees must be updated.
+void planByFieldIfProven(PairRecord&, Engine);
+
+}  // namespace palpate

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "CollisionDetection/JobScratch.h"
+#include "CollisionDetection/PairTable.h"
+
+#include <cstddef>
+
+namespace palpate {
+
+/// Work on an analytical shape and the elements near it, or on two shapes: one job.
+class ShapeWork {
+ public:
+  explicit ShapeWork(PairRecord& record) : m_record(&record) {}
+
+  std::size_t start(const FrameStart&) const;
+  bool hasRound(int round, Jobs) const { return round == 0; }
+  void run(int round, std::size_t job, JobScratch&) const;
+  void runByBruteForce(JobScratch&) const;
+  void join(Jobs, const FrameJoin&) const;
+
+ private:
+  void findPair(const MeshPair&, JobScratch&) const;
+  void findNearMesh(const MeshPair&, JobScratch&) const;
+
+  PairRecord* m_record;
+};
+
+}  // namespace palpate
