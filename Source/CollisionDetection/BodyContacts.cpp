@@ -20,11 +20,12 @@ bool mayBeBodies(const PairRecord& record) {
   if (settings.method != Method::Auto || settings.earliestTimeOnly || record.a == record.b ||
       record.plan.kind != PairKind::Meshes || record.anyDisabled() || record.meshes().hasFilters())
     return false;
-  return !record.a->mesh.topology.triangles.empty() && !record.b->mesh.topology.triangles.empty() &&
-         hasClosedSurface(*record.a) && hasClosedSurface(*record.b);
+  return !record.a->body.mesh.topology.triangles.empty() &&
+         !record.b->body.mesh.topology.triangles.empty() && hasClosedSurface(record.a->body) &&
+         hasClosedSurface(record.b->body);
 }
 
-Eigen::AlignedBox3d boxOf(const SearchableGeometry& geometry) {
+Eigen::AlignedBox3d boxOf(const Body& geometry) {
   const Vector3d origin = worldOrigin(geometry);
   const FloatBox box = worldMap(geometry, origin, 0.0, false)(geometry.tree.octree().box(0));
   const double unit = 1.0 / geometry.tree.frame().scale;
@@ -35,8 +36,7 @@ Eigen::AlignedBox3d boxOf(const SearchableGeometry& geometry) {
 }
 
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
-bool wasInside(const SearchableGeometry& inner, const SearchableGeometry& outer,
-               PointQueryStack& stack) {
+bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
   const auto cornersOf = [&](std::size_t i) -> Corners {
     const auto& [a, b, c] = outer.mesh.topology.triangles[i];
     const Positions& before = outer.mesh.before;
@@ -51,8 +51,7 @@ bool wasInside(const SearchableGeometry& inner, const SearchableGeometry& outer,
 
 /// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the
 /// step.
-bool isInside(const SearchableGeometry& inner, const SearchableGeometry& outer, Engine engine,
-              PointQueryStack& stack) {
+bool isInside(const Body& inner, const Body& outer, Engine engine, PointQueryStack& stack) {
   const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
   return boxOf(outer).contains(boxOf(inner)) &&
          windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
@@ -153,7 +152,7 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
   stack.exactDecisions = 0;
   m_contacts.clear();
   if (!mayBeBodies(record)) return false;
-  const SearchableGeometry &a = *record.a, &b = *record.b;
+  const Body &a = record.a->body, &b = record.b->body;
   const bool meet = anyIntersecting(local);
   if (meet && agree(local)) return false;
   const bool overlapped =
@@ -177,7 +176,7 @@ void BodyContacts::addContacts(const PairRecord& record, Engine engine, const Pe
   if (triangles.empty())
     for (const BodyPair::Meeting& meeting : m_scratch.meetings)
       triangles.push_back({meeting.elementA, meeting.elementB});
-  const BodyPair pair(*record.a, *record.b, engine, m_scratch.pair);
+  const BodyPair pair(record.a->body, record.b->body, engine, m_scratch.pair);
   for (const bool ofA : {true, false})
     addVertices(pair, ofA, found, record.pair.settings.thickness);
   addEdges(found);

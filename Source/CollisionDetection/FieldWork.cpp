@@ -19,7 +19,7 @@ constexpr std::size_t kJobs = 32, kSharedSize = 512;
 void describeField(const PairRecord& record, CollisionData::Contents& contents) {
   describeExact(contents);
   Validity& validity = contents.validity;
-  const DistanceField& field = *record.body().field;
+  const DistanceField& field = *record.body().body.field;
   contents.errorBound = field.errorBound();
   const PlacedField placed = record.placedField();
   const double thickness = record.meshes().thicknessAtEnd();
@@ -28,7 +28,7 @@ void describeField(const PairRecord& record, CollisionData::Contents& contents) 
     if (!placed.lookup().signIsReliable(placed.inField(contact.point)))
       validity.unreliableSign.push_back(i);
     const double value =
-        contact.distance + record.mesh().mesh.radius(contact.vertices, contact.weights);
+        contact.distance + record.mesh().body.mesh.radius(contact.vertices, contact.weights);
     if (value <= -reachOf(field)) validity.outsideBand.push_back(i);
     if (thickness - contact.distance < field.errorBound()) validity.nearThreshold.push_back(i);
   }
@@ -38,7 +38,7 @@ void describeField(const PairRecord& record, CollisionData::Contents& contents) 
 
 std::size_t FieldWork::start(const FrameStart& frame) {
   const PlacedField placed = m_record->placedField();
-  m_record->fieldContacts(placed).start(m_record->mesh());
+  m_record->fieldContacts(placed).start(m_record->mesh().body);
   const std::size_t elements = m_record->fieldScratch->elements.size();
   const bool shared = frame.threads.count() > 1 && elements >= kSharedSize;
   m_jobs = elements == 0 ? 0 : shared ? kJobs : 1;

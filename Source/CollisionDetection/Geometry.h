@@ -9,7 +9,7 @@
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Validity/MethodChoice.h"
 
 #include <array>
@@ -38,7 +38,7 @@ class GeometryMotion {
   double arcDeviation() const { return m_arcDeviation; }  ///< L
 
  private:
-  using Ends = DerivedFrom<4>;  ///< body and transform of two ends
+  using Ends = DerivedFrom<std::array<PositionsState, 2>>;
   Ends m_rangeVersion, m_arcVersion, m_correctionVersion;
   MotionRange m_range, m_correction;
   double m_arcDeviation = 0;
@@ -48,9 +48,10 @@ class GeometryMotion {
 
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
-struct Geometry : SearchableGeometry {
-  explicit Geometry(GeometryId newId) : SearchableGeometry(newId) {}
+struct Geometry : CountedObject {
+  explicit Geometry(GeometryId id) : body(id) {}
 
+  Body body;
   CollisionFilter filter;
   GeometryStep step;          ///< writes the positions of both ends
   double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
@@ -59,19 +60,14 @@ struct Geometry : SearchableGeometry {
   SurfaceProxySettings proxySettings;         ///< if there is one
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
+  operator GeometryLabel() const { return body; }
   /// The data for the choice of a method. extent is 0 before the first update of the octree.
   GeometryInStep inStep() const;
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }
   /// Whether data of the shape are attached, so that it must not change.
-  bool isShapeFixed() const { return proxy || (field && !isField()); }
-  /// The revisions on which all results for the geometry depend.
-  std::array<Revision, 8> state() const {
-    return {revisions.topology,      revisions.enabled,           revisions.filter,
-            revisions.field,         mesh.before.bodyRevision(),  mesh.before.transformRevision(),
-            mesh.now.bodyRevision(), mesh.now.transformRevision()};
-  }
+  bool isShapeFixed() const { return proxy || (body.field && !body.isField()); }
 };
 
 }  // namespace palpate

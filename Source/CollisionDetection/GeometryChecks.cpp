@@ -141,10 +141,10 @@ void checkOnePerVertex(const GeometryLabel& label, std::span<const Eigen::Vector
 }
 
 void checkAttachable(const Geometry& geometry, const DistanceField& field) {
-  const MeshTopology& topology = geometry.mesh.topology;
+  const MeshTopology& topology = geometry.body.mesh.topology;
   const auto refuse = [&](const std::string& reason, ErrorCode code,
                           std::optional<std::size_t> element = {}) {
-    throw Error(code, nameOf(geometry) + reason, geometry.id, element);
+    throw Error(code, nameOf(geometry) + reason, geometry.body.id, element);
   };
   if (!topology.hasFaces())
     refuse(" is " + nameOf(topology.type) +
@@ -153,7 +153,7 @@ void checkAttachable(const Geometry& geometry, const DistanceField& field) {
   if (!topology.disabled.empty())
     refuse(" has disabled elements, and a distance field is of all elements",
            ErrorCode::UnsupportedMethod);
-  const std::span<const Eigen::Vector3d> body = geometry.mesh.now.body();
+  const std::span<const Eigen::Vector3d> body = geometry.body.mesh.now.body();
   for (std::size_t v = 0; v < body.size(); ++v) {
     if (!topology.isUsed[v]) continue;
     const double value = field.value(body[v]);
@@ -166,17 +166,17 @@ void checkAttachable(const Geometry& geometry, const DistanceField& field) {
 }
 
 void checkProxy(const Geometry& geometry, const SurfaceProxySettings& settings) {
-  const MeshTopology& topology = geometry.mesh.topology;
+  const MeshTopology& topology = geometry.body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(geometry) + " is " + nameOf(topology.type) +
                     "; attachSurfaceProxy() is for triangle and tetrahedral meshes",
-                geometry.id);
+                geometry.body.id);
   const auto need = [&](const char* which, double value, double most, const std::string& rule) {
     if (!(value > 0.0 && value <= most))
       throw Error(ErrorCode::InvalidSettings,
                   nameOf(geometry) + ": " + which + " is " + textOf(value) + "; it must be " + rule,
-                  geometry.id);
+                  geometry.body.id);
   };
   need("reach", settings.reach, kLargestMeasure, "positive and finite");
   need("errorBound", settings.errorBound, kLargestMeasure, "positive and finite");
@@ -185,34 +185,35 @@ void checkProxy(const Geometry& geometry, const SurfaceProxySettings& settings) 
 
 void checkShapeMayChange(const Geometry& geometry, const char* call) {
   if (!geometry.isShapeFixed()) return;
-  const bool hasField = geometry.field != nullptr;
+  const bool hasField = geometry.body.field != nullptr;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry) + " has " +
                   (hasField ? "a distance field" : "the leaves of a proxy") +
                   " attached, so that " + call + " may not change it; detach " +
                   (hasField ? "the field by attachDistanceField() with null"
                             : "them by attachSurfaceProxy() with none"),
-              geometry.id);
+              geometry.body.id);
 }
 
 void checkPositionCount(const Geometry& geometry, std::size_t count) {
-  if (geometry.shape)
+  if (geometry.body.shape)
     throw Error(ErrorCode::WrongPositionCount,
                 nameOf(geometry) + " is a shape, which has no positions; setTransform() moves it",
-                geometry.id);
-  if (geometry.isField())
+                geometry.body.id);
+  if (geometry.body.isField())
     throw Error(
         ErrorCode::WrongPositionCount,
         nameOf(geometry) + " is a distance field, which has no positions; setTransform() moves it",
-        geometry.id);
-  if (count != geometry.mesh.topology.vertexCount)
-    throw Error(ErrorCode::WrongPositionCount,
-                nameOf(geometry) + ": " + std::to_string(count) + " positions given, but it has " +
-                    std::to_string(geometry.mesh.topology.vertexCount) + " vertices" +
-                    (geometry.solid                      ? "; setTetrahedra() changes their number"
-                     : geometry.mesh.topology.hasFaces() ? "; setTriangles() changes their number"
-                                                         : ""),
-                geometry.id);
+        geometry.body.id);
+  if (count != geometry.body.mesh.topology.vertexCount)
+    throw Error(
+        ErrorCode::WrongPositionCount,
+        nameOf(geometry) + ": " + std::to_string(count) + " positions given, but it has " +
+            std::to_string(geometry.body.mesh.topology.vertexCount) + " vertices" +
+            (geometry.body.solid                      ? "; setTetrahedra() changes their number"
+             : geometry.body.mesh.topology.hasFaces() ? "; setTriangles() changes their number"
+                                                      : ""),
+        geometry.body.id);
 }
 
 }  // namespace palpate

@@ -8,8 +8,8 @@ namespace palpate {
 
 namespace {
 
-std::array<Revision, 4> ends(const Positions& from, const Positions& to) {
-  return {from.bodyRevision(), from.transformRevision(), to.bodyRevision(), to.transformRevision()};
+std::array<PositionsState, 2> ends(const Positions& from, const Positions& to) {
+  return {from.state(), to.state()};
 }
 
 /// L: the longest side of the box of both ends, in the body's frame.
@@ -23,29 +23,28 @@ double extentOfPositions(const TriangleMesh& mesh) {
 /// L: an upper bound of the extent along any axis of the world. A placed body may be turned, so the
 /// longest side of its box is doubled.
 double extentOf(const Geometry& geometry) {
-  if (geometry.tree.octree().size() == 0) return 0.0;
-  const FloatBox box = geometry.tree.octree().blocks()[0].box(0);
-  const double turned = geometry.isPlaced() ? 2.0 : 1.0;
-  if (box.mayBeClamped()) return turned * extentOfPositions(geometry.mesh);
+  if (geometry.body.tree.octree().size() == 0) return 0.0;
+  const FloatBox box = geometry.body.tree.octree().blocks()[0].box(0);
+  const double turned = geometry.body.isPlaced() ? 2.0 : 1.0;
+  if (box.mayBeClamped()) return turned * extentOfPositions(geometry.body.mesh);
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
-  return turned * longest / geometry.tree.frame().scale;
+  return turned * longest / geometry.body.tree.frame().scale;
 }
 
 }  // namespace
 
 GeometryInStep Geometry::inStep() const {
-  return {mesh,
+  return {body.mesh,
           smallestHeight,
           motion.range(),
           motion.correction(),
           motion.arcDeviation(),
-          tree.isValid() ? extentOf(*this) : 0.0,
-          revisions.topology,
-          revisions.enabled,
+          body.tree.isValid() ? extentOf(*this) : 0.0,
+          body.revisions.elements,
           step.detected(),
-          field.get()};
+          body.field.get()};
 }
 
 void GeometryMotion::set(const TriangleMesh& mesh, const MotionRange& motion) {
@@ -55,14 +54,14 @@ void GeometryMotion::set(const TriangleMesh& mesh, const MotionRange& motion) {
 
 void GeometryMotion::update(const Geometry& geometry) {
   m_isUsed = true;
-  const TriangleMesh& mesh = geometry.mesh;
-  const std::array<Revision, 4> step = ends(mesh.before, mesh.now);
+  const TriangleMesh& mesh = geometry.body.mesh;
+  const auto step = ends(mesh.before, mesh.now);
   if (!m_rangeVersion.isCurrent(step)) {
     m_rangeVersion.invalidate();
     if (mesh.before.isSameAs(mesh.now)) {
       m_range = {};
       m_range.isEmpty = mesh.now.size() == 0;
-    } else if (geometry.isPlaced() && mesh.now.hasSameBody(mesh.before)) {
+    } else if (geometry.body.isPlaced() && mesh.now.hasSameBody(mesh.before)) {
       m_range = m_search.motion(geometry);
     } else {
       m_range = motionRange(mesh.before, mesh.now);
@@ -74,7 +73,7 @@ void GeometryMotion::update(const Geometry& geometry) {
     m_arcDeviation = m_search.arcDeviation(geometry);
     m_arcVersion.commit(step);
   }
-  const std::array<Revision, 4> correctionEnds = ends(geometry.step.detected(), mesh.before);
+  const auto correctionEnds = ends(geometry.step.detected(), mesh.before);
   if (!m_correctionVersion.isCurrent(correctionEnds)) {
     m_correctionVersion.invalidate();
     m_correction = geometry.step.detected().isSameAs(mesh.before)

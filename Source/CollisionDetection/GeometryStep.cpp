@@ -85,7 +85,7 @@ void GeometryStep::place(TriangleMesh& mesh, Positions& end,
                          const RigidTransform& transform) noexcept {
   for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
                                  &std::as_const(m_detected), &std::as_const(mesh.before)})
-    if (other->isPlaced() && other->transform() == transform) return end.placeAs(*other);
+    if (other->isPlaced() && other->transform().hasBitsOf(transform)) return end.placeAs(*other);
   end.place(transform, m_revisions.next());
 }
 

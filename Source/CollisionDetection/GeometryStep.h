@@ -7,7 +7,7 @@
 #include "Mesh/Positions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/PlacedShape.h"
 
 #include <cstdint>

@@ -17,7 +17,9 @@ constexpr std::size_t kSmall = 16384;
 /// If fewer triangles than this are updated in all, one thread updates all geometries: cores take
 /// longer to hand over the data than to compute them.
 constexpr std::size_t kSmallRefit = 24576;
-PlacedShape* shapeOf(Geometry& geometry) { return geometry.shape ? &*geometry.shape : nullptr; }
+PlacedShape* shapeOf(Geometry& geometry) {
+  return geometry.body.shape ? &*geometry.body.shape : nullptr;
+}
 
 /// Computed in the body's frame, so that it does not depend on the transform.
 double smallestHeight(const TriangleMesh& mesh) {
@@ -43,13 +45,14 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
                                               MeshTopology topology) const {
   auto geometry = std::make_unique<Geometry>(nextId());
   auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
-  TriangleMesh& mesh = geometry->mesh;
+  TriangleMesh& mesh = geometry->body.mesh;
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
   geometry->step.start(mesh, std::move(body));
   geometry->smallestHeight = smallestHeight(mesh);
-  GeometryRevisions& revisions = geometry->revisions;
-  for (Revision* revision : {&revisions.topology, &revisions.enabled, &revisions.filter})
+  BodyRevisions& revisions = geometry->body.revisions;
+  for (Revision* revision :
+       {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
     *revision = revisions.counter.next();
   return geometry;
 }
@@ -60,7 +63,7 @@ GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
   ++m_state;
-  return m_geometries.back()->id;
+  return m_geometries.back()->body.id;
 }
 
 GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
@@ -72,7 +75,7 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   MeshTopology topology(positions.size(), triangles);
   topology.type = type;
   auto geometry = make(checkedRest(id, positions), std::move(topology));
-  TriangleMesh& mesh = geometry->mesh;
+  TriangleMesh& mesh = geometry->body.mesh;
   if (!radii.empty()) mesh.largestRadius = *std::max_element(radii.begin(), radii.end());
   if (radii.size() > 1) mesh.radii.assign(radii.begin(), radii.end());
   return add(std::move(geometry));
@@ -101,8 +104,8 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   TetrahedralTopology solid = checkedTopology(id, rest, tetrahedra);
   MeshTopology topology(positions.size(), solid.surface);
   auto geometry = make(std::move(rest), std::move(topology));
-  geometry->solid = std::make_unique<Solid>();
-  geometry->solid->topology = std::move(solid);
+  geometry->body.solid = std::make_unique<Solid>();
+  geometry->body.solid->topology = std::move(solid);
   return add(std::move(geometry));
 }
 
@@ -116,8 +119,8 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
   topology.type = GeometryType::Shape;
   auto geometry =
       make({shape.now.corners().begin(), shape.now.corners().end()}, std::move(topology));
-  geometry->mesh.rest.clear();
-  geometry->shape = shape;
+  geometry->body.mesh.rest.clear();
+  geometry->body.shape = shape;
   geometry->step.startShape(shape.now);
   return add(std::move(geometry));
 }
@@ -129,15 +132,15 @@ GeometryId GeometryTable::add(std::shared_ptr<const DistanceField> field) {
   MeshTopology topology;
   topology.type = GeometryType::Field;
   auto geometry = make({}, std::move(topology));
-  geometry->field = std::move(field);
+  geometry->body.field = std::move(field);
   return add(std::move(geometry));
 }
 
 void GeometryTable::attach(GeometryId id, std::shared_ptr<const DistanceField> field) {
   Geometry& geometry = at(id);
   if (field) checkAttachable(geometry, *field);
-  geometry.field = std::move(field);
-  geometry.revisions.field = geometry.revisions.counter.next();
+  geometry.body.field = std::move(field);
+  geometry.body.revisions.field = geometry.body.revisions.counter.next();
   ++m_state;
 }
 
@@ -148,12 +151,12 @@ void GeometryTable::attach(GeometryId id, const std::optional<SurfaceProxySettin
   if (settings) {
     checkProxy(geometry, *settings);
     const auto& [reach, errorBound, cone] = *settings;
-    proxy = std::make_shared<const SurfaceProxy>(geometry.mesh,
+    proxy = std::make_shared<const SurfaceProxy>(geometry.body.mesh,
                                                  ProxySettings{reach, errorBound, cone}, threads);
   }
   geometry.proxy = std::move(proxy);
   geometry.proxySettings = settings.value_or(SurfaceProxySettings());
-  geometry.revisions.field = geometry.revisions.counter.next();
+  geometry.body.revisions.field = geometry.body.revisions.counter.next();
   ++m_state;
 }
 
@@ -161,12 +164,12 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
                                  const RigidTransform& now) {
   Geometry& geometry = at(id);
   // The positions in the body's frame, and the octree, stay as they are.
-  geometry.step.setTransform(geometry, geometry.mesh, shapeOf(geometry), before, now);
+  geometry.step.setTransform(geometry, geometry.body.mesh, shapeOf(geometry), before, now);
   ++m_state;
 }
 
 void GeometryTable::restoreNow(Geometry& geometry, const Positions& now) noexcept {
-  geometry.step.restoreNow(geometry.mesh, shapeOf(geometry), now);
+  geometry.step.restoreNow(geometry.body.mesh, shapeOf(geometry), now);
   ++m_state;
 }
 
@@ -174,15 +177,15 @@ void GeometryTable::advance() noexcept {
   ++m_stepNumber;
   ++m_state;
   for (const auto& geometry : m_geometries) {
-    geometry->step.advance(geometry->mesh, shapeOf(*geometry));
+    geometry->step.advance(geometry->body.mesh, shapeOf(*geometry));
     geometry->motion.advance();
   }
 }
 
 Geometry* GeometryTable::find(GeometryId id) const {
   const auto found = std::lower_bound(m_geometries.begin(), m_geometries.end(), id,
-                                      [](const auto& g, GeometryId i) { return g->id < i; });
-  return found == m_geometries.end() || (*found)->id != id ? nullptr : found->get();
+                                      [](const auto& g, GeometryId i) { return g->body.id < i; });
+  return found == m_geometries.end() || (*found)->body.id != id ? nullptr : found->get();
 }
 
 Geometry& GeometryTable::at(GeometryId id) const {
@@ -206,17 +209,17 @@ void GeometryTable::setPositions(GeometryId id,
   if (before) checkPositionCount(geometry, before->size());
   checkPositionCount(geometry, now.size());
   std::optional<MotionRange> moved;
-  geometry.step.setPositions(geometry, geometry.mesh, before, now, threads,
+  geometry.step.setPositions(geometry, geometry.body.mesh, before, now, threads,
                              geometry.motion.shouldMeasure() ? &moved : nullptr);
   ++m_state;
-  if (moved) geometry.motion.set(geometry.mesh, *moved);
+  if (moved) geometry.motion.set(geometry.body.mesh, *moved);
 }
 
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles, const Preparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTriangles()");
-  checkMeshType(geometry, false, "setTriangles() is for triangle meshes");
+  checkMeshType(geometry.body, false, "setTriangles() is for triangle meshes");
   checkCounts(geometry, positions, triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(geometry, positions), {positions.size(), triangles}, {},
               prepare);
@@ -228,7 +231,7 @@ void GeometryTable::setTetrahedra(GeometryId id, std::span<const Eigen::Vector3d
                                   const Preparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTetrahedra()");
-  checkMeshType(geometry, true, "setTetrahedra() is for tetrahedral meshes");
+  checkMeshType(geometry.body, true, "setTetrahedra() is for tetrahedral meshes");
   CountedVector<Eigen::Vector3d> rest = checkedRest(geometry, positions);
   auto solid = std::make_unique<Solid>();
   solid->topology = checkedTopology(geometry, rest, tetrahedra);
@@ -243,16 +246,16 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
   prepare(topology, rest);
   // Nothing below throws.
-  geometry.mesh.rest = std::move(rest);
-  geometry.mesh.topology = std::move(topology);
-  geometry.solid = std::move(solid);
-  geometry.step.start(geometry.mesh, std::move(body));
-  geometry.smallestHeight = smallestHeight(geometry.mesh);
-  geometry.revisions.topology = geometry.revisions.counter.next();
-  geometry.revisions.enabled = geometry.revisions.counter.next();
+  geometry.body.mesh.rest = std::move(rest);
+  geometry.body.mesh.topology = std::move(topology);
+  geometry.body.solid = std::move(solid);
+  geometry.step.start(geometry.body.mesh, std::move(body));
+  geometry.smallestHeight = smallestHeight(geometry.body.mesh);
+  geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
+  geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
 }
 
-void GeometryTable::setName(GeometryId id, std::string name) { at(id).name = std::move(name); }
+void GeometryTable::setName(GeometryId id, std::string name) { at(id).body.name = std::move(name); }
 
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);
@@ -262,20 +265,20 @@ void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
                     std::to_string(static_cast<int>(filter.sidedness)) +
                     "; it must be Both or Outer",
                 id);
-  if (filter.sidedness == Sidedness::Outer && !geometry.mesh.topology.hasFaces())
-    throw Error(
-        ErrorCode::InvalidSettings,
-        nameOf(geometry) + " is " + nameOf(geometry.mesh.topology.type) + ", which has no sides",
-        id);
+  if (filter.sidedness == Sidedness::Outer && !geometry.body.mesh.topology.hasFaces())
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(geometry) + " is " + nameOf(geometry.body.mesh.topology.type) +
+                    ", which has no sides",
+                id);
   geometry.filter = filter;
-  geometry.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
-  geometry.revisions.filter = geometry.revisions.counter.next();
+  geometry.body.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
+  geometry.body.revisions.filter = geometry.body.revisions.counter.next();
 }
 
 void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> elements) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setDisabledElements()");
-  MeshTopology& topology = geometry.mesh.topology;
+  MeshTopology& topology = geometry.body.mesh.topology;
   for (const std::uint32_t element : elements)
     if (element >= topology.triangles.size())
       throw Error(ErrorCode::IndexOutOfRange,
@@ -284,28 +287,29 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
                       std::to_string(topology.triangles.size()) + " elements",
                   id, element);
   topology.disable(elements);
-  geometry.revisions.enabled = geometry.revisions.counter.next();
+  geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
   double spread = 0;
   for (const auto& geometry : m_geometries)
-    spread =
-        std::max(spread, geometry->tree.sampleFrame(geometry->mesh, geometry->revisions.topology));
+    spread = std::max(spread, geometry->body.tree.sampleFrame(
+                                  geometry->body.mesh, geometry->body.revisions.elements.topology));
   const double scale = frameScale(spread);
   m_changed.clear();
   for (const auto& geometry : m_geometries)
     if (!geometry->skipsOctree &&
-        (!geometry->tree.isCurrent(geometry->mesh, geometry->revisions.topology, scale) ||
-         geometry->tree.needsDops(geometry->mesh, settings.bounds)))
+        (!geometry->body.tree.isCurrent(geometry->body.mesh,
+                                        geometry->body.revisions.elements.topology, scale) ||
+         geometry->body.tree.needsDops(geometry->body.mesh, settings.bounds)))
       m_changed.push_back(geometry.get());
   // Geometries are updated in parallel, the largest first, and large ones use several threads each.
   // The serial parts of one update thus run beside the work on other geometries.
   const auto size = [](const Geometry* geometry) {
-    return geometry->mesh.topology.triangles.size();
+    return geometry->body.mesh.topology.triangles.size();
   };
   std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
-    return size(l) != size(r) ? size(l) > size(r) : l->id < r->id;
+    return size(l) != size(r) ? size(l) > size(r) : l->body.id < r->body.id;
   });
   if (m_changed.empty()) return;
   std::size_t total = 0;
@@ -315,9 +319,11 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     Geometry& geometry = *m_changed[i];
     const Threads& shared = size(&geometry) < kSmall ? one : threads;
-    if (!geometry.tree.isCurrent(geometry.mesh, geometry.revisions.topology, scale))
-      geometry.tree.update(geometry.mesh, geometry.revisions.topology, scale, settings, shared);
-    geometry.tree.updateDops(geometry.mesh, settings.bounds, shared);
+    if (!geometry.body.tree.isCurrent(geometry.body.mesh, geometry.body.revisions.elements.topology,
+                                      scale))
+      geometry.body.tree.update(geometry.body.mesh, geometry.body.revisions.elements.topology,
+                                scale, settings, shared);
+    geometry.body.tree.updateDops(geometry.body.mesh, settings.bounds, shared);
   });
 }
 

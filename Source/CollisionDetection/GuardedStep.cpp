@@ -52,7 +52,7 @@ RigidTransform between(const RigidTransform& before, const RigidTransform& now, 
 std::pair<GeometryId, GeometryId> inOrder(GeometryId a, GeometryId b) { return std::minmax(a, b); }
 
 std::string elementOf(const Geometry& geometry, std::uint32_t index) {
-  const GeometryType type = geometry.mesh.topology.type;
+  const GeometryType type = geometry.body.mesh.topology.type;
   const char* name = type == GeometryType::Lines    ? ", segment "
                      : type == GeometryType::Points ? ", point "
                                                     : ", triangle ";
@@ -76,7 +76,7 @@ Placed(const Contact&, const Geometry&, const Geometry&) -> Placed<Contact>;
 ImpactQuery queryOf(const Placed<VertexTriangleContact>& placed) {
   const auto& [contact, vertices, triangles] = placed;
   const auto step = [](const Geometry& geometry, std::uint32_t v) {
-    return ImpactQuery::Step{geometry.mesh.before[v], geometry.mesh.now[v]};
+    return ImpactQuery::Step{geometry.body.mesh.before[v], geometry.body.mesh.now[v]};
   };
   const auto& [a, b, c] = contact.corners;
   return {ImpactQuery::Kind::VertexTriangle,
@@ -86,7 +86,7 @@ ImpactQuery queryOf(const Placed<VertexTriangleContact>& placed) {
 ImpactQuery queryOf(const Placed<EdgeEdgeContact>& placed) {
   const auto& [contact, first, second] = placed;
   const auto step = [](const Geometry& geometry, std::uint32_t v) {
-    return ImpactQuery::Step{geometry.mesh.before[v], geometry.mesh.now[v]};
+    return ImpactQuery::Step{geometry.body.mesh.before[v], geometry.body.mesh.now[v]};
   };
   return {ImpactQuery::Kind::EdgeEdge,
           {{step(first, contact.edgeA[0]), step(first, contact.edgeA[1]),
@@ -109,8 +109,8 @@ std::array<std::string, 2> namesOf(const Placed<ShapeShapeContact>& placed) {
 
 /// How a point of a placed geometry moves in the step as it is now.
 Vector3d displacementOf(const Geometry& geometry, const Vector3d& point) {
-  const RigidTransform &before = geometry.mesh.before.transform(),
-                       &now = geometry.mesh.now.transform();
+  const RigidTransform &before = geometry.body.mesh.before.transform(),
+                       &now = geometry.body.mesh.now.transform();
   const Vector3d inBody = before.rotation.transpose() * (point - before.translation);
   return now(inBody) - before(inBody);
 }
@@ -156,10 +156,10 @@ void DisjointSets::join(std::uint32_t a, std::uint32_t b) {
 }
 
 const GuardedStep::Body* GuardedStep::find(GeometryId id) const {
-  const auto at =
-      std::lower_bound(m_bodies.begin(), m_bodies.end(), id,
-                       [](const Body& body, GeometryId key) { return body.geometry->id < key; });
-  return at == m_bodies.end() || at->geometry->id != id ? nullptr : &*at;
+  const auto at = std::lower_bound(
+      m_bodies.begin(), m_bodies.end(), id,
+      [](const Body& body, GeometryId key) { return body.geometry->body.id < key; });
+  return at == m_bodies.end() || at->geometry->body.id != id ? nullptr : &*at;
 }
 
 std::uint32_t GuardedStep::nodeOf(GeometryId id, std::uint32_t vertex) const {
@@ -182,7 +182,7 @@ void GuardedStep::forEachNode(const GuardedVertex& v, F&& f) const {
 }
 
 bool GuardedStep::moves(const Body& body, std::size_t node) const {
-  const Positions& before = body.geometry->mesh.before;
+  const Positions& before = body.geometry->body.mesh.before;
   if (!body.isWhole) return before.body()[node] != body.given.body()[node];
   return !(before.transform() == body.given.transform()) || !before.hasSameBody(body.given);
 }
@@ -193,19 +193,20 @@ void GuardedStep::begin(GeometryTable& geometries, const GuardedPairs& pairs,
   m_geometries.clear();
   for (const auto& pair : pairs)
     for (Geometry* geometry : {pair->a, pair->b})
-      if (!geometry->mesh.before.isSameAs(geometry->mesh.now)) m_geometries.push_back(geometry);
+      if (!geometry->body.mesh.before.isSameAs(geometry->body.mesh.now))
+        m_geometries.push_back(geometry);
   const auto add = [&](const GuardedVertex& v) {
     if (Geometry* geometry = geometries.find(v.geometry)) m_geometries.push_back(geometry);
   };
   for (const auto& group : settings.groups) std::for_each(group.begin(), group.end(), add);
   std::for_each(settings.fixed.begin(), settings.fixed.end(), add);
   std::sort(m_geometries.begin(), m_geometries.end(),
-            [](const Geometry* l, const Geometry* r) { return l->id < r->id; });
+            [](const Geometry* l, const Geometry* r) { return l->body.id < r->body.id; });
   m_geometries.erase(std::unique(m_geometries.begin(), m_geometries.end()), m_geometries.end());
   std::size_t nodes = 0;
   for (Geometry* geometry : m_geometries) {
-    const TriangleMesh& mesh = geometry->mesh;
-    const bool isWhole = geometry->shape || !(mesh.before.transform() == mesh.now.transform());
+    const TriangleMesh& mesh = geometry->body.mesh;
+    const bool isWhole = geometry->body.shape || !(mesh.before.transform() == mesh.now.transform());
     m_bodies.push_back({geometry, mesh.now, static_cast<std::uint32_t>(nodes), isWhole});
     nodes += m_bodies.back().nodeCount();
   }
@@ -246,13 +247,13 @@ void GuardedStep::forEachContact(const PairRecord& record, F&& f) {
   pass(record.data.vertexTriangle(), a, b);
   pass(record.data.triangleVertex(), b, a);
   pass(record.data.edgeEdge(), a, b);
-  pass(record.data.shape(), a.shape ? b : a, a.shape ? a : b);
+  pass(record.data.shape(), a.body.shape ? b : a, a.body.shape ? a : b);
   pass(record.data.shapeShape(), a, b);
 }
 
 void GuardedStep::addMover(Touch& touch, const Geometry& geometry, std::uint32_t vertex,
                            double approach) const {
-  const std::uint32_t node = nodeOf(geometry.id, vertex),
+  const std::uint32_t node = nodeOf(geometry.body.id, vertex),
                       part = node == kNoNode ? kNoNode : m_parts.find(node);
   for (Mover& mover : touch.movers)
     if (mover.part == part || mover.part == kNoNode) {
@@ -270,7 +271,7 @@ void GuardedStep::addTouch(const Contact& placed, std::size_t pair, std::size_t 
   Touch touch{{}, contact.timeOfImpact, contact.timeOfImpact == 0.0, pair, number};
   touch.movers.fill({kNoNode, 0.0});
   const auto vertex = [&](const Geometry& geometry, std::uint32_t v, double weight) {
-    const TriangleMesh& mesh = geometry.mesh;
+    const TriangleMesh& mesh = geometry.body.mesh;
     addMover(touch, geometry, v, weight * contact.normal.dot(mesh.now[v] - mesh.before[v]));
   };
   if constexpr (std::is_same_v<Kind, ShapeContact>) {
@@ -290,7 +291,7 @@ void GuardedStep::addTouch(const Contact& placed, std::size_t pair, std::size_t 
       if (touch.atStart && certainlyPart(query)) return;
       // Only features without radii touch as their centre lines do.
       if (const ImpactResult again = findTouch(query, kGuardTolerance);
-          again.impact && first.mesh.largestRadius + second.mesh.largestRadius == 0.0)
+          again.impact && first.body.mesh.largestRadius + second.body.mesh.largestRadius == 0.0)
         touch.time = again.time;
     }
     const Stencil of = stencil(contact);
@@ -408,20 +409,20 @@ void GuardedStep::throwRemains(const GuardedPairs& pairs, const Touch& touch) co
                     (moves && !touch.atStart
                          ? " touch within the step, and all their vertices that move are fixed"
                          : " touched before the step"),
-                placed.first.id, elementNumberOf(placed.contact));
+                placed.first.body.id, elementNumberOf(placed.contact));
   });
   throw Error(ErrorCode::ImpactRemains, "features touch");  // not reached: the contact exists
 }
 
 void GuardedStep::apply(GeometryTable& geometries, const Threads& threads) {
   for (const Body& body : m_bodies) {
-    TriangleMesh& mesh = body.geometry->mesh;
+    TriangleMesh& mesh = body.geometry->body.mesh;
     const auto fraction = [&](std::size_t node) {
       return m_fraction[m_parts.find(body.firstNode + static_cast<std::uint32_t>(node))];
     };
     if (body.isWhole && fraction(0) < 1.0)
       geometries.setTransform(
-          body.geometry->id, {},
+          body.geometry->body.id, {},
           between(mesh.before.transform(), body.given.transform(), fraction(0)));
     const std::span<const Vector3d> before = mesh.before.body(), given = body.given.body();
     if (mesh.before.hasSameBody(body.given)) continue;
@@ -433,7 +434,7 @@ void GuardedStep::apply(GeometryTable& geometries, const Threads& threads) {
       isShortened = true;
       m_positions[v] = between(before[v], given[v], share);
     }
-    if (isShortened) geometries.setPositions(body.geometry->id, {}, m_positions, threads);
+    if (isShortened) geometries.setPositions(body.geometry->body.id, {}, m_positions, threads);
   }
 }
 
@@ -450,7 +451,7 @@ void GuardedStep::listHeld(std::vector<HeldVertex>& out) const {
     for (std::uint32_t i = 0; i < body.nodeCount(); ++i) {
       const double fraction = m_fraction[m_parts.find(body.firstNode + i)];
       if (fraction < 1.0 && moves(body, i))
-        out.push_back({body.geometry->id, body.isWhole ? kNoElement : i, fraction});
+        out.push_back({body.geometry->body.id, body.isWhole ? kNoElement : i, fraction});
     }
 }
 

@@ -1,6 +1,8 @@
 #include <palpate/ClosedMesh.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Math/TriangleIntersection.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -72,11 +74,20 @@ MeshDefects findMeshDefects(const TriangleMeshView& mesh) {
   if (defects.unwelded) return defects;
   defects.insideOut = defects.closed() && hasNegativeVolume(mesh);
   const std::vector<std::uint32_t> parts = partsOf(mesh);
+  const auto partOf = [&](std::uint32_t t) { return parts[mesh.triangles[t][0]]; };
+  const auto cornersOf = [&](std::uint32_t t) {
+    const auto& [p, q, r] = mesh.triangles[t];
+    return Corners{mesh.positions[p], mesh.positions[q], mesh.positions[r]};
+  };
+  SignCounts counts;
   collisions.addCollisionPair(id, id, {Method::Intersection, 0.0});
-  collisions.detectCollision();
-  for (const ElementPair& pair : collisions.collisionData(id, id).intersectingTriangles())
-    if (parts[mesh.triangles[pair.a][0]] != parts[mesh.triangles[pair.b][0]])
-      defects.overlapping.push_back(pair);
+  collisions.forEachCandidate(id, id, [&](std::span<const ElementPair> candidates) {
+    for (const ElementPair& pair : candidates)
+      if (partOf(pair.a) != partOf(pair.b) &&
+          intersectTriangles(cornersOf(pair.a), cornersOf(pair.b), counts).intersect())
+        defects.overlapping.push_back(pair);
+  });
+  std::sort(defects.overlapping.begin(), defects.overlapping.end());
   return defects;
 }
 

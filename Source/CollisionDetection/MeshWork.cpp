@@ -25,7 +25,7 @@ constexpr std::size_t kSharedSize = 8192;
 /// method reports nothing but touching features: Continuous, without a thickness.
 bool reportsOnlyTouching(const PairRecord& record) {
   return record.a == record.b && record.plan.method == Method::Continuous &&
-         record.a->mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
+         record.a->body.mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
 }
 
 /// L: by how much more than the thickness Continuous may report features (TimeOfImpactSettings).
@@ -39,11 +39,15 @@ double approachSlack(const PairRecord& record, double thickness) {
 }
 
 FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
-  FloatPair floats{record.a->tree.floats(), record.b->tree.floats(), nullptr, nullptr,
-                   trees.shiftLower,        trees.shiftUpper};
+  FloatPair floats{record.a->body.tree.floats(),
+                   record.b->body.tree.floats(),
+                   nullptr,
+                   nullptr,
+                   trees.shiftLower,
+                   trees.shiftUpper};
   if (record.plan.swept()) {
-    floats.beforeA = record.a->tree.floatsAtStart();
-    floats.beforeB = record.b->tree.floatsAtStart();
+    floats.beforeA = record.a->body.tree.floatsAtStart();
+    floats.beforeB = record.b->body.tree.floatsAtStart();
   }
   return floats;
 }
@@ -67,17 +71,17 @@ std::size_t MeshWork::startCandidates(const FrameStart& frame) {
 std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs,
                                      BoxFrame boxFrame) {
   PairRecord& record = *m_record;
-  GeometryOctree &ofA = record.a->tree, &ofB = record.b->tree;
+  GeometryOctree &ofA = record.a->body.tree, &ofB = record.b->body.tree;
   const std::size_t elements = ofA.octree().size() + ofB.octree().size();
   if (ofA.octree().size() == 0 || ofB.octree().size() == 0) return 0;
   const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
-                                       ? ofA.findUnfoldedStars(record.a->mesh, frame.threads)
+                                       ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads)
                                        : nullptr;
   m_thickness =
       record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
   const auto treesIn = [&](BoxFrame in, double distance) {
     if (in == BoxFrame::Body) distance += approachSlack(record, m_thickness);
-    TreePair trees = treesOf(*record.a, *record.b, distance, record.plan.swept(), in);
+    TreePair trees = treesOf(record.a->body, record.b->body, distance, record.plan.swept(), in);
     if (trees.self() && !adjacentPairs) trees.adjacency = ofA.ordered().data();
     if (unfolded) trees.adjacency = unfolded;
     return trees;
@@ -85,7 +89,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   m_floats = floatsOf(record, treesIn(BoxFrame::World, m_thickness));
   // A search at the searchDistance is for boxes in the world.
   const bool searches = adjacentPairs && record.plan.searchDistance > 0.0,
-             inWorld = searches || !record.a->isPlaced() || !record.b->isPlaced();
+             inWorld = searches || !record.a->body.isPlaced() || !record.b->body.isPlaced();
   m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
                     searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
   const bool shared = frame.threads.count() > 1 && elements >= kSharedSize;
@@ -131,7 +135,7 @@ std::span<const ElementPair> MeshWork::candidatesAmong(std::span<const ElementPa
     keepInWorld(searches ? std::max(plan.step.motionWithRounding, m_thickness) : m_thickness,
                 scratch);
   scratch.nearby |= !kept.empty();
-  const MeshTopology &a = m_record->a->mesh.topology, &b = m_record->b->mesh.topology;
+  const MeshTopology &a = m_record->a->body.mesh.topology, &b = m_record->b->body.mesh.topology;
   if (m_record->anyDisabled())
     std::erase_if(kept,
                   [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });

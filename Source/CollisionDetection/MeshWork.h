@@ -6,7 +6,7 @@
 #include "Core/MemoryBudget.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "Octree/Traversal.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <cstddef>
 #include <span>

@@ -31,9 +31,10 @@ namespace palpate {
 namespace {
 
 Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
-  if (geometry.shape) return geometry.shape->now.bounds();
-  if (geometry.isField()) return PlacedField(*geometry.field, geometry.mesh.now).domain();
-  const TriangleMesh& mesh = geometry.mesh;
+  if (geometry.body.shape) return geometry.body.shape->now.bounds();
+  if (geometry.body.isField())
+    return PlacedField(*geometry.body.field, geometry.body.mesh.now).domain();
+  const TriangleMesh& mesh = geometry.body.mesh;
   Eigen::AlignedBox3d box;
   for (std::uint32_t v = 0; v < mesh.now.size(); ++v) {
     const Eigen::Vector3d centre = mesh.now[v], margin = Eigen::Vector3d::Constant(mesh.radius(v));
@@ -91,7 +92,7 @@ struct OctreeBasedCD::Implementation {
     next.geometries = next.triangles = next.segments = next.points = next.untestedVertices = 0;
     for (const auto& geometry : geometries.all()) {
       ++next.geometries;
-      const MeshTopology& topology = geometry->mesh.topology;
+      const MeshTopology& topology = geometry->body.mesh.topology;
       (topology.hasFaces()                    ? next.triangles
        : topology.type == GeometryType::Lines ? next.segments
                                               : next.points) += topology.triangles.size();
@@ -138,15 +139,15 @@ struct OctreeBasedCD::Implementation {
     if (!hasUpdates) updates = {};
     const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
     for (const auto& geometry : geometries.all()) {
-      if (isFirst) geometry->tree.lastUpdate = Update::Unchanged;
-      geometry->tree.setSwept(false);
-      geometry->tree.boxMilliseconds = geometry->tree.octreeMilliseconds = 0;
+      if (isFirst) geometry->body.tree.lastUpdate = Update::Unchanged;
+      geometry->body.tree.setSwept(false);
+      geometry->body.tree.boxMilliseconds = geometry->body.tree.octreeMilliseconds = 0;
     }
     Stopwatch watch;
     for (const auto& record : records) {
       planStep(*record, detecting, !settings.keepCandidates);
       if (record->plan.swept())
-        for (Geometry* geometry : {record->a, record->b}) geometry->tree.setSwept(true);
+        for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
     }
     updates.milliseconds.boxes += watch.lap();
     geometries.updateOctrees(settings.octree, threads);
@@ -154,7 +155,7 @@ struct OctreeBasedCD::Implementation {
     double boxes = 0, octrees = 0;
     updates.rebuiltOctrees = updates.refittedOctrees = updates.unchangedOctrees = 0;
     for (const auto& geometry : geometries.all()) {
-      const GeometryOctree& tree = geometry->tree;
+      const GeometryOctree& tree = geometry->body.tree;
       ++(tree.lastUpdate == Update::Rebuilt    ? updates.rebuiltOctrees
          : tree.lastUpdate == Update::Refitted ? updates.refittedOctrees
                                                : updates.unchangedOctrees);
@@ -201,10 +202,11 @@ struct OctreeBasedCD::Implementation {
     state->trees.clear();
     std::uint32_t firstNode = 0;
     for (const auto& geometry : geometries.all()) {
-      const GeometryOctree& tree = geometry->tree;
+      const GeometryOctree& tree = geometry->body.tree;
       if (geometry->skipsOctree || !tree.isValid() || tree.octree().size() == 0) continue;
-      state->trees.push_back({geometry->id, &tree.octree(), tree.frame().origin, tree.frame().scale,
-                              tree.lastUpdate, tree.bytesBesidesOctree(), firstNode});
+      state->trees.push_back({geometry->body.id, &tree.octree(), tree.frame().origin,
+                              tree.frame().scale, tree.lastUpdate, tree.bytesBesidesOctree(),
+                              firstNode});
       firstNode += static_cast<std::uint32_t>(tree.octree().pool().used() * 8);
     }
   }
@@ -307,7 +309,8 @@ struct OctreeBasedCD::Implementation {
       next.contacts += record->statistics.contacts;
       next.intersectingTriangles += data.intersectingTriangles().size();
     }
-    for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->mesh);
+    for (const auto& geometry : geometries.all())
+      geometry->step.recordDetection(geometry->body.mesh);
     publish(next);
     hasUpdates = false;
     auditFrame(settings, geometries, pairs, audit);
@@ -373,12 +376,10 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     const std::uint64_t now = m_all->geometries.state();
     return m_all->octreesState == now ? now : 0;
   }
-  SearchableGeometry& at(GeometryId id) const override {
-    return searchable(m_all->geometries.at(id));
-  }
+  const Body& at(GeometryId id) const override { return searchable(m_all->geometries.at(id).body); }
   std::size_t geometryCount() const override { return m_all->geometries.all().size(); }
-  SearchableGeometry& geometry(std::size_t index) const override {
-    return *m_all->geometries.all()[index];
+  const Body& geometry(std::size_t index) const override {
+    return m_all->geometries.all()[index]->body;
   }
   std::uint64_t step() const override { return m_all->geometries.stepNumber(); }
   Engine engine() const override { return m_all->settings.engine; }
@@ -433,7 +434,7 @@ void OctreeBasedCD::Implementation::releaseMemory() {
   frame = Frame();
   sortingScratch = {};
   for (const auto& geometry : geometries.all()) {
-    geometry->tree.releaseMemory();
+    geometry->body.tree.releaseMemory();
     geometry->step.releaseMemory();
   }
   for (const auto& record : pairs.records()) record->releaseMemory();
@@ -588,12 +589,12 @@ void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Ve
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
   const Geometry& solid = read().geometries.at(geometry);
-  checkMeshType(solid, true, "surface() is for tetrahedral meshes");
-  return {solid.solid->topology.surface, solid.solid->topology.surfaceOwner};
+  checkMeshType(solid.body, true, "surface() is for tetrahedral meshes");
+  return {solid.body.solid->topology.surface, solid.body.solid->topology.surfaceOwner};
 }
 
 Pose OctreeBasedCD::transform(GeometryId geometry) const {
-  const RigidTransform& now = read().geometries.at(geometry).mesh.now.transform();
+  const RigidTransform& now = read().geometries.at(geometry).body.mesh.now.transform();
   return {now.rotation, now.translation};
 }
 
@@ -609,7 +610,7 @@ void OctreeBasedCD::setName(GeometryId geometry, std::string name) {
 }
 
 const std::string& OctreeBasedCD::name(GeometryId geometry) const {
-  return read().geometries.at(geometry).name;
+  return read().geometries.at(geometry).body.name;
 }
 
 void OctreeBasedCD::setCollisionFilter(GeometryId geometry, const CollisionFilter& filter) {
@@ -665,8 +666,8 @@ std::size_t OctreeBasedCD::vertexCount(GeometryId geometry) const {
 
 std::span<const Eigen::Vector3d> OctreeBasedCD::positions(GeometryId geometry) const {
   const Geometry& found = read().geometries.at(geometry);
-  if (found.shape) return {};
-  return found.mesh.now.body();
+  if (found.body.shape) return {};
+  return found.body.mesh.now.body();
 }
 
 Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
@@ -759,7 +760,8 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
   const std::lock_guard lock(all.sorting);
   const MemoryScope memory(all.budget, MemoryStage::Pairs);
   if (!record.candidatesSorted)
-    orderPairs(record.candidates, record.a->mesh.topology.triangles.size(), all.sortingScratch);
+    orderPairs(record.candidates, record.a->body.mesh.topology.triangles.size(),
+               all.sortingScratch);
   record.candidatesSorted = true;
   return record.candidates;
 }
@@ -792,7 +794,7 @@ CollisionProblem OctreeBasedCD::problem() const {
 
 CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                               const PairSettings& settings) {
-  const Support* const support =
+  const SupportedPairs* const support =
       supportOf(settings.method, GeometryType::Triangles, GeometryType::Triangles, false);
   if (support && support->has(kNeedsStep))
     throw Error(ErrorCode::UnsupportedMethod,

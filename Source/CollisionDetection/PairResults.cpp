@@ -34,7 +34,7 @@ void PairResults::start(Jobs jobs) {
 }
 
 void PairResults::sortFacts(const PairRecord& record) {
-  const TriangleMesh &a = record.a->mesh, &b = record.b->mesh;
+  const TriangleMesh &a = record.a->body.mesh, &b = record.b->body.mesh;
   sortUnique(m_facts.verticesA, a.now.size(), m_flags);
   sortUnique(m_facts.verticesB, b.now.size(), m_flags);
   sortUnique(m_facts.degenerateA, a.topology.triangles.size(), m_flags);

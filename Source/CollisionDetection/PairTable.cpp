@@ -24,29 +24,28 @@ FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
 
 bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
                              const Threads& threads) {
-  const DerivedFrom<3>::Sources sources{b->revisions.topology, b->revisions.enabled,
-                                        b->mesh.now.bodyRevision()};
-  const ProxySettings wanted{pair.settings.thickness + a->mesh.largestRadius,
+  const ProxyState state{b->body.revisions.elements, b->body.mesh.now.bodyRevision()};
+  const ProxySettings wanted{pair.settings.thickness + a->body.mesh.largestRadius,
                              pair.settings.allowedError, pair.settings.widestNormalCone};
   const auto isCurrent = [&](const PairRecord& record) {
     return record.proxy && record.b == b && record.proxySettings == wanted &&
-           record.proxyVersion.isCurrent(sources);
+           record.proxyVersion.isCurrent(state);
   };
   if (isCurrent(*this)) return false;
-  if (proxyVersion.isValid() && proxyVersion.sources()[0] == sources[0] &&
-      proxyVersion.sources()[2] != sources[2])
+  if (proxyVersion.isValid() && proxyVersion.state().elements.topology == state.elements.topology &&
+      proxyVersion.state().positions != state.positions)
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(*a, *b) + ": Method::Proxy is for a rigid body, and the positions of " +
                     nameOf(*b) +
                     " were changed; move it by setTransform(), or set its elements again",
-                b->id);
+                b->body.id);
   const auto shared = std::find_if(others.begin(), others.end(),
                                    [&](const auto& record) { return isCurrent(*record); });
   const bool builds = shared == others.end();
-  proxy =
-      builds ? std::make_shared<const SurfaceProxy>(b->mesh, wanted, threads) : (*shared)->proxy;
+  proxy = builds ? std::make_shared<const SurfaceProxy>(b->body.mesh, wanted, threads)
+                 : (*shared)->proxy;
   proxySettings = wanted;
-  proxyVersion.commit(sources);
+  proxyVersion.commit(state);
   return builds;
 }
 
@@ -96,7 +95,7 @@ void checkPredicate(const PairRecord& record, PairKind kind) {
                                                "predicates"
                                              : ": contact predicates are for pairs of meshes, and "
                                                "one of the two is a shape"),
-              record.a->id);
+              record.a->body.id);
 }
 
 }  // namespace
@@ -130,8 +129,8 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   planWithoutMotion(*record);
   record->settingsRevision = m_revisions.next();
   if (settings.restDistance > 0.0)
-    record->nearAtRest =
-        verticesWithin(first.mesh.topology, first.mesh.rest, settings.restDistance, threads);
+    record->nearAtRest = verticesWithin(first.body.mesh.topology, first.body.mesh.rest,
+                                        settings.restDistance, threads);
   record->index = m_records.size();
   const auto reserve = [](auto& vector) {
     if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
@@ -167,7 +166,7 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   const PairKind kind = checkPair(*record.a, *record.b, settings).kind;
   if (record.predicate) checkPredicate(record, kind);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0)
-    record.nearAtRest = verticesWithin(record.a->mesh.topology, record.a->mesh.rest,
+    record.nearAtRest = verticesWithin(record.a->body.mesh.topology, record.a->body.mesh.rest,
                                        settings.restDistance, threads);
   // Nothing below throws.
   if (settings.method != Method::Proxy) {
@@ -181,20 +180,20 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
 }
 
 void PairTable::checkRigid(const Geometry& geometry) const {
-  if (m_byIds.contains(keyOf(geometry.id, geometry.id)))
+  if (m_byIds.contains(keyOf(geometry.body.id, geometry.body.id)))
     throw Error(ErrorCode::UnsupportedMethod, nameOf(geometry, geometry) + ": " + kRigidWithItself,
-                geometry.id);
+                geometry.body.id);
 }
 
 void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field) const {
   for (const auto& record : m_records) {
     const auto& [a, b, settings] = record->pair;
     if (settings.method != Method::DistanceField || (a != geometry && b != geometry)) continue;
-    if (record->a->isField() || record->b->isField()) continue;
-    const DistanceField* const ofA = a == geometry ? field : record->a->field.get();
-    const DistanceField* const ofB = b == geometry ? field : record->b->field.get();
+    if (record->a->body.isField() || record->b->body.isField()) continue;
+    const DistanceField* const ofA = a == geometry ? field : record->a->body.field.get();
+    const DistanceField* const ofB = b == geometry ? field : record->b->body.field.get();
     checkField(*record->a, *record->b, ofB ? ofB : ofA, settings,
-               (ofB ? record->a : record->b)->mesh.largestRadius, geometry);
+               (ofB ? record->a : record->b)->body.mesh.largestRadius, geometry);
   }
 }
 

@@ -31,42 +31,44 @@ struct PairRecord : CountedObject {
   PairPlan plan;  ///< of this frame
   Trust trust;
 
-  /// The states of both geometries, and of the pair's settings and predicate.
-  using Derived = DerivedFrom<17>;
-  Derived::Sources state() const {
-    Derived::Sources sources;
-    const auto ofA = a->state(), ofB = b->state();
-    std::copy(ofB.begin(), ofB.end(), std::copy(ofA.begin(), ofA.end(), sources.begin()));
-    sources.back() = settingsRevision;
-    return sources;
-  }
+  struct State {
+    BodyState a, b;
+    Revision settings;  ///< with the predicate
+    friend bool operator==(const State&, const State&) = default;
+  };
+  using Derived = DerivedFrom<State>;
+  State state() const { return {a->body.state(), b->body.state(), settingsRevision}; }
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
     if (settings.earliestTimeOnly) settings.contacts = Contacts::All;
     const PairRecord& filters = guarded ? *guarded : *this;
-    return {a->mesh,
-            b->mesh,
+    return {a->body.mesh,
+            b->body.mesh,
             settings,
             floats,
             plan.step,
             settings.restDistance > 0.0 ? &filters.nearAtRest : nullptr,
             filters.predicate ? &filters.predicate : nullptr,
-            a->shape ? &*a->shape : nullptr,
-            b->shape ? &*b->shape : nullptr,
-            usesField() ? body().field.get() : nullptr,
-            usesField() ? &body().mesh : nullptr,
+            a->body.shape ? &*a->body.shape : nullptr,
+            b->body.shape ? &*b->body.shape : nullptr,
+            usesField() ? body().body.field.get() : nullptr,
+            usesField() ? &body().body.mesh : nullptr,
             guarded != nullptr};
   }
   /// Whether a distance field answers in this frame.
   bool usesField() const { return plan.kind == PairKind::Field; }
-  const Geometry& body() const { return bodyWithField(*a, *b); }                ///< if usesField()
-  PlacedField placedField() const { return {*body().field, body().mesh.now}; }  ///< if usesField()
+  const Geometry& body() const {  ///< if usesField()
+    return answersByFieldOfSecond(a->body.mesh.topology.type, b->body.field.get()) ? *b : *a;
+  }
+  PlacedField placedField() const {
+    return {*body().body.field, body().body.mesh.now};
+  }  ///< if usesField()
   /// If usesField(): for the contacts with the field. Allocates fieldScratch when first called.
   FieldContacts fieldContacts(const PlacedField&);
   bool collides() const { return a->meets(*b); }
   bool anyDisabled() const {
-    return !a->mesh.topology.disabled.empty() || !b->mesh.topology.disabled.empty();
+    return !a->body.mesh.topology.disabled.empty() || !b->body.mesh.topology.disabled.empty();
   }
   /// Makes `next` the pair's result.
   void commit() noexcept;
@@ -78,7 +80,8 @@ struct PairRecord : CountedObject {
 
   /// How the settings have the pair answered. Auto's plan of a frame may have another kind.
   PairKind kind() const {
-    return supportOf(pair.settings.method, a->mesh.topology.type, b->mesh.topology.type, a == b)
+    return supportOf(pair.settings.method, a->body.mesh.topology.type, b->body.mesh.topology.type,
+                     a == b)
         ->kind;
   }
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
@@ -88,10 +91,12 @@ struct PairRecord : CountedObject {
   /// Returns whether leaves were built.
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);
   /// For a pair with a shape, or if usesField(): the geometry with elements.
-  const Geometry& mesh() const { return a->shape || (usesField() && &body() == a) ? *b : *a; }
+  const Geometry& mesh() const { return a->body.shape || (usesField() && &body() == a) ? *b : *a; }
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
-  bool hasWiderBoxes() const { return !plan.swept() && (a->tree.isSwept() || b->tree.isSwept()); }
+  bool hasWiderBoxes() const {
+    return !plan.swept() && (a->body.tree.isSwept() || b->body.tree.isSwept());
+  }
 
   /// Of a StepGuard: the pair that it guards, whose filters apply. Null: a pair of the table.
   const PairRecord* guarded = nullptr;
@@ -114,7 +119,12 @@ struct PairRecord : CountedObject {
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
   std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, for PairKind::Proxy; pairs may share it
   ProxySettings proxySettings;
-  DerivedFrom<3> proxyVersion;  ///< topology, enabled elements and positions of b
+  struct ProxyState {  ///< of b
+    ElementsState elements;
+    Revision positions;
+    friend bool operator==(const ProxyState&, const ProxyState&) = default;
+  };
+  DerivedFrom<ProxyState> proxyVersion;
 };
 
 /// Collision pairs, found by their geometries in either order.

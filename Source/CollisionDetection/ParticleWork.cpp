@@ -46,19 +46,19 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 }  // namespace
 
 void ParticleWork::place() {
-  m_proxy.emplace(*m_record->b->proxy, m_record->b->mesh, m_record->plan.proxyThickness);
+  m_proxy.emplace(*m_record->b->proxy, m_record->b->body.mesh, m_record->plan.proxyThickness);
 }
 
 std::size_t ParticleWork::start(const FrameStart&) {
   place();
-  return (m_record->a->mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
+  return (m_record->a->body.mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
 }
 
 void ParticleWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
   const std::size_t begin = job * kParticlesPerJob;
-  findByLeaves(begin, std::min(m_record->a->mesh.now.size(), begin + kParticlesPerJob), false,
+  findByLeaves(begin, std::min(m_record->a->body.mesh.now.size(), begin + kParticlesPerJob), false,
                scratch);
   findOthers(scratch);
   scratch.narrowMilliseconds += watch.lap();
@@ -66,13 +66,13 @@ void ParticleWork::run(int, std::size_t job, JobScratch& scratch) const {
 
 void ParticleWork::runByBruteForce(JobScratch& scratch) {
   place();
-  findByLeaves(0, m_record->a->mesh.now.size(), true, scratch);
+  findByLeaves(0, m_record->a->body.mesh.now.size(), true, scratch);
   detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
 }
 
 void ParticleWork::findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce,
                                 JobScratch& scratch) const {
-  const TriangleMesh& points = m_record->a->mesh;
+  const TriangleMesh& points = m_record->a->body.mesh;
   const PairPlan& plan = m_record->plan;
   const ParticleStep step{m_record->b->motion.range(), m_record->pair.settings.thickness,
                           plan.motionTolerance};
@@ -84,18 +84,18 @@ void ParticleWork::findByLeaves(std::size_t begin, std::size_t end, bool byBrute
 }
 
 void ParticleWork::findOthers(JobScratch& scratch) const {
-  const TriangleMesh& points = m_record->a->mesh;
+  const TriangleMesh& points = m_record->a->body.mesh;
   const MeshPair meshes = m_record->meshes();
   const bool swept = m_record->plan.swept();
   const auto isDisabled = [&](const ElementPair& p) {
-    return !m_record->b->mesh.topology.isEnabled(p.b);
+    return !m_record->b->body.mesh.topology.isEnabled(p.b);
   };
   for (const std::uint32_t point : scratch.hits.others) {
     Eigen::AlignedBox3d box(points.now[point]);
     if (swept) box.extend(points.before[point]);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
-    findElementsNear(*m_record->b, {box.min() - margin, box.max() + margin}, swept, scratch.queries,
-                     scratch.elements);
+    findElementsNear(m_record->b->body, {box.min() - margin, box.max() + margin}, swept,
+                     scratch.queries, scratch.elements);
     scratch.kept.clear();
     for (const std::uint32_t element : scratch.elements) scratch.kept.push_back({point, element});
     std::erase_if(scratch.kept, isDisabled);
@@ -117,7 +117,7 @@ void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
   results.assess(record, false, join.statistics);
   if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
   countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);
-  describeAsShape(record.a->mesh, contents);
+  describeAsShape(record.a->body.mesh, contents);
 }
 
 }  // namespace palpate

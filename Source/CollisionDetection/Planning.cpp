@@ -12,8 +12,8 @@ void planWithoutMotion(PairRecord& record) {
 bool mayUseLeaves(const PairRecord& record) {
   const PairSettings& settings = record.pair.settings;
   const Geometry &a = *record.a, &b = *record.b;
-  const double reach = settings.thickness + a.mesh.largestRadius;
-  return settings.method == Method::Auto && kPoints.has(a.mesh.topology.type) && b.proxy &&
+  const double reach = settings.thickness + a.body.mesh.largestRadius;
+  return settings.method == Method::Auto && kPoints.has(a.body.mesh.topology.type) && b.proxy &&
          b.proxySettings.errorBound <= settings.allowedError && !record.predicate && reach > 0.0 &&
          reach <= b.proxySettings.reach;
 }
@@ -43,7 +43,7 @@ void planByFieldIfProven(PairRecord& record, Engine engine) {
     const PlacedField placed = record.placedField();
     FieldContacts contacts = record.fieldContacts(placed);
     return engine == Engine::BruteForce ? contacts.isFurtherByBruteForce(exact.motion)
-                                        : contacts.isFurther(record.mesh(), exact.motion);
+                                        : contacts.isFurther(record.mesh().body, exact.motion);
   };
   if (!isProven()) record.plan = exact;
 }

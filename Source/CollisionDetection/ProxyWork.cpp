@@ -17,29 +17,30 @@ void describeProxy(const SurfaceProxy& proxy, const PlacedProxy& placed, Jobs jo
 }
 
 void ProxyWork::place() {
-  m_proxy.emplace(*m_record->proxy, m_record->b->mesh, m_record->pair.settings.thickness);
+  m_proxy.emplace(*m_record->proxy, m_record->b->body.mesh, m_record->pair.settings.thickness);
 }
 
 std::size_t ProxyWork::start(const FrameStart&) {
   place();
-  return (m_record->a->mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
+  return (m_record->a->body.mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
 }
 
 void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const std::size_t begin = job * kParticlesPerJob;
-  find(begin, std::min(m_record->a->mesh.now.size(), begin + kParticlesPerJob), false, scratch);
+  find(begin, std::min(m_record->a->body.mesh.now.size(), begin + kParticlesPerJob), false,
+       scratch);
 }
 
 void ProxyWork::runByBruteForce(JobScratch& scratch) {
   place();
-  find(0, m_record->a->mesh.now.size(), true, scratch);
+  find(0, m_record->a->body.mesh.now.size(), true, scratch);
 }
 
 void ProxyWork::find(std::size_t begin, std::size_t end, bool byBruteForce,
                      JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  m_proxy->find(m_record->a->mesh, begin, end, byBruteForce, nullptr, scratch.hits);
+  m_proxy->find(m_record->a->body.mesh, begin, end, byBruteForce, nullptr, scratch.hits);
   scratch.contacts.featurePairs += scratch.hits.answered;
   scratch.narrowMilliseconds += watch.lap();
 }
@@ -59,7 +60,7 @@ void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   join.threads.forEach(jobs.size(), [&](std::size_t i) {
     std::size_t first = 0;
     for (std::size_t k = 0; k < i; ++k) first += jobs[k]->hits.count;
-    m_proxy->write(record.a->mesh, jobs[i]->hits, contents.shape.data() + first);
+    m_proxy->write(record.a->body.mesh, jobs[i]->hits, contents.shape.data() + first);
   });
   describeProxy(*record.proxy, *m_proxy, jobs, contents);
   join.results.start(jobs);

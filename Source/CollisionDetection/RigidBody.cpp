@@ -27,14 +27,14 @@ class RigidSearch::Step {
   Step(const Geometry& geometry, RigidSearch& search)
       : m_geometry(geometry),
         m_search(search),
-        m_before(geometry.mesh.before.transform()),
-        m_now(geometry.mesh.now.transform()),
+        m_before(geometry.body.mesh.before.transform()),
+        m_now(geometry.body.mesh.now.transform()),
         m_matrix(m_now.rotation - m_before.rotation),
         m_vector(m_now.translation - m_before.translation) {
-    const DerivedFrom<1>::Sources body{geometry.mesh.now.bodyRevision()};
+    const Revision body = geometry.body.mesh.now.bodyRevision();
     if (!search.m_largestVersion.isCurrent(body)) {
       search.m_largest = 0.0;
-      for (const Vector3d& p : geometry.mesh.now.body())
+      for (const Vector3d& p : geometry.body.mesh.now.body())
         search.m_largest = std::max(search.m_largest, p.cwiseAbs().maxCoeff());
       search.m_largestVersion.commit(body);
     }
@@ -51,7 +51,7 @@ class RigidSearch::Step {
   /// centre plus, for each axis, growth(axis) times half the box's edge.
   template <class Size>
   double largest(std::uint32_t& vertex, const Vector3d& growth, Size&& size) {
-    const std::span<const Vector3d> body = m_geometry.mesh.now.body();
+    const std::span<const Vector3d> body = m_geometry.body.mesh.now.body();
     const auto sizeOf = [&](std::uint32_t v) { return size(m_now(body[v]) - m_before(body[v])); };
     if (body.empty()) return 0.0;
     if (vertex >= body.size()) vertex = 0;
@@ -60,19 +60,19 @@ class RigidSearch::Step {
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
-    const double unit = 1.0 / m_geometry.tree.frame().scale;
+    const double unit = 1.0 / m_geometry.body.tree.frame().scale;
     const auto mayExceed = [&](const FloatBox& box) {
       if (box.empty()) return false;
       if (box.mayBeClamped()) return true;
       Vector3d lower, upper;
       for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
-      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.tree.frame().origin;
+      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.body.tree.frame().origin;
       const double most =
           size(m_matrix * centre + m_vector) + growth.dot(0.5 * unit * (upper - lower));
       return !(most <= best + m_slack);
     };
-    const GeometryOctree& tree = m_geometry.tree;
-    if (tree.encloses(m_geometry.mesh, m_geometry.revisions.topology)) {
+    const GeometryOctree& tree = m_geometry.body.tree;
+    if (tree.encloses(m_geometry.body.mesh, m_geometry.body.revisions.elements.topology)) {
       forEachOverlapping(tree.octree(), mayExceed, m_search.m_queries,
                          [&](std::uint32_t begin, std::uint32_t end) {
                            for (std::uint32_t i = begin; i < end; ++i)
@@ -97,7 +97,7 @@ class RigidSearch::Step {
 MotionRange RigidSearch::motion(const Geometry& geometry) {
   Step step(geometry, *this);
   MotionRange range;
-  range.isEmpty = geometry.mesh.now.size() == 0;
+  range.isEmpty = geometry.body.mesh.now.size() == 0;
   if (step.before() == step.now()) return range;
   for (int k = 0; k < 3; ++k) {
     const Vector3d growth = step.matrix().row(k).cwiseAbs();
@@ -106,8 +106,8 @@ MotionRange RigidSearch::motion(const Geometry& geometry) {
     range.lower[k] =
         -step.largest(m_furthest[3 + k], growth, [&](const Vector3d& moved) { return -moved[k]; });
   }
-  if (geometry.shape && geometry.shape->now.isCylinder()) {
-    const Shape &before = geometry.shape->before, &now = geometry.shape->now;
+  if (geometry.body.shape && geometry.body.shape->now.isCylinder()) {
+    const Shape &before = geometry.body.shape->before, &now = geometry.body.shape->now;
     const double turned = (now.axes().col(2) - before.axes().col(2)).norm() + kPlacedError;
     const Vector3d ofRim = Vector3d::Constant(turned * now.radius());
     range.lower -= ofRim;
@@ -117,14 +117,14 @@ MotionRange RigidSearch::motion(const Geometry& geometry) {
 }
 
 double RigidSearch::arcDeviation(const Geometry& geometry) {
-  if (!geometry.isPlaced()) return 0.0;
+  if (!geometry.body.isPlaced()) return 0.0;
   Step step(geometry, *this);
   if (step.before().rotation == step.now().rotation) return 0.0;
   const Matrix3d turn = step.now().rotation * step.before().rotation.transpose();
   const Eigen::Quaterniond half = Eigen::Quaterniond(turn).normalized();
   const double sine = half.vec().norm();
   if (sine == 0.0) return 0.0;
-  if (geometry.shape && geometry.shape->now.isPlane())
+  if (geometry.body.shape && geometry.body.shape->now.isPlane())
     return std::numeric_limits<double>::infinity();
   const Vector3d axis = half.vec() / sine;
   const auto across = [&](const Vector3d& v) -> Vector3d { return v - axis.dot(v) * axis; };
@@ -134,10 +134,11 @@ double RigidSearch::arcDeviation(const Geometry& geometry) {
                            step.largest(m_furthest[6], growth, [&](const Vector3d& moved) {
                              return across(moved).norm();
                            });
-  if (!(geometry.shape && geometry.shape->now.isCylinder() && deviation > 0.0)) return deviation;
-  const std::span<const Vector3d> ends = geometry.shape->now.corners();
+  if (!(geometry.body.shape && geometry.body.shape->now.isCylinder() && deviation > 0.0))
+    return deviation;
+  const std::span<const Vector3d> ends = geometry.body.shape->now.corners();
   const double slope = 4.0 * deviation / stableLength(ends[1] - ends[0]);
-  return deviation + slope * geometry.shape->now.radius();
+  return deviation + slope * geometry.body.shape->now.radius();
 }
 
 }  // namespace palpate

@@ -38,7 +38,7 @@ class RigidSearch {
   std::array<std::uint32_t, 7> m_furthest{};  ///< vertices of the last step, tried first
   PointQueryStack m_queries;
   double m_largest = 0;  ///< L: magnitude of the coordinates in the body's frame
-  DerivedFrom<1> m_largestVersion;
+  DerivedFrom<Revision> m_largestVersion;
 };
 
 }  // namespace palpate

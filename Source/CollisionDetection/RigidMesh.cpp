@@ -30,19 +30,19 @@ struct RigidMesh::Implementation {
     }
   };
 
-  Geometry& place(const RigidTransform& pose, const SearchableGeometry& beside,
-                  const OctreeSettings& settings) {
+  Geometry& place(const RigidTransform& pose, const Body& beside, const OctreeSettings& settings) {
     Geometry& mesh = *table.all().front();
-    table.setTransform(mesh.id, std::nullopt, pose);
+    table.setTransform(mesh.body.id, std::nullopt, pose);
     const double scale = beside.tree.frame().scale;
-    if (!mesh.tree.isCurrent(mesh.mesh, mesh.revisions.topology, scale)) {
-      mesh.tree.sampleFrame(mesh.mesh, mesh.revisions.topology);
-      mesh.tree.update(mesh.mesh, mesh.revisions.topology, scale, settings, one);
+    if (!mesh.body.tree.isCurrent(mesh.body.mesh, mesh.body.revisions.elements.topology, scale)) {
+      mesh.body.tree.sampleFrame(mesh.body.mesh, mesh.body.revisions.elements.topology);
+      mesh.body.tree.update(mesh.body.mesh, mesh.body.revisions.elements.topology, scale, settings,
+                            one);
     }
-    mesh.tree.updateDops(mesh.mesh, settings.bounds, one);
+    mesh.body.tree.updateDops(mesh.body.mesh, settings.bounds, one);
     return mesh;
   }
-  void findByOctree(const SearchableGeometry& a, const SearchableGeometry& b, Job& job) {
+  void findByOctree(const Body& a, const Body& b, Job& job) {
     const TreePair trees = treesOf(a, b, job.pair.maxFeatureDistance(), false, BoxFrame::Body);
     startPairs(trees, 1, stack);
     startNodes.assign(stack.pairs.begin(), stack.pairs.end());
@@ -87,19 +87,19 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Eigen::Matri
     throw Error(ErrorCode::InvalidCall, "this RigidMesh object was moved from");
   const RigidTransform pose = checkedPose({rotation, translation}, "the query's mesh");
   checkLength(thickness, "thickness", true);
-  const SearchableGeometry& a = source.at(id);
+  const Body& a = source.at(id);
   checkHasElements(a);
   RigidMesh::Implementation& all = *mesh.m_implementation;
   const Geometry& b = all.place(pose, a, source.octreeSettings());
   all.found.clear();
-  const MeshPair pair{a.mesh, b.mesh, {Method::Proximity, thickness}};
+  const MeshPair pair{a.mesh, b.body.mesh, {Method::Proximity, thickness}};
   RigidMesh::Implementation::Job job{pair, all};
   const auto countA = static_cast<std::uint32_t>(a.mesh.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(b.mesh.topology.triangles.size());
+             countB = static_cast<std::uint32_t>(b.body.mesh.topology.triangles.size());
   if (source.engine() == Engine::BruteForce)
     all.findByBruteForce(countA, countB, job);
   else if (countA > 0 && countB > 0)
-    all.findByOctree(a, b, job);
+    all.findByOctree(a, b.body, job);
   ContactBuffers* const buffers[] = {&all.found};
   orderContacts(buffers, 0, all.order, all.sorted);
   CollisionData::Contents& sorted = all.sorted;

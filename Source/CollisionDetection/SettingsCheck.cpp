@@ -67,16 +67,17 @@ class PairCheck {
   PairCheck(const Geometry& a, const Geometry& b, const PairSettings& settings)
       : m_a(a), m_b(b), m_settings(settings), m_method(settings.method) {}
 
-  const Support& check() const {
+  const SupportedPairs& check() const {
     range();
     shapes();
-    const Support* const row =
-        supportOf(m_method, m_a.mesh.topology.type, m_b.mesh.topology.type, &m_a == &m_b);
+    const SupportedPairs* const row =
+        supportOf(m_method, m_a.body.mesh.topology.type, m_b.body.mesh.topology.type, &m_a == &m_b);
     if (!row) refuse();
     if (row->kind == PairKind::Field) {
-      const Geometry& body = bodyWithField(m_a, m_b);
-      checkField(m_a, m_b, body.field.get(), m_settings,
-                 (&body == &m_a ? m_b : m_a).mesh.largestRadius, m_a.id);
+      const bool second = answersByFieldOfSecond(m_a.body.mesh.topology.type, m_b.body.field.get());
+      const Geometry &body = second ? m_b : m_a, &other = second ? m_a : m_b;
+      checkField(m_a, m_b, body.body.field.get(), m_settings, other.body.mesh.largestRadius,
+                 m_a.body.id);
     } else {
       lengths(*row);
     }
@@ -86,7 +87,7 @@ class PairCheck {
  private:
   void need(bool good, const std::string& reason,
             ErrorCode code = ErrorCode::InvalidSettings) const {
-    if (!good) throw Error(code, nameOf(m_a, m_b) + ": " + reason, m_a.id);
+    if (!good) throw Error(code, nameOf(m_a, m_b) + ": " + reason, m_a.body.id);
   }
   void support(bool supported, const std::string& reason) const {
     need(supported, reason, ErrorCode::UnsupportedMethod);
@@ -100,7 +101,7 @@ class PairCheck {
     const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance, earliestTimeOnly,
                 allowedError, normalCone] = m_settings;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);
-    need(rest == 0.0 || (&m_a == &m_b && m_a.mesh.topology.type != GeometryType::Points),
+    need(rest == 0.0 || (&m_a == &m_b && m_a.body.mesh.topology.type != GeometryType::Points),
          "restDistance is for a triangle or line mesh with itself");
     finite("thickness", thickness, thickness >= 0.0, kLengthRule);
     finite("motionTolerance", motionTolerance, true,
@@ -128,9 +129,9 @@ class PairCheck {
   }
 
   void shapes() const {
-    const auto &a = m_a.shape, &b = m_b.shape;
+    const auto &a = m_a.body.shape, &b = m_b.body.shape;
     const bool self = &m_a == &m_b;
-    support(!self || a || !m_a.isPlaced(), kRigidWithItself);
+    support(!self || a || !m_a.body.isPlaced(), kRigidWithItself);
     support(!self || !a, "a shape cannot be tested against itself");
     support(!a || !b || !a->now.isPlane() || !b->now.isPlane(),
             "a pair of two planes is not supported");
@@ -145,7 +146,7 @@ class PairCheck {
   /// Says why the table of support has no row.
   [[noreturn]] void refuse() const {
     const std::string types =
-        nameOf(m_a.mesh.topology.type) + " and " + nameOf(m_b.mesh.topology.type);
+        nameOf(m_a.body.mesh.topology.type) + " and " + nameOf(m_b.body.mesh.topology.type);
     support(m_method != Method::Intersection,
             "Method::Intersection is for two triangle meshes, not for " + types +
                 "; use Auto, Proximity or Continuous");
@@ -155,16 +156,17 @@ class PairCheck {
             std::string("a distance field accepts only Auto and Method::DistanceField, not ") +
                 toString(m_method));
     support(&m_a != &m_b, "Method::DistanceField is not for a geometry with itself");
-    support(!m_a.isField() || !m_b.isField(), "a pair of two distance fields is not supported");
-    support(!m_a.shape && !m_b.shape, "a distance field with a shape is not supported");
-    checkField(m_a, m_b, nullptr, m_settings, 0.0, m_a.id);
+    support(!m_a.body.isField() || !m_b.body.isField(),
+            "a pair of two distance fields is not supported");
+    support(!m_a.body.shape && !m_b.body.shape, "a distance field with a shape is not supported");
+    checkField(m_a, m_b, nullptr, m_settings, 0.0, m_a.body.id);
     throw Error(ErrorCode::UnsupportedMethod,
                 nameOf(m_a, m_b) + ": Method::" + toString(m_method) + " does not answer " + types,
-                m_a.id);
+                m_a.body.id);
   }
 
   /// Checks thickness and radii.
-  void lengths(const Support& row) const {
+  void lengths(const SupportedPairs& row) const {
     const auto answered = [&](Method method) {
       return answers(method, m_settings.thickness, m_a.inStep(), m_b.inStep());
     };
@@ -186,7 +188,8 @@ class PairCheck {
 
 }  // namespace
 
-const Support& checkPair(const Geometry& a, const Geometry& b, const PairSettings& settings) {
+const SupportedPairs& checkPair(const Geometry& a, const Geometry& b,
+                                const PairSettings& settings) {
   return PairCheck(a, b, settings).check();
 }
 

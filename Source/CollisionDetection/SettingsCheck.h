@@ -13,7 +13,7 @@ const Settings& checked(const Settings&);
 
 /// Returns the row of the table of support by which a pair is answered. Throws UnsupportedMethod or
 /// InvalidSettings with the fault.
-const Support& checkPair(const Geometry& a, const Geometry& b, const PairSettings&);
+const SupportedPairs& checkPair(const Geometry& a, const Geometry& b, const PairSettings&);
 
 /// Throws unless a pair by Method::DistanceField can do with this field of its body, or null.
 /// largestRadius: L, of the other geometry. named: the geometry of the error.

@@ -12,7 +12,7 @@ namespace palpate {
 
 std::size_t ShapeWork::start(const FrameStart&) const {
   const Geometry& mesh = m_record->mesh();
-  return mesh.shape || mesh.tree.octree().size() > 0 ? 1 : 0;
+  return mesh.body.shape || mesh.body.tree.octree().size() > 0 ? 1 : 0;
 }
 
 void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
@@ -34,7 +34,7 @@ void ShapeWork::findPair(const MeshPair& meshes, JobScratch& scratch) const {
 
 void ShapeWork::findNearMesh(const MeshPair& meshes, JobScratch& scratch) const {
   const auto& [analytical, now, before] = meshes.shape();
-  findElementsNear(m_record->mesh(), m_record->plan.swept() ? before : now, now,
+  findElementsNear(m_record->mesh().body, m_record->plan.swept() ? before : now, now,
                    meshes.maxFeatureDistance(), scratch.queries, scratch.elements);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;

@@ -14,12 +14,12 @@ namespace palpate {
 namespace {
 
 void checkVertex(const Geometry& geometry, std::uint32_t vertex) {
-  const std::size_t count = geometry.shape ? 0 : geometry.mesh.now.size();
+  const std::size_t count = geometry.body.shape ? 0 : geometry.body.mesh.now.size();
   if (vertex == kNoElement || vertex < count) return;
   throw Error(ErrorCode::IndexOutOfRange,
               nameOf(geometry) + ": vertex " + std::to_string(vertex) +
                   " is out of range; the geometry has " + std::to_string(count) + " vertices",
-              geometry.id, vertex);
+              geometry.body.id, vertex);
 }
 
 }  // namespace
@@ -40,11 +40,11 @@ struct StepGuard::Implementation {
     for (const auto& record : source->pairs().records()) {
       if (settings.isLeftOut(record->pair.a, record->pair.b)) continue;
       for (const Geometry* geometry : {record->a, record->b})
-        if (geometry->isField())
+        if (geometry->body.isField())
           throw Error(ErrorCode::UnsupportedMethod,
                       nameOf(record->pair.a, record->pair.b) + ": a StepGuard cannot guard " +
                           nameOf(*geometry) + ", which is a distance field; leave the pair out",
-                      geometry->id);
+                      geometry->body.id);
       if (count == pairs.size()) pairs.emplace_back();
       std::unique_ptr<PairRecord>& own = pairs[count++];
       if (!own || own->guarded != record.get() || own->a != record->a || own->b != record->b) {
@@ -54,8 +54,8 @@ struct StepGuard::Implementation {
         own->b = record->b;
       }
       own->pair = {record->pair.a, record->pair.b, settingsOf(record->pair.settings)};
-      if (!own->a->shape && !own->b->shape &&
-          own->a->mesh.largestRadius + own->b->mesh.largestRadius == 0.0)
+      if (!own->a->body.shape && !own->b->body.shape &&
+          own->a->body.mesh.largestRadius + own->b->body.mesh.largestRadius == 0.0)
         own->pair.settings.timeTolerance = kTouchTolerance;
       own->settingsRevision = record->settingsRevision;
     }

@@ -6,6 +6,12 @@
 
 namespace palpate {
 
+/// Returns the bytes of a file.
+///
+/// what     the start of the message, such as "the capture"
+/// Errors   File, with the reason; also for a path that names no regular file, which is not opened.
+std::string readWholeFile(const std::filesystem::path&, const std::string& what);
+
 /// Writes a file completely or not at all: to a file beside it, which then takes its name. A
 /// symbolic link stays, and the file that it names is written.
 ///

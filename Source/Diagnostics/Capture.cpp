@@ -394,14 +394,6 @@ void checkReadable(const CollisionProblem& problem) {
   fill(detection, problem);
 }
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::error_code fault;
-  std::ifstream file(path, std::ios::binary);
-  if (!file.is_open() || !std::filesystem::is_regular_file(path, fault))
-    throw Error(ErrorCode::File, "the capture \"" + path.string() + "\" cannot be read");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 }  // namespace
 
 void writeCapture(const CollisionProblem& problem, const std::filesystem::path& path) {
@@ -429,7 +421,7 @@ void capture(const OctreeBasedCD& detection, const AuditFailure& failure,
 
 CollisionProblem readCapture(const std::filesystem::path& path) {
   const StandardFloatingPoint standard;
-  Reader file(path, contentOf(path));
+  Reader file(path, readWholeFile(path, "the capture"));
   if (!file.rest().starts_with(kTitle)) file.failWhole("it is not a capture");
   file.expect(kTitle);
   int version = 0;

@@ -14,29 +14,29 @@ void copyTo(std::vector<T>& out, std::span<const T> from) {
 }
 
 CollisionProblem::Geometry meshOf(const Geometry& geometry) {
-  const TriangleMesh& mesh = geometry.mesh;
+  const TriangleMesh& mesh = geometry.body.mesh;
   CollisionProblem::Geometry copy;
-  copy.id = geometry.id;
-  copy.name = geometry.name;
+  copy.id = geometry.body.id;
+  copy.name = geometry.body.name;
   copy.type = mesh.topology.type;
   copyTo<double>(copy.radii, mesh.radii);
   copy.filter = geometry.filter;
   copyTo<std::uint32_t>(copy.disabled, mesh.topology.disabled);
-  if (geometry.shape) copy.analytical = geometry.shape->analytical;
-  copy.field = geometry.field;
+  if (geometry.body.shape) copy.analytical = geometry.body.shape->analytical;
+  copy.field = geometry.body.field;
   if (geometry.proxy) copy.proxy = geometry.proxySettings;
   if (geometry.isShapeFixed()) {
     copyTo(copy.before, mesh.before.body());
     copyTo(copy.now, mesh.now.body());
-  } else if (!geometry.shape)
+  } else if (!geometry.body.shape)
     copy.before = mesh.before.all(), copy.now = mesh.now.all();
   const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
   copy.rotation = now.rotation, copy.translation = now.translation;
   copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
   if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.triangles);
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
-  if (geometry.solid) {
-    copyTo<Tetrahedron>(copy.tetrahedra, geometry.solid->topology.tetrahedra);
+  if (geometry.body.solid) {
+    copyTo<Tetrahedron>(copy.tetrahedra, geometry.body.solid->topology.tetrahedra);
     copyTo<Eigen::Vector3d>(copy.rest, mesh.rest);
   }
   return copy;
@@ -61,7 +61,7 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
          static_cast<bool>(record->predicate)});
     if (record->pair.settings.restDistance > 0.0)
       copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,
-                              record->a->mesh.rest);
+                              record->a->body.mesh.rest);
   }
   return problem;
 }

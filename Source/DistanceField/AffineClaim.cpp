@@ -329,7 +329,7 @@ namespace palpate {
 
 HWY_EXPORT(proveClaimKernel);
 
-bool AffineClaim::holds(const SearchableGeometry& geometry) const {
+bool AffineClaim::holds(const Body& geometry) const {
   const Octree& octree = geometry.tree.octree();
   octree.requireBuilt();
   const ClaimSearch search{octree, geometry.tree.ordered().data(), geometry.mesh.now.body().data(),

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -28,7 +28,7 @@ struct AffineClaim {
   std::array<Side, 2> sides;
 
   /// Whether the triangles of the mesh certainly allow all sides that are wanted.
-  bool holds(const SearchableGeometry&) const;
+  bool holds(const Body&) const;
 };
 
 }  // namespace palpate

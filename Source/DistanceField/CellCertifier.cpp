@@ -17,8 +17,7 @@ using Eigen::Vector3d;
 
 double InterpolatedCell::halfDiagonal() const { return std::numbers::sqrt3 * halfSide; }
 
-CellCertifier::CellCertifier(const SearchableGeometry& geometry, const SurfaceSign& sign,
-                             double tolerance)
+CellCertifier::CellCertifier(const Body& geometry, const SurfaceSign& sign, double tolerance)
     : m_geometry(geometry), m_sign(sign), m_tolerance(tolerance) {
   const FloatBox box = geometry.tree.octree().box(0);
   float reach = 0;

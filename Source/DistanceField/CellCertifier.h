@@ -2,7 +2,7 @@
 
 #include "DistanceField/SurfaceSign.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -37,7 +37,7 @@ struct InterpolatedCell {
 class CellCertifier {
  public:
   /// The geometry's octree must be up to date. tolerance: L; the error of distances at corners.
-  CellCertifier(const SearchableGeometry&, const SurfaceSign&, double tolerance);
+  CellCertifier(const Body&, const SurfaceSign&, double tolerance);
 
   /// Whether the interpolated distance is certainly within `bound` of the exact one in the whole
   /// cell. The values may be rounded to float; `bound` must include neither that rounding nor the
@@ -52,7 +52,7 @@ class CellCertifier {
   bool isPositiveInPlane(const InterpolatedCell&, const Eigen::Vector3d& normal, double atCentre,
                          double level, double error, PointQueryStack&) const;
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const SurfaceSign& m_sign;
   const double m_tolerance;  ///< L
   double m_reach;            ///< in the octree's floats: the largest coordinate

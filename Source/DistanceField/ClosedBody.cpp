@@ -43,13 +43,12 @@ void checkMesh(const TriangleMeshView& mesh, GeometryId id) {
 
 }  // namespace
 
-void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, SearchableGeometry& out) {
+void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, Body& out) {
   makeCheckedBody(mesh, threads, out);
   checkInside(out, InsideRule::Closed);
 }
 
-void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads,
-                     SearchableGeometry& out) {
+void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads, Body& out) {
   checkMesh(mesh, out.id);
   if (mesh.triangles.empty())
     throw Error(ErrorCode::NotClosed, nameOf(out) + " has no triangles", out.id);

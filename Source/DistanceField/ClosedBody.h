@@ -3,7 +3,7 @@
 #include <palpate/Types.h>
 
 #include "Core/Threads.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 namespace palpate {
 
@@ -11,9 +11,9 @@ namespace palpate {
 ///
 /// Errors   NonFinitePosition, also for one beyond kLargestMeasure; IndexOutOfRange; TooLarge for
 ///          more than 2^28 vertices or triangles; NotClosed, also without triangles.
-void makeClosedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
+void makeClosedBody(const TriangleMeshView&, const Threads&, Body& out);
 /// The same for a mesh that may be open. Throws NotClosed only for one without triangles.
-void makeCheckedBody(const TriangleMeshView&, const Threads&, SearchableGeometry& out);
+void makeCheckedBody(const TriangleMeshView&, const Threads&, Body& out);
 
 /// Throws InvalidSettings unless a setting is positive and at most kLargestMeasure.
 void checkPositive(double length, const char* name);

@@ -11,7 +11,7 @@
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldFile.h"
 #include "Queries/Containment.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <string>
 #include <utility>
@@ -53,10 +53,10 @@ DistanceField DistanceField::build(const TriangleMeshView& mesh,
   checkPositive(settings.band, "band");
   checkThreads(settings.threads);
   const Threads threads(settings.threads);
-  SearchableGeometry body(GeometryId{0});
+  Body body(GeometryId{0});
   makeCheckedBody(mesh, threads, body);
   const bool closed = palpate::isClosed(body);
-  if (!closed) body.windingNumbers.update(body, threads);
+  if (!closed) body.prepared->windingNumbers.update(body, threads);
   return DistanceField(
       std::make_shared<const Implementation>(buildField(body, closed, settings, threads)));
 }

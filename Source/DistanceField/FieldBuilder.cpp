@@ -47,8 +47,8 @@ constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); 
 
 class FieldBuilder {
  public:
-  FieldBuilder(const SearchableGeometry& geometry, bool isClosed,
-               const DistanceFieldSettings& settings, const Threads& threads)
+  FieldBuilder(const Body& geometry, bool isClosed, const DistanceFieldSettings& settings,
+               const Threads& threads)
       : m_geometry(geometry),
         m_settings(settings),
         m_threads(threads),
@@ -581,7 +581,7 @@ class FieldBuilder {
                          static_cast<std::uint32_t>(m_field.leaves.size() - 1));
   }
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const DistanceFieldSettings& m_settings;
   const Threads& m_threads;
   /// L: at most the band, or values beyond the band could have the wrong sign.
@@ -619,8 +619,8 @@ class FieldBuilder {
 
 }  // namespace
 
-FieldCells buildField(const SearchableGeometry& geometry, bool isClosed,
-                      const DistanceFieldSettings& settings, const Threads& threads) {
+FieldCells buildField(const Body& geometry, bool isClosed, const DistanceFieldSettings& settings,
+                      const Threads& threads) {
   return FieldBuilder(geometry, isClosed, settings, threads).build();
 }
 

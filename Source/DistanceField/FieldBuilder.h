@@ -4,7 +4,7 @@
 
 #include "Core/Threads.h"
 #include "DistanceField/FieldCells.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 namespace palpate {
 
@@ -18,7 +18,6 @@ namespace palpate {
 ///    the larger cell interpolates there. Larger cells are split until no hanging value is off by
 ///    more than its share of the error bound.
 /// 3. The cells are numbered, depth first.
-FieldCells buildField(const SearchableGeometry&, bool isClosed, const DistanceFieldSettings&,
-                      const Threads&);
+FieldCells buildField(const Body&, bool isClosed, const DistanceFieldSettings&, const Threads&);
 
 }  // namespace palpate

@@ -264,7 +264,7 @@ double valueBeyond(const PlacedField& placed, double distance) {
 ///
 /// The bound is that of FeaturesNearField::excludes(), from the centre of a node's box.
 template <class Visit>
-void forEachElementNear(const SearchableGeometry& geometry, const PlacedField& placed, double limit,
+void forEachElementNear(const Body& geometry, const PlacedField& placed, double limit,
                         PointQueryStack& stack, Visit&& visit) {
   const Octree& octree = geometry.tree.octree();
   if (octree.size() == 0) return;
@@ -332,7 +332,7 @@ void FieldContacts::startValues() {
   if (scratch.values.size() < count) scratch.values.resize(count);
 }
 
-bool FieldContacts::isFurther(const SearchableGeometry& geometry, double distance) {
+bool FieldContacts::isFurther(const Body& geometry, double distance) {
   const MeshTopology& topology = m_mesh.topology;
   const double target = valueBeyond(m_field, distance);
   if (!(target + m_mesh.largestRadius < reachOf(m_field.field()))) return false;
@@ -372,7 +372,7 @@ bool FieldContacts::isFurtherByBruteForce(double distance) const {
   return true;
 }
 
-void FieldContacts::start(const SearchableGeometry& geometry) {
+void FieldContacts::start(const Body& geometry) {
   const MeshTopology& topology = m_mesh.topology;
   FieldScratch& scratch = m_scratch;
   scratch.elements.clear();

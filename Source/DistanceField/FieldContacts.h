@@ -6,7 +6,7 @@
 #include "Core/Buffer.h"
 #include "Mesh/TriangleMesh.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/ShapeContacts.h"
 
 #include <Eigen/Core>
@@ -83,12 +83,12 @@ class FieldContacts {
   ///          error bound, depthToleranceOf() and the placement's error.
   /// Cost     that of the elements with smaller values, or near them. False is mostly found at the
   ///          first element.
-  bool isFurther(const SearchableGeometry&, double distance);
+  bool isFurther(const Body&, double distance);
   /// The same, by the values in every element. Bounds exclude none.
   bool isFurtherByBruteForce(double distance) const;
 
   /// Finds the elements near the field, and their vertices.
-  void start(const SearchableGeometry&);
+  void start(const Body&);
   /// Looks up the field at scratch.vertices[begin, end).
   void findValues(std::size_t begin, std::size_t end);
   /// Finds contacts of vertices and edges that scratch.elements[begin, end) own.

@@ -105,14 +105,6 @@ class Reader {
   std::size_t m_at = 0, m_last = 0;
 };
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::error_code fault;
-  std::ifstream file(path, std::ios::binary);
-  if (!file.is_open() || !std::filesystem::is_regular_file(path, fault))
-    throw Error(ErrorCode::File, "the distance field \"" + path.string() + "\" cannot be read");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 /// An entry in block `block`, or among the roots (-1). Children come after their parent, so that
 /// no cell contains itself.
 CellEntry entryOf(Reader& file, bool isClosed, std::size_t blocks, std::size_t leaves,
@@ -157,7 +149,7 @@ void writeField(const FieldCells& cells, const std::filesystem::path& path) {
 }
 
 FieldCells readField(const std::filesystem::path& path) {
-  Reader file(path, contentOf(path));
+  Reader file(path, readWholeFile(path, "the distance field"));
   file.title();
   if (const auto version = file.integer<std::uint32_t>(); version != kVersion)
     file.refuse("the version is " + std::to_string(version) + "; version " +

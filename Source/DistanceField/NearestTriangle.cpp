@@ -55,7 +55,7 @@ DistanceBounds::DistanceBounds(const Vector3d& p, const TriangleBatch& triangles
   HWY_DYNAMIC_DISPATCH(distanceBoundsKernel)(coordinates, triangles, count, *this);
 }
 
-NearestTriangle::NearestTriangle(const SearchableGeometry& geometry, double tolerance)
+NearestTriangle::NearestTriangle(const Body& geometry, double tolerance)
     : m_geometry(geometry), m_tolerance(tolerance), m_largest(0) {
   const FloatBox root = geometry.tree.octree().box(0);
   for (int k = 0; k < 3; ++k)

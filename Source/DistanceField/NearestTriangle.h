@@ -1,7 +1,7 @@
 #pragma once
 
 #include "Math/VertexTriangleDistances.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -33,13 +33,13 @@ class NearestTriangle {
   };
 
   /// tolerance: L. Distances are off by no more, or by 16 u of the largest coordinate difference.
-  NearestTriangle(const SearchableGeometry&, double tolerance);
+  NearestTriangle(const Body&, double tolerance);
 
   /// likely: places of at most eight triangles that are likely near.
   Near at(const Eigen::Vector3d& point, std::span<const std::uint32_t> likely) const;
 
  private:
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const double m_tolerance;
   float m_largest;  ///< in the octree's floats: the largest coordinate
 };

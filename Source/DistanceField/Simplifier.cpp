@@ -51,8 +51,8 @@ constexpr std::uint32_t kNone = 0xffffffff;
 
 }  // namespace
 
-Simplifier::Simplifier(const SearchableGeometry& body, const SimplifySettings& settings,
-                       double largest, const Threads& threads)
+Simplifier::Simplifier(const Body& body, const SimplifySettings& settings, double largest,
+                       const Threads& threads)
     : m_body(body),
       m_settings(settings),
       m_threads(threads),
@@ -255,7 +255,7 @@ void Simplifier::measureProtrusions() {
   m_protrusions.assign(m_triangles.size(), 0.0);
   m_owner.assign(m_components.size(), kNone);
   if (m_triangles.empty()) return;
-  SearchableGeometry surface(GeometryId{1});
+  Body surface(GeometryId{1});
   makeBody(m_start, m_triangles, m_threads, surface);
   const auto positions = m_body.mesh.now.body();
   std::vector<double> outside(positions.size(), 0.0);
@@ -369,7 +369,7 @@ void Simplifier::checkComponents() {
   for (std::uint32_t v = 0; v < components.size(); ++v)
     if (components[v] == v && m_certificate.isInside(m_moved[v], stack))
       m_isBad[m_components[m_origin[v]]] = 1;
-  SearchableGeometry surface(GeometryId{1});
+  Body surface(GeometryId{1});
   makeBody(m_moved, m_triangles, m_threads, surface);
   const SimplifyCertificate inside(surface, m_settings.maxDistance, 0.0);
   const auto positions = m_body.mesh.now.body();
@@ -437,7 +437,7 @@ void Simplifier::giveUp() const {
 /// The first two triangles of the mesh that have a common point and no common vertex.
 std::optional<ElementPair> Simplifier::findCrossing() const {
   struct Search {
-    const SearchableGeometry& body;
+    const Body& body;
     std::optional<ElementPair> first{};
     void test(const ElementPair& pair) {
       const auto& triangles = body.mesh.topology.triangles;

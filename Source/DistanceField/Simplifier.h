@@ -5,7 +5,7 @@
 #include "Core/Threads.h"
 #include "DistanceField/SimplifyCertificate.h"
 #include "DistanceField/SimplifyOffset.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -23,8 +23,7 @@ namespace palpate {
 class Simplifier {
  public:
   /// largest: L, of the mesh's coordinates. The body's octree must be up to date.
-  Simplifier(const SearchableGeometry& body, const SimplifySettings&, double largest,
-             const Threads&);
+  Simplifier(const Body& body, const SimplifySettings&, double largest, const Threads&);
   SimplifiedMesh run();
 
  private:
@@ -60,7 +59,7 @@ class Simplifier {
   void forEach(std::size_t size, F&& f);
   void report(double share);
 
-  const SearchableGeometry& m_body;
+  const Body& m_body;
   const SimplifySettings& m_settings;
   const Threads& m_threads;
   const SimplifyCertificate m_certificate;

@@ -8,7 +8,7 @@
 #include "Core/Threads.h"
 #include "DistanceField/ClosedBody.h"
 #include "DistanceField/Simplifier.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <algorithm>
 #include <string>
@@ -55,7 +55,7 @@ SimplifiedMesh simplify(const TriangleMeshView& mesh, const SimplifySettings& se
   checkPositive(settings.maxDistance, "maxDistance");
   checkThreads(settings.threads);
   const Threads threads(settings.threads);
-  SearchableGeometry body(GeometryId{0});
+  Body body(GeometryId{0});
   makeClosedBody(mesh, threads, body);
   const double largest = checkSize(mesh, settings.maxDistance);
   return Simplifier(body, settings, largest, threads).run();

@@ -29,8 +29,7 @@ constexpr double kBelowShare = 1.0 - 0x1p-16;
 
 }  // namespace
 
-SimplifyCertificate::SimplifyCertificate(const SearchableGeometry& geometry, double maxDistance,
-                                         double largest)
+SimplifyCertificate::SimplifyCertificate(const Body& geometry, double maxDistance, double largest)
     : m_geometry(geometry),
       m_frame(geometry),
       m_maxDistance(maxDistance),

@@ -2,7 +2,7 @@
 
 #include "Math/TriangleIntersection.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Queries/VertexSearch.h"
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ class SimplifyCertificate {
  public:
   /// largest: L, of all coordinates of triangles and mesh. The geometry's octree must be up to
   /// date.
-  SimplifyCertificate(const SearchableGeometry&, double maxDistance, double largest);
+  SimplifyCertificate(const Body&, double maxDistance, double largest);
 
   /// Writes the triangles of the mesh with which this one has a point in common, by their places in
   /// the octree's order. Decided exactly.
@@ -46,7 +46,7 @@ class SimplifyCertificate {
   std::optional<double> bound(const Corners&, const std::array<Foot, 3>&, int depth,
                               PointQueryStack&) const;
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const PointFrame m_frame;
   double m_maxDistance, m_slack;  ///< L
 };

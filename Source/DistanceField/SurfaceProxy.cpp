@@ -353,7 +353,9 @@ class SurfaceProxyBuilder {
     if (total.fetch_add(size, std::memory_order_relaxed) + size > most)
       throw Error(ErrorCode::TooLarge,
                   "the leaves of a surface proxy need more than " + std::to_string(most) + " " +
-                      what + ": the thickness and the radii are too large for the body");
+                      what +
+                      ": the thickness and the radii are too large for the body, or it has too "
+                      "many triangles apart from each other");
   }
   void countListed(std::size_t size) const {
     count(size, m_listed, m_settings.mostListed, kInLists);

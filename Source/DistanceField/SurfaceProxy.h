@@ -17,7 +17,7 @@ struct ProxySettings {
   double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
   /// Most triangles that are compared with nodes while the leaves are built, and most in lists of
   /// leaves and of nodes that are divided last.
-  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 26;
+  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 25;
   friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
 };
 

@@ -21,8 +21,7 @@ const Vector3d kAside{0.0131, 0.0277, 0.0193};
 
 }  // namespace
 
-SurfaceSign::SurfaceSign(const SearchableGeometry& body, bool isClosed)
-    : m_body(body), m_isClosed(isClosed) {
+SurfaceSign::SurfaceSign(const Body& body, bool isClosed) : m_body(body), m_isClosed(isClosed) {
   if (!isClosed) m_boundary.emplace(body.mesh);
 }
 
@@ -38,7 +37,7 @@ SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius,
                change = way * m_boundary->steepness(centre, radius, kMostDefect / way);
   if (!(change < kMostDefect)) return Reliability::Unknown;
   const SolidAngleShare number =
-      m_body.windingNumbers.value(m_body, centre + radius * kAside, kNumberError, stack);
+      m_body.prepared->windingNumbers.value(m_body, centre + radius * kAside, kNumberError, stack);
   const double defect = std::abs(number.value - std::round(number.value)),
                doubt = change + number.error + kFieldError;
   if (defect + doubt < kMostDefect) return Reliability::Reliable;

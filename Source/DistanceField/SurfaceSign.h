@@ -2,7 +2,7 @@
 
 #include "DistanceField/BoundaryCurve.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -26,7 +26,7 @@ class SurfaceSign {
   };
 
   /// body: its octree must be up to date, and its windingNumbers unless it is closed.
-  SurfaceSign(const SearchableGeometry& body, bool isClosed);
+  SurfaceSign(const Body& body, bool isClosed);
 
   bool isClosed() const { return m_isClosed; }
   bool isInside(const Eigen::Vector3d&, PointQueryStack&) const;
@@ -36,7 +36,7 @@ class SurfaceSign {
   double reach() const;
 
  private:
-  const SearchableGeometry& m_body;
+  const Body& m_body;
   const bool m_isClosed;
   std::optional<BoundaryCurve> m_boundary;  ///< unless closed
 };

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include <cstddef>
+#include <cstring>
 #include <memory>
 #include <span>
 #include <utility>
@@ -26,6 +27,11 @@ struct RigidTransform {
       return rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
     };
     return {row(0), row(1), row(2)};
+  }
+  /// Also of zeros, whose signs can reach positions.
+  bool hasBitsOf(const RigidTransform& other) const {
+    return std::memcmp(rotation.data(), other.rotation.data(), sizeof rotation) == 0 &&
+           std::memcmp(translation.data(), other.translation.data(), sizeof translation) == 0;
   }
   friend bool operator==(const RigidTransform& l, const RigidTransform& r) {
     return l.rotation == r.rotation && l.translation == r.translation;
@@ -80,7 +86,7 @@ class Positions {
   }
 
   Revision bodyRevision() const { return m_bodyRevision; }
-  Revision transformRevision() const { return m_transformRevision; }
+  PositionsState state() const { return {m_bodyRevision, m_transformRevision}; }
   bool isSameAs(const Positions& other) const {
     return hasSameBody(other) && m_transformRevision == other.m_transformRevision;
   }

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 
 namespace palpate {
@@ -27,26 +25,37 @@ class RevisionCounter {
   std::uint64_t m_last = 0;
 };
 
-/// The states that a derived value was computed from: the one place that compares revisions.
+/// The elements of a geometry: their topology with the shape at rest, and which are enabled.
+struct ElementsState {
+  Revision topology, enabled;
+  friend bool operator==(const ElementsState&, const ElementsState&) = default;
+};
+
+/// Positions at one end of a step: those in the body's frame, and the transform.
+struct PositionsState {
+  Revision body, transform;
+  friend bool operator==(const PositionsState&, const PositionsState&) = default;
+};
+
+/// The state that a derived value was computed from, of named revisions: the one place that
+/// compares them.
 ///
 /// Code that computes the value calls invalidate() before the first change to it and commit() after
 /// the last one. If a computation fails, the value therefore counts as outdated.
-template <std::size_t count>
+template <class State>
 class DerivedFrom {
  public:
-  using Sources = std::array<Revision, count>;
-
-  bool isCurrent(const Sources& sources) const { return m_isValid && m_sources == sources; }
+  bool isCurrent(const State& state) const { return m_isValid && m_state == state; }
   bool isValid() const { return m_isValid; }
-  const Sources& sources() const { return m_sources; }
+  const State& state() const { return m_state; }  ///< of the last commit()
   void invalidate() { m_isValid = false; }
-  void commit(const Sources& sources) {
-    m_sources = sources;
+  void commit(const State& state) {
+    m_state = state;
     m_isValid = true;
   }
 
  private:
-  Sources m_sources{};
+  State m_state{};
   bool m_isValid = false;
 };
 

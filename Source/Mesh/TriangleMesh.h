@@ -6,7 +6,6 @@
 #include "Mesh/Positions.h"
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,7 +61,6 @@ struct MeshTopology {
   bool hasOnlyClosedStars = true;           ///< the enabled triangles are a closed surface
   CountedVector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
   CountedVector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
-  std::optional<bool> closed;               ///< and consistently oriented; set when first needed
 
   /// Disables these triangles and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.

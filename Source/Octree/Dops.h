@@ -57,7 +57,7 @@ struct DopMap {
 
 /// Sets one end's map. It takes for each direction the combination that is least for the mean half
 /// widths of the tree's leaves. thickness: along any unit vector. error: along an axis, as
-/// forEachBodyEnd() in Queries/SearchableGeometry.cpp derives it.
+/// forEachBodyEnd() in Bodies/Body.cpp derives it.
 ///
 /// Rounding. Let u be 2^-53, d a direction, and m the matrix. c = d m has components with an error
 /// of 2 u sqrt(3), and their magnitudes sum up to 3 at most. Let E be three old directions, as

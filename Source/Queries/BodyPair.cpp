@@ -16,7 +16,7 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
-void BodyVertices::assign(const SearchableGeometry& geometry) {
+void BodyVertices::assign(const Body& geometry) {
   const auto& now = geometry.mesh.now;
   positions.resize(now.size());
   for (std::size_t v = 0; v < now.size(); ++v) positions[v] = now[v];
@@ -59,17 +59,21 @@ Vector3d BodyVertices::furthest(const Vector3d& direction) const {
   return positions[best];
 }
 
-BodyPair::BodyPair(const SearchableGeometry& a, const SearchableGeometry& b, Engine engine,
-                   BodyPairScratch& scratch)
-    : m_a(a), m_b(b), m_engine(engine), m_scratch(scratch) {
+BodyPair::BodyPair(const Body& a, const Body& b, Engine engine, BodyPairScratch& scratch,
+                   Moved moved)
+    : m_a(a),
+      m_b(b),
+      m_engine(engine),
+      m_movesTransform(moved == Moved::Body && a.isPlaced()),
+      m_scratch(scratch) {
   scratch.a.assign(a);
   scratch.b.assign(b);
   m_magnitude = std::max(scratch.a.magnitude(), scratch.b.magnitude());
 }
 
 Vector3d BodyPair::moved(std::uint32_t vertex, const Vector3d& shift) const {
+  if (!m_movesTransform) return m_scratch.a.positions[vertex] + shift;
   const Positions& now = m_a.mesh.now;
-  if (!now.isPlaced()) return m_scratch.a.positions[vertex] + shift;
   RigidTransform transform = now.transform();
   transform.translation += shift;
   return transform(now.body()[vertex]);

@@ -7,7 +7,7 @@
 #include "Octree/PointQueries.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/RayHits.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -27,7 +27,7 @@ struct BodyVertices {
   CountedVector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
   Eigen::AlignedBox3d box;                   ///< of the vertices that are in triangles
 
-  void assign(const SearchableGeometry&);
+  void assign(const Body&);
   double magnitude() const;  ///< L: the largest coordinate
   /// The vertex that is furthest along a direction.
   Eigen::Vector3d furthest(const Eigen::Vector3d& direction) const;
@@ -47,14 +47,18 @@ struct BodyPairScratch {
   std::vector<RayHits::Met> met;
 };
 
-/// Two closed meshes with triangles, and exact tests of both where a is moved by a translation. A
-/// vertex of a is then where the caller finds it: at fl(position + shift), or of a placed body by
-/// the transform with the translation fl(translation + shift).
+/// What a translation moves.
+enum class Moved : std::uint8_t {
+  Positions,  ///< in the world, also of a placed body: to fl(position + shift)
+  Body        ///< as the caller would: a placed body's translation, to fl(translation + shift)
+};
+
+/// Two closed meshes with triangles, and exact tests of both where a is moved by a translation.
 class BodyPair {
  public:
-  BodyPair(const SearchableGeometry& a, const SearchableGeometry& b, Engine, BodyPairScratch&);
+  BodyPair(const Body& a, const Body& b, Engine, BodyPairScratch&, Moved = Moved::Body);
 
-  const SearchableGeometry& geometry(bool ofA) const { return ofA ? m_a : m_b; }
+  const Body& geometry(bool ofA) const { return ofA ? m_a : m_b; }
   const BodyVertices& vertices(bool ofA) const { return ofA ? m_scratch.a : m_scratch.b; }
   double magnitude() const { return m_magnitude; }  ///< L: the largest coordinate
 
@@ -102,8 +106,9 @@ class BodyPair {
   Eigen::Vector3d moved(std::uint32_t vertexOfA, const Eigen::Vector3d& shift) const;
   bool isInMovedA(const Eigen::Vector3d& p, const Eigen::Vector3d& shift) const;
 
-  const SearchableGeometry &m_a, &m_b;
+  const Body &m_a, &m_b;
   const Engine m_engine;
+  const bool m_movesTransform;
   BodyPairScratch& m_scratch;
   double m_magnitude;
 };

@@ -299,7 +299,7 @@ class Search {
   }
   SurfacePoint pointOf(bool ofA) const {
     const std::uint32_t element = ofA ? m_best.last.elementA : m_best.last.elementB;
-    const SearchableGeometry& geometry = m_pair.geometry(ofA);
+    const Body& geometry = m_pair.geometry(ofA);
     const Triangle& vertices = geometry.mesh.topology.triangles[element];
     Vector3d weights = (ofA ? m_best.last.weightsA : m_best.last.weightsB).cwiseMax(0.0);
     weights /= weights.sum();
@@ -329,14 +329,14 @@ class Search {
 
 }  // namespace
 
-Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry& b, Engine engine,
-                          PenetrationScratch& scratch, const PenetrationEffort& effort) {
-  const auto none = [](const SearchableGeometry& geometry) {
+Penetration penetrationOf(const Body& a, const Body& b, Engine engine, PenetrationScratch& scratch,
+                          const PenetrationEffort& effort) {
+  const auto none = [](const Body& geometry) {
     return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
   };
   const Penetration apart{false, Vector3d::Zero(), 0.0, none(a), none(b), true};
   if (a.mesh.topology.triangles.empty() || b.mesh.topology.triangles.empty()) return apart;
-  const BodyPair pair(a, b, engine, scratch.pair);
+  const BodyPair pair(a, b, engine, scratch.pair, effort.moved);
   if (!overlap(pair, scratch.meetings)) return apart;
   return Search(pair, scratch, effort).run();
 }

@@ -35,11 +35,12 @@ struct PenetrationEffort {
   int translations;      ///< so many directions start a descent; more if none of them separates
   std::size_t inside;    ///< vertices of a body that are tested
   bool aroundTheSphere;  ///< whether directions around the sphere are tried
+  Moved moved;
 };
 /// For the query.
-constexpr PenetrationEffort kThorough{24, 1024, true};
-/// For contacts of bodies: a direction that leaves is enough.
-constexpr PenetrationEffort kQuick{2, 64, false};
+constexpr PenetrationEffort kThorough{24, 1024, true, Moved::Body};
+/// For contacts of bodies: a direction that leaves is enough. They are those of the positions.
+constexpr PenetrationEffort kQuick{2, 64, false, Moved::Positions};
 
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).
 ///
@@ -49,7 +50,7 @@ constexpr PenetrationEffort kQuick{2, 64, false};
 ///          faces that meet or are inside, and a set around the sphere. Rays from inside vertices
 ///          bound the depth of each from below. From the best ones the search goes on to the
 ///          shortest translation that satisfies all contacts at which translations ended.
-Penetration penetrationOf(const SearchableGeometry& a, const SearchableGeometry& b, Engine,
-                          PenetrationScratch&, const PenetrationEffort& = kThorough);
+Penetration penetrationOf(const Body& a, const Body& b, Engine, PenetrationScratch&,
+                          const PenetrationEffort& = kThorough);
 
 }  // namespace palpate

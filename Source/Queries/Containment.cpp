@@ -25,7 +25,7 @@ constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
 /// Point queries for one body.
 class BodyQuery {
  public:
-  BodyQuery(const SearchableGeometry& geometry, Engine engine, PointQueryStack& stack)
+  BodyQuery(const Body& geometry, Engine engine, PointQueryStack& stack)
       : m_geometry(geometry),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
@@ -88,7 +88,7 @@ class BodyQuery {
                               -near->closest.normal,
                               near->closest.distance,
                               true};
-    if (m_geometry.mesh.topology.closed != true || !(result.depth > 0)) return result;
+    if (!m_geometry.isKnownClosed() || !(result.depth > 0)) return result;
     const int number = windingNumber(p).value_or(0);
     const auto numberAt = [this](const Eigen::Vector3d& q) { return windingNumber(q); };
     if (number == 0 || outer.holds(p, *near, number, numberAt)) return result;
@@ -112,7 +112,7 @@ class BodyQuery {
     return static_cast<std::uint32_t>(m_geometry.tree.ordered().size());
   }
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   bool m_bruteForce;
   PointQueryStack& m_stack;
   PointFrame m_frame;
@@ -122,7 +122,7 @@ class BodyQuery {
 /// Whether points are inside a body, and their surface points.
 class InsideQuery {
  public:
-  InsideQuery(const SearchableGeometry& body, const InsideSettings& settings, Engine engine,
+  InsideQuery(const Body& body, const InsideSettings& settings, Engine engine,
               PointQueryStack& stack)
       : m_body(body),
         m_settings(settings),
@@ -134,10 +134,10 @@ class InsideQuery {
 
   WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
     if (m_settings.rule == InsideRule::WindingNumber) {
-      const WindingNumbers::Result found =
-          m_body.windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce, m_stack);
+      const WindingNumbers::Result found = m_body.prepared->windingNumbers.evaluate(
+          m_body, p, m_settings.margin, m_bruteForce, m_stack);
       // That of a closed surface is an integer, which is exact where rounding leaves the sum open.
-      if (found.decided || m_body.mesh.topology.closed != true) return found;
+      if (found.decided || !m_body.isKnownClosed()) return found;
       return {m_surface.windingNumber(p).value_or(0) != 0, true};
     }
     if (m_solid) return {m_solid->lowest(p).has_value(), true};
@@ -148,7 +148,7 @@ class InsideQuery {
   }
 
  private:
-  const SearchableGeometry& m_body;
+  const Body& m_body;
   const InsideSettings& m_settings;
   const bool m_bruteForce;
   PointQueryStack& m_stack;
@@ -158,21 +158,21 @@ class InsideQuery {
 
 }  // namespace
 
-bool isInside(const SearchableGeometry& body, const Eigen::Vector3d& point,
-              const InsideSettings& settings, Engine engine, PointQueryStack& stack) {
+bool isInside(const Body& body, const Eigen::Vector3d& point, const InsideSettings& settings,
+              Engine engine, PointQueryStack& stack) {
   return body.tree.octree().size() > 0 &&
          InsideQuery(body, settings, engine, stack).evaluate(point).inside;
 }
 
-int windingNumber(const SearchableGeometry& body, const Eigen::Vector3d& point, Engine engine,
+int windingNumber(const Body& body, const Eigen::Vector3d& point, Engine engine,
                   PointQueryStack& stack) {
   if (body.tree.octree().size() == 0) return 0;
   return BodyQuery(body, engine, stack).windingNumber(point).value_or(0);
 }
 
-void findInside(const SearchableGeometry& vertices, const SearchableGeometry& body,
-                const InsideSettings& settings, Engine engine, const Threads& threads,
-                VertexSearch<InsideVertex>& scratch, std::vector<InsideVertex>& out) {
+void findInside(const Body& vertices, const Body& body, const InsideSettings& settings,
+                Engine engine, const Threads& threads, VertexSearch<InsideVertex>& scratch,
+                std::vector<InsideVertex>& out) {
   if (body.tree.octree().size() == 0) return out.clear();
   const OuterSurface outer(body, engine == Engine::BruteForce);
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
@@ -189,19 +189,24 @@ void findInside(const SearchableGeometry& vertices, const SearchableGeometry& bo
   });
 }
 
-bool isClosed(SearchableGeometry& body) {
+bool isClosed(const Body& body) {
   const bool hasClosed = hasClosedSurface(body);  // remembered for BodyQuery
   return body.solid || hasClosed;                 // tetrahedra define their inside
 }
 
-bool hasClosedSurface(SearchableGeometry& body) {
-  MeshTopology& topology = body.mesh.topology;
+bool hasClosedSurface(const Body& body) {
+  const MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces()) return false;
-  if (!topology.closed) topology.closed = findMeshDefects(topology.triangles).closed();
-  return *topology.closed;
+  PreparedData& prepared = *body.prepared;
+  if (!prepared.closedVersion.isCurrent(body.revisions.elements.topology)) {
+    prepared.closedVersion.invalidate();
+    prepared.isClosed = findMeshDefects(topology.triangles).closed();
+    prepared.closedVersion.commit(body.revisions.elements.topology);
+  }
+  return prepared.isClosed;
 }
 
-void checkSettings(const SearchableGeometry& body, const InsideSettings& settings) {
+void checkSettings(const Body& body, const InsideSettings& settings) {
   if (settings.rule != InsideRule::Closed && settings.rule != InsideRule::WindingNumber)
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(body) + ": rule is " + std::to_string(static_cast<int>(settings.rule)) +
@@ -214,7 +219,7 @@ void checkSettings(const SearchableGeometry& body, const InsideSettings& setting
                 body.id);
 }
 
-void checkInside(SearchableGeometry& body, InsideRule rule) {
+void checkInside(const Body& body, InsideRule rule) {
   const MeshTopology& topology = body.mesh.topology;
   if (!topology.hasFaces())
     throw Error(ErrorCode::NotClosed,

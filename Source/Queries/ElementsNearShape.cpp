@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-void findElementsNear(const SearchableGeometry& geometry, const Shape& before, const Shape& now,
+void findElementsNear(const Body& geometry, const Shape& before, const Shape& now,
                       double maxDistance, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
   using Eigen::Vector3d;
   const bool wholeStep = &before != &now;
@@ -48,8 +48,8 @@ void findElementsNear(const SearchableGeometry& geometry, const Shape& before, c
                      });
 }
 
-void findElementsNear(const SearchableGeometry& geometry, const Eigen::AlignedBox3d& box,
-                      bool wholeStep, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+void findElementsNear(const Body& geometry, const Eigen::AlignedBox3d& box, bool wholeStep,
+                      PointQueryStack& stack, Buffer<std::uint32_t>& out) {
   const Eigen::Vector3d origin = worldOrigin(geometry);
   const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
   const double unit = 1.0 / geometry.tree.frame().scale,

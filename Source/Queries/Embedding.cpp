@@ -4,17 +4,19 @@
 
 namespace palpate {
 
-void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings& settings,
-                      const Threads& threads) {
-  const DerivedFrom<2>::Sources now{solid.revisions.topology, solid.mesh.now.bodyRevision()};
+void updateTetrahedra(const Body& solid, const OctreeSettings& settings, const Threads& threads) {
+  PreparedData& prepared = *solid.prepared;
+  auto& version = prepared.tetrahedraVersion;
   const FloatFrame& frame = solid.tree.frame();
-  Solid& tetrahedra = *solid.solid;
-  if (tetrahedra.treeVersion.isCurrent(now) && tetrahedra.treeFrame == frame) return;
-  tetrahedra.treeVersion.invalidate();
-  tetrahedra.tree.update(tetrahedra.topology.tetrahedra, solid.tree.floats(),
-                         solid.tree.spread() * frame.scale, settings, threads);
-  tetrahedra.treeFrame = frame;
-  tetrahedra.treeVersion.commit(now);
+  const PreparedData::TetrahedraState now{solid.revisions.elements.topology,
+                                          solid.mesh.now.bodyRevision(), frame};
+  if (version.isCurrent(now)) return;
+  if (!prepared.tetrahedra || version.state().topology != now.topology)
+    prepared.tetrahedra.emplace();
+  version.invalidate();
+  prepared.tetrahedra->update(solid.solid->topology.tetrahedra, solid.tree.floats(),
+                              solid.tree.spread() * frame.scale, settings, threads);
+  version.commit(now);
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
@@ -32,16 +34,15 @@ std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
     for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) testOne(i, tetrahedra[i]);
     return best;
   }
-  const TetrahedronTree& tree = m_solid.solid->tree;
+  const TetrahedronTree& tree = *m_solid.prepared->tetrahedra;
   if (tree.octree().size() == 0) return best;
   findOverlapping(tree.octree(), m_frame.map(), m_frame.boxOf(p), m_stack);
   for (const std::uint32_t i : m_stack.found) testOne(tree.octree().order()[i], tree.ordered()[i]);
   return best;
 }
 
-void findEmbedded(const SearchableGeometry& vertices, const SearchableGeometry& solid,
-                  Engine engine, const Threads& threads, VertexSearch<EmbeddedVertex>& scratch,
-                  std::vector<EmbeddedVertex>& out) {
+void findEmbedded(const Body& vertices, const Body& solid, Engine engine, const Threads& threads,
+                  VertexSearch<EmbeddedVertex>& scratch, std::vector<EmbeddedVertex>& out) {
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {
     return [&, query = SolidQuery(solid, engine, stack)](
                std::uint32_t v) mutable -> std::optional<EmbeddedVertex> {

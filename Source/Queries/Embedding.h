@@ -11,13 +11,13 @@ namespace palpate {
 
 /// Updates the octree over a solid's tetrahedra to the positions now. The octree over its surface
 /// must be up to date.
-void updateTetrahedra(SearchableGeometry& solid, const OctreeSettings&, const Threads&);
+void updateTetrahedra(const Body& solid, const OctreeSettings&, const Threads&);
 
 /// Finds the tetrahedron of a solid that contains a point. The octree over the tetrahedra must be
 /// up to date.
 class SolidQuery {
  public:
-  SolidQuery(const SearchableGeometry& solid, Engine engine, PointQueryStack& stack)
+  SolidQuery(const Body& solid, Engine engine, PointQueryStack& stack)
       : m_solid(solid),
         m_bruteForce(engine == Engine::BruteForce),
         m_stack(stack),
@@ -27,7 +27,7 @@ class SolidQuery {
   std::optional<TetrahedronPoint> lowest(const Eigen::Vector3d& p);
 
  private:
-  const SearchableGeometry& m_solid;
+  const Body& m_solid;
   bool m_bruteForce;
   PointQueryStack& m_stack;
   PointFrame m_frame;
@@ -35,7 +35,7 @@ class SolidQuery {
 
 /// Finds the vertices of one geometry that are in tetrahedra of another, with their weights there.
 /// `out`: ascending vertices.
-void findEmbedded(const SearchableGeometry& vertices, const SearchableGeometry& solid, Engine,
-                  const Threads&, VertexSearch<EmbeddedVertex>&, std::vector<EmbeddedVertex>& out);
+void findEmbedded(const Body& vertices, const Body& solid, Engine, const Threads&,
+                  VertexSearch<EmbeddedVertex>&, std::vector<EmbeddedVertex>& out);
 
 }  // namespace palpate

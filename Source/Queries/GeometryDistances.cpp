@@ -27,8 +27,8 @@ using Eigen::Vector3d;
 
 namespace {
 
-SurfacePoint surfacePoint(const SearchableGeometry& geometry, std::uint32_t element,
-                          const Vector3d& weights, double distance) {
+SurfacePoint surfacePoint(const Body& geometry, std::uint32_t element, const Vector3d& weights,
+                          double distance) {
   const Triangle& vertices = geometry.mesh.topology.triangles[element];
   Vector3d position = Vector3d::Zero();
   for (int i = 0; i < 3; ++i)
@@ -40,20 +40,20 @@ SurfacePoint noPoint(GeometryId id) {
   return {id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), kInfinity};
 }
 
-Eigen::Matrix3d rotationOf(const SearchableGeometry& geometry) {
+Eigen::Matrix3d rotationOf(const Body& geometry) {
   return geometry.isPlaced() ? geometry.mesh.now.transform().rotation
                              : Eigen::Matrix3d::Identity().eval();
 }
 
 /// The sum of the coordinates that positions in the world come from.
-double magnitudeOf(const SearchableGeometry& geometry) {
+double magnitudeOf(const Body& geometry) {
   return worldOrigin(geometry).cwiseAbs().sum() + geometry.tree.frame().origin.cwiseAbs().sum();
 }
 
 float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
 
 /// A direction in the frame of a geometry's floats.
-std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d& direction) {
+std::array<float, 3> inFloats(const Body& geometry, const Vector3d& direction) {
   const Vector3d inBody = rotationOf(geometry).transpose() * direction;
   return {static_cast<float>(inBody[0]), static_cast<float>(inBody[1]),
           static_cast<float>(inBody[2])};
@@ -61,7 +61,7 @@ std::array<float, 3> inFloats(const SearchableGeometry& geometry, const Vector3d
 
 /// Bounds the error of heights in a geometry's floats, and of their offset. Positions and direction
 /// are off by 2^-24 along each axis, and there are four more roundings.
-double heightsErrorOf(const SearchableGeometry& geometry) {
+double heightsErrorOf(const Body& geometry) {
   const FloatBox root = geometry.tree.octree().box(0);
   if (root.mayBeClamped()) return kInfinity;
   float largest = 0;
@@ -79,7 +79,7 @@ double sizeOf(const FloatBox& box) {
 
 }  // namespace
 
-BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b, const Vector3d& shift) {
+BoxMap mapBetween(const Body& a, const Body& b, const Vector3d& shift) {
   BoxMap map;
   const double scale = a.tree.frame().scale;
   const Eigen::Matrix3d toA = rotationOf(a).transpose(), rotation = toA * rotationOf(b);
@@ -93,11 +93,11 @@ BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b, cons
   return map;
 }
 
-PairSide sideOf(const SearchableGeometry& geometry, const BoxMap& map) {
+PairSide sideOf(const Body& geometry, const BoxMap& map) {
   return {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), map};
 }
 
-double boxErrorOf(const SearchableGeometry& a, const SearchableGeometry& b) {
+double boxErrorOf(const Body& a, const Body& b) {
   return 4 * kOrthonormal * (sizeOf(a.tree.octree().box(0)) + sizeOf(b.tree.octree().box(0)));
 }
 
@@ -106,7 +106,7 @@ namespace {
 /// The nearest pair of elements that was found so far.
 class NearestPair {
  public:
-  NearestPair(const SearchableGeometry& a, const SearchableGeometry& b)
+  NearestPair(const Body& a, const Body& b)
       : m_a(a), m_b(b), m_radii(a.mesh.largestRadius + b.mesh.largestRadius) {}
 
   /// Tests the elements at two places of the octrees' orders.
@@ -156,7 +156,7 @@ class NearestPair {
   static constexpr double kTestsPerPairs = 0x1p-6;
 
   /// By place: whether no lower element has the same corners and radii.
-  static std::vector<std::uint8_t> lowestOfCoincident(const SearchableGeometry& geometry) {
+  static std::vector<std::uint8_t> lowestOfCoincident(const Body& geometry) {
     using Key = std::array<std::array<double, 4>, 3>;  // positions and radius of the corners
     std::vector<std::pair<Key, std::uint32_t>> keys;
     const auto& ordered = geometry.tree.ordered();
@@ -180,41 +180,46 @@ class NearestPair {
     return lowest;
   }
 
-  /// Whether an element holds the vertex of the nearest pair, and lies behind the plane through it
-  /// across the way to the other vertex, decided exactly. Two such elements are as near as the
-  /// vertices are. place: in the octree's order.
+  /// Whether an element has a corner at the vertex of the nearest pair, and lies behind the plane
+  /// through it across the way to the other vertex, decided exactly. Two such elements are as near
+  /// as the vertices are. place: in the octree's order.
   struct AtVertex {
-    std::uint32_t vertex = kNoElement;
+    std::optional<Vector3d> at{};
     enum class Answer : std::uint8_t { Unknown, No, Yes };
     std::vector<Answer> known{};  ///< by place
 
-    bool holds(std::uint32_t place, const SearchableGeometry& geometry, const Vector3d& other) {
+    bool holds(std::uint32_t place, const Body& geometry, const Vector3d& other) {
       if (known[place] == Answer::Unknown) {
         const Triangle& corners = geometry.tree.ordered()[place];
-        const Vector3d at = geometry.mesh.now[vertex];
-        const bool isBehind =
-            std::find(corners.begin(), corners.end(), vertex) != corners.end() &&
-            std::none_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
-              return corner != vertex && comesNearer(other, at, geometry.mesh.now[corner]);
-            });
+        const bool isBehind = cornerAt(geometry, place, *at) < 3 &&
+                              std::none_of(corners.begin(), corners.end(), [&](std::uint32_t v) {
+                                const Vector3d corner = geometry.mesh.now[v];
+                                return corner != *at && comesNearer(other, *at, corner);
+                              });
         known[place] = isBehind ? Answer::Yes : Answer::No;
       }
       return known[place] == Answer::Yes;
     }
   };
+  /// The first corner of an element at this position; 3: none.
+  static Eigen::Index cornerAt(const Body& geometry, std::uint32_t place, const Vector3d& at) {
+    const Triangle& corners = geometry.tree.ordered()[place];
+    return std::find_if(corners.begin(), corners.end(),
+                        [&](std::uint32_t v) { return geometry.mesh.now[v] == at; }) -
+           corners.begin();
+  }
   /// Sets the vertices of the nearest pair, if its points are vertices without radii.
   void findVertices() {
     if (m_lowestA.empty() || m_radii > 0.0 || !std::isfinite(m_best.distance)) return;
-    const auto set = [](AtVertex& side, const SearchableGeometry& geometry, std::uint32_t element,
+    const auto set = [](AtVertex& side, const Body& geometry, std::uint32_t element,
                         const Vector3d& weights) {
       Eigen::Index corner = 0;
       const bool isVertex = weights.maxCoeff(&corner) == 1.0;
-      const std::uint32_t vertex =
-          isVertex ? geometry.mesh.topology.triangles[element][static_cast<std::size_t>(corner)]
-                   : kNoElement;
-      if (vertex == side.vertex) return false;
-      side.vertex = vertex;
-      return true;
+      std::optional<Vector3d> at;
+      if (isVertex)
+        at = geometry.mesh
+                 .now[geometry.mesh.topology.triangles[element][static_cast<std::size_t>(corner)]];
+      return std::exchange(side.at, at) != at;
     };
     const bool a = set(m_atA, m_a, m_elementA, m_best.weightsA),
                b = set(m_atB, m_b, m_elementB, m_best.weightsB);
@@ -223,17 +228,11 @@ class NearestPair {
     m_atB.known.assign(m_b.tree.ordered().size(), AtVertex::Answer::Unknown);
   }
   bool areAtVertices(std::uint32_t placeA, std::uint32_t placeB) {
-    return m_atA.vertex != kNoElement && m_atB.vertex != kNoElement &&
-           m_atA.holds(placeA, m_a, m_b.mesh.now[m_atB.vertex]) &&
-           m_atB.holds(placeB, m_b, m_a.mesh.now[m_atA.vertex]);
-  }
-  static Vector3d weightsAt(const SearchableGeometry& geometry, std::uint32_t place,
-                            std::uint32_t vertex) {
-    const Triangle& corners = geometry.tree.ordered()[place];
-    return Vector3d::Unit(std::find(corners.begin(), corners.end(), vertex) - corners.begin());
+    return m_atA.at && m_atB.at && m_atA.holds(placeA, m_a, *m_atB.at) &&
+           m_atB.holds(placeB, m_b, *m_atA.at);
   }
 
-  static Element elementOf(const SearchableGeometry& geometry, std::uint32_t place) {
+  static Element elementOf(const Body& geometry, std::uint32_t place) {
     return {geometry.mesh, geometry.tree.ordered()[place]};
   }
   void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b) {
@@ -245,8 +244,8 @@ class NearestPair {
     if (m_best.distance == 0.0 && !precedes()) return;
     if (areAtVertices(placeA, placeB)) {
       if (!precedes()) return;
-      m_best.weightsA = weightsAt(m_a, placeA, m_atA.vertex);
-      m_best.weightsB = weightsAt(m_b, placeB, m_atB.vertex);
+      m_best.weightsA = Vector3d::Unit(cornerAt(m_a, placeA, *m_atA.at));
+      m_best.weightsB = Vector3d::Unit(cornerAt(m_b, placeB, *m_atB.at));
       m_elementA = elementA;
       m_elementB = elementB;
       return;
@@ -296,7 +295,7 @@ class NearestPair {
     return false;
   }
 
-  const SearchableGeometry &m_a, &m_b;
+  const Body &m_a, &m_b;
   const double m_radii;  ///< L: the largest ones of both
   double m_tests = 0;
   std::vector<std::uint8_t> m_lowestA, m_lowestB;  ///< by place; empty: all are tested
@@ -308,7 +307,7 @@ class NearestPair {
 
 /// Two elements near each other: each geometry's element nearest to a point of the other one, in
 /// turn.
-void startNear(const SearchableGeometry& a, const SearchableGeometry& b, NearestPair& nearest) {
+void startNear(const Body& a, const Body& b, NearestPair& nearest) {
   constexpr int kRounds = 4;
   std::uint32_t placeA = 0, placeB = 0;
   Vector3d point = worldOrigin(b);
@@ -332,8 +331,7 @@ void startNear(const SearchableGeometry& a, const SearchableGeometry& b, Nearest
 /// what test(element) would find in the box with this centre and these half extents, in L, in the
 /// world. test returns the least distance that was found so far.
 template <class Bound, class Test>
-void descend(const SearchableGeometry& geometry, bool bruteForce, double best, Bound&& bound,
-             Test&& test) {
+void descend(const Body& geometry, bool bruteForce, double best, Bound&& bound, Test&& test) {
   const Octree& octree = geometry.tree.octree();
   if (bruteForce) {
     for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) test(i);
@@ -401,8 +399,8 @@ NearestToShape nearestBallTo(const Shape& shape, const Element& segment) {
 
 }  // namespace
 
-GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce, std::unique_ptr<PairScratch>& scratch) {
+GeometryDistance distanceBetween(const Body& a, const Body& b, bool bruteForce,
+                                 std::unique_ptr<PairScratch>& scratch) {
   NearestPair nearest(a, b);
   const std::size_t sizeA = a.tree.ordered().size(), sizeB = b.tree.ordered().size();
   if (sizeA == 0 || sizeB == 0) return {noPoint(a.id), noPoint(b.id), kInfinity};
@@ -437,8 +435,8 @@ GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGe
   return nearest.result();
 }
 
-GeometryDistance distanceBetween(const SearchableGeometry& geometry, GeometryId id,
-                                 const Shape& shape, bool bruteForce) {
+GeometryDistance distanceBetween(const Body& geometry, GeometryId id, const Shape& shape,
+                                 bool bruteForce) {
   if (geometry.tree.ordered().empty()) return {noPoint(geometry.id), noPoint(id), kInfinity};
   std::uint32_t best = kNoElement;
   NearestToShape nearest{Vector3d::Zero(), Vector3d::Zero(), kInfinity, false};
@@ -519,8 +517,8 @@ GeometryDistance distanceBetween(GeometryId idA, const Shape& a, GeometryId idB,
   return out;
 }
 
-SegmentDistance distanceFromSegment(const SearchableGeometry& geometry, const Vector3d& p,
-                                    const Vector3d& q, double maxDistance, bool bruteForce) {
+SegmentDistance distanceFromSegment(const Body& geometry, const Vector3d& p, const Vector3d& q,
+                                    double maxDistance, bool bruteForce) {
   ElementDistance best;
   best.distance = maxDistance;
   std::uint32_t nearest = kNoElement;

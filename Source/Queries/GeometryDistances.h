@@ -3,7 +3,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Queries/PairTraversal.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/Shape.h"
 
 #include <memory>
@@ -11,13 +11,13 @@
 namespace palpate {
 
 /// A geometry for a search of pairs, with the map of its boxes to the common floats.
-PairSide sideOf(const SearchableGeometry&, const BoxMap&);
+PairSide sideOf(const Body&, const BoxMap&);
 /// The map of b's boxes to a's floats, where a is moved by `shift`, L in the world. a's rotation
 /// leaves distances from a's origin as they are within kOrthonormal.
-BoxMap mapBetween(const SearchableGeometry& a, const SearchableGeometry& b,
+BoxMap mapBetween(const Body& a, const Body& b,
                   const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
 /// In a's floats: boxes of elements with a common point may be so far apart in this map.
-double boxErrorOf(const SearchableGeometry& a, const SearchableGeometry& b);
+double boxErrorOf(const Body& a, const Body& b);
 
 /// The least distance between two geometries, of which at least one has elements. Of equally near
 /// pairs of elements, by computed distance, that of the lowest element of a, then of b. 0 if
@@ -28,11 +28,10 @@ double boxErrorOf(const SearchableGeometry& a, const SearchableGeometry& b);
 ///          is skipped if its boxes, in the frame of a, are further apart than the best pair of
 ///          elements, or if their heights along the direction of that pair are. scratch: null
 ///          before the first call.
-GeometryDistance distanceBetween(const SearchableGeometry& a, const SearchableGeometry& b,
-                                 bool bruteForce, std::unique_ptr<PairScratch>& scratch);
+GeometryDistance distanceBetween(const Body& a, const Body& b, bool bruteForce,
+                                 std::unique_ptr<PairScratch>& scratch);
 /// The same for a geometry with elements and a shape with this id, which is solid.
-GeometryDistance distanceBetween(const SearchableGeometry&, GeometryId, const Shape&,
-                                 bool bruteForce);
+GeometryDistance distanceBetween(const Body&, GeometryId, const Shape&, bool bruteForce);
 
 /// The same for two shapes. At most one may be a plane.
 GeometryDistance distanceBetween(GeometryId, const Shape&, GeometryId, const Shape&,
@@ -44,7 +43,7 @@ struct SegmentDistance {
   double weight;  ///< of q
   SurfacePoint nearest;
 };
-SegmentDistance distanceFromSegment(const SearchableGeometry&, const Eigen::Vector3d& p,
-                                    const Eigen::Vector3d& q, double maxDistance, bool bruteForce);
+SegmentDistance distanceFromSegment(const Body&, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                                    double maxDistance, bool bruteForce);
 
 }  // namespace palpate

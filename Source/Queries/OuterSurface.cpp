@@ -27,9 +27,24 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Directions at a point in which the outside is looked for. At most points few faces meet. At the
-/// tip of a fan one is enough.
+/// Planes at a point in front of which the outside is looked for, and between three of which. At
+/// most points few faces meet. At the tip of a fan one is enough.
 constexpr std::size_t kMostNormals = 32, kFewNormals = 6;
+
+/// Calls f(direction) for a direction on each combination of sides of three planes, until it is
+/// true. Returns whether it was.
+template <class F>
+bool anySector(const Vector3d& n1, const Vector3d& n2, const Vector3d& n3, F&& f) {
+  const Vector3d dual[] = {n2.cross(n3), n3.cross(n1), n1.cross(n2)};
+  const double volume = n1.dot(dual[0]);
+  if (!(std::abs(volume) > 0x1p-20)) return false;  // two planes have the same sectors
+  for (unsigned sides = 0; sides < 8; ++sides) {
+    Vector3d direction = Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) direction += (sides >> k & 1 ? -1.0 : 1.0) / volume * dual[k];
+    if (f(direction)) return true;
+  }
+  return false;
+}
 
 /// Along the line in which two triangles intersect, all points of both, or one. The ends are
 /// within rounding.
@@ -67,7 +82,7 @@ Vector3d closestOnSegment(const Vector3d& p, const Vector3d& a, const Vector3d& 
 
 }  // namespace
 
-OuterSurface::OuterSurface(const SearchableGeometry& geometry, bool bruteForce)
+OuterSurface::OuterSurface(const Body& geometry, bool bruteForce)
     : m_geometry(geometry), m_bruteForce(bruteForce) {}
 
 std::array<Vector3d, 3> OuterSurface::cornersOf(std::uint32_t element) const {
@@ -95,19 +110,13 @@ bool OuterSurface::isOutside(const Vector3d& q, const Vector3d& direction,
 
 bool OuterSurface::holds(const Vector3d& p, const PointDistances::Near& near, int number,
                          const WindingNumber& windingNumber) const {
-  const VertexTriangleDistance& closest = near.closest;
-  if (closest.feature == TriangleFeature::Face && std::abs(number) == 1) {
-    const auto [a, b, c] = cornersOf(near.element);
-    // Of a closed surface the number falls by 1 where a face is left through its front.
-    if ((windingNormal(a, b, c).dot(closest.normal) < 0) == (number > 0)) return true;
-  }
-  const Vector3d q = p - closest.difference;
+  const Vector3d q = p - near.closest.difference;
   if (!(aside(q) > 0x1p-900)) return true;  // nothing can be told so near to the smallest double
   return holdsPoint(q, p, number, windingNumber);
 }
 
-/// Whether some point beside q is outside. Tried are those in front of the triangles at q, and of
-/// pairs of them, and the one beyond q.
+/// Whether some point beside q is outside. Tried are the one beyond q, those in front of the
+/// triangles at q, and those on either side of pairs and triples of their planes.
 bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int number,
                               const WindingNumber& windingNumber) const {
   if (isOutside(q, q - from, windingNumber)) return true;
@@ -130,11 +139,18 @@ bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int numbe
   const double side = number > 0 ? 1.0 : -1.0;
   if (isOutside(q, side * sum, windingNumber)) return true;
   if (normals.size() < 2) return false;
-  for (std::size_t i = 0; i < std::min(normals.size(), kMostNormals); ++i) {
+  for (std::size_t i = 0; i < std::min(normals.size(), kMostNormals); ++i)
     if (isOutside(q, side * normals[i], windingNumber)) return true;
-    for (std::size_t j = 0; j < i && normals.size() > 2 && normals.size() <= kFewNormals; ++j)
-      if (isOutside(q, side * (normals[i] + normals[j]), windingNumber)) return true;
-  }
+  if (normals.size() > kFewNormals) return false;
+  const auto outside = [&](const Vector3d& way) { return isOutside(q, way, windingNumber); };
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const Vector3d &m = normals[i], &n = normals[j];
+      for (const Vector3d& way : {Vector3d(m + n), Vector3d(m - n), Vector3d(n - m)})
+        if (outside(way)) return true;
+      for (std::size_t k = 0; k < j; ++k)
+        if (anySector(m, n, normals[k], outside)) return true;
+    }
   return false;
 }
 
@@ -151,14 +167,18 @@ void OuterSurface::findCreases() const {
     if (!found.intersect()) return;
     std::vector<Vector3d> common;
     addCommonPoints(ofA, ofB, found, common);
+    m_parts.mixed.push_back(i);
+    m_parts.mixed.push_back(j);
     const Vector3d along =
         windingNormal(ofA[0], ofA[1], ofA[2]).cross(windingNormal(ofB[0], ofB[1], ofB[2]));
+    // Triangles in one plane have an area in common. Its outline ends at these points.
+    if (found.touch())
+      for (const Vector3d& point : common)
+        m_parts.creases.push_back({std::min(i, j), {point, point}});
     const auto [first, last] = std::minmax_element(
         common.begin(), common.end(),
         [&](const Vector3d& l, const Vector3d& r) { return along.dot(l) < along.dot(r); });
     m_parts.creases.push_back({std::min(i, j), {*first, *last}});
-    m_parts.mixed.push_back(i);
-    m_parts.mixed.push_back(j);
   };
   const std::span<const std::uint32_t> order = m_geometry.tree.octree().order();
   if (m_bruteForce) {
@@ -228,7 +248,7 @@ void OuterSurface::find(const WindingNumber& windingNumber) const {
   findCreases();
   m_parts.elementOf = outerTriangles(windingNumber);
   if (m_parts.elementOf.empty()) return;
-  m_parts.outer = std::make_unique<SearchableGeometry>(m_geometry.id);
+  m_parts.outer = std::make_unique<Body>(m_geometry.id);
   std::vector<Triangle> triangles;
   for (const std::uint32_t element : m_parts.elementOf)
     triangles.push_back(m_geometry.mesh.topology.triangles[element]);

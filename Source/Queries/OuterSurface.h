@@ -3,7 +3,7 @@
 #include <palpate/CountedVector.h>
 
 #include "Queries/PointDistances.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -25,7 +25,7 @@ class OuterSurface {
   /// L, in the world: the winding number of the body about a point; none on its surface.
   using WindingNumber = std::function<std::optional<int>(const Eigen::Vector3d&)>;
 
-  OuterSurface(const SearchableGeometry&, bool bruteForce);
+  OuterSurface(const Body&, bool bruteForce);
 
   /// Whether the surface point that is nearest to p is on the outer surface. number: the winding
   /// number about p, not 0.
@@ -54,9 +54,9 @@ class OuterSurface {
   };
   /// What the first search finds.
   struct Parts {
-    std::unique_ptr<SearchableGeometry> outer;  ///< triangles on the outer surface, whole
-    CountedVector<std::uint32_t> elementOf;     ///< of the body, by elements of `outer`
-    CountedVector<std::uint32_t> mixed;         ///< triangles that intersect others, ascending
+    std::unique_ptr<Body> outer;             ///< triangles on the outer surface, whole
+    CountedVector<std::uint32_t> elementOf;  ///< of the body, by elements of `outer`
+    CountedVector<std::uint32_t> mixed;      ///< triangles that intersect others, ascending
     CountedVector<Crease> creases;
   };
   void find(const WindingNumber&) const;
@@ -69,7 +69,7 @@ class OuterSurface {
   std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t element) const;
   double aside(const Eigen::Vector3d& p) const;
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const bool m_bruteForce;
   mutable std::once_flag m_isFound;
   mutable Parts m_parts;

@@ -55,8 +55,8 @@ double rootBetween(double from, double to, F&& f) {
 
 }  // namespace
 
-void findPathParts(const SearchableGeometry& body, const PathLine& path, double radius,
-                   bool bruteForce, std::vector<RayHits::Met>& met, PathScratch& scratch) {
+void findPathParts(const Body& body, const PathLine& path, double radius, bool bruteForce,
+                   std::vector<RayHits::Met>& met, PathScratch& scratch) {
   // Where a segment with a rounded direction is divided. No value is likely to be special.
   constexpr double kDivision = 0.618;
   std::vector<PathPart>& parts = scratch.parts;
@@ -91,11 +91,11 @@ void findPathParts(const SearchableGeometry& body, const PathLine& path, double 
   }
 }
 
-void addInvertedFaces(const SearchableGeometry& solid, const PathLine& path, bool bruteForce,
+void addInvertedFaces(const Body& solid, const PathLine& path, bool bruteForce,
                       PointQueryStack& stack, PathScratch& scratch) {
   const Positions& now = solid.mesh.now;
   const TetrahedralTopology& topology = solid.solid->topology;
-  const TetrahedronTree& tree = solid.solid->tree;
+  const TetrahedronTree& tree = *solid.prepared->tetrahedra;
   const PointFrame frame(solid);
   std::vector<PathPart>& inner = scratch.inner;
   inner.clear();
@@ -161,8 +161,7 @@ void findPathParts(const Shape& shape, const PathLine& path, double radius,
   }
 }
 
-PathClearance clearanceOf(const SearchableGeometry& body, const PathLine& path, double radius,
-                          bool bruteForce) {
+PathClearance clearanceOf(const Body& body, const PathLine& path, double radius, bool bruteForce) {
   PathClearance best{body.id,
                      kInfinity,
                      0.0,

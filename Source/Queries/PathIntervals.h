@@ -3,7 +3,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Queries/RayHits.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -55,7 +55,7 @@ struct PathScratch {
 
 /// Finds the parts of the path in which its ball meets the surface of a body with elements, by
 /// ascending arc length, into scratch.parts. They do not touch each other.
-void findPathParts(const SearchableGeometry& body, const PathLine&, double radius, bool bruteForce,
+void findPathParts(const Body& body, const PathLine&, double radius, bool bruteForce,
                    std::vector<RayHits::Met>& met, PathScratch&);
 /// The same for a shape. Its inside belongs to the parts.
 void findPathParts(const Shape&, const PathLine&, double radius, std::vector<PathPart>& parts);
@@ -63,8 +63,8 @@ void findPathParts(const Shape&, const PathLine&, double radius, std::vector<Pat
 /// Adds the places where the path meets faces of inverted tetrahedra to scratch.parts. The union of
 /// the tetrahedra may end at a face within the mesh where both its neighbours lie on one side of
 /// it: one of them is inverted. The octree over the tetrahedra must be up to date.
-void addInvertedFaces(const SearchableGeometry& solid, const PathLine&, bool bruteForce,
-                      PointQueryStack&, PathScratch&);
+void addInvertedFaces(const Body& solid, const PathLine&, bool bruteForce, PointQueryStack&,
+                      PathScratch&);
 
 /// Joins parts to the intervals in which the ball is in the body, and appends them.
 ///
@@ -100,7 +100,6 @@ void joinPathParts(GeometryId body, const PathLine& path, std::span<const PathPa
 }
 
 /// The least distance of the path to a body that it does not enter.
-PathClearance clearanceOf(const SearchableGeometry& body, const PathLine&, double radius,
-                          bool bruteForce);
+PathClearance clearanceOf(const Body& body, const PathLine&, double radius, bool bruteForce);
 
 }  // namespace palpate

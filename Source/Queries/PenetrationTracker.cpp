@@ -17,7 +17,7 @@ namespace {
 
 using Corners = std::array<Eigen::Vector3d, 3>;
 
-Corners cornersOf(const SearchableGeometry& body, const Triangle& t) {
+Corners cornersOf(const Body& body, const Triangle& t) {
   const Positions& now = body.mesh.now;
   return {now[t[0]], now[t[1]], now[t[2]]};
 }
@@ -80,10 +80,15 @@ struct PenetrationTracker::Implementation {
   class Search;
 
   GeometryId vertices, body;
-  std::uint64_t sourceId = 0;                ///< SpatialQueries::Source::id()
-  DerivedFrom<2> lastTopology, nowTopology;  ///< topology of the vertices' geometry and of the body
-  std::uint64_t step = 0;                    ///< in which `now` was computed
-  std::vector<VertexState> last, now;        ///< ascending vertices
+  std::uint64_t sourceId = 0;  ///< SpatialQueries::Source::id()
+  /// Of the vertices' geometry and of the body.
+  struct Topologies {
+    Revision vertices, body;
+    friend bool operator==(const Topologies&, const Topologies&) = default;
+  };
+  DerivedFrom<Topologies> lastTopology, nowTopology;
+  std::uint64_t step = 0;              ///< in which `now` was computed
+  std::vector<VertexState> last, now;  ///< ascending vertices
   std::vector<InsideVertex> inside;
   std::vector<TrackedVertex> found;
   std::vector<PointQueryStack> stacks;
@@ -92,7 +97,7 @@ struct PenetrationTracker::Implementation {
 /// Finds surface points along directions, and chooses the penetration direction of a vertex.
 class PenetrationTracker::Implementation::Search {
  public:
-  Search(const SearchableGeometry& body, Engine engine, PointQueryStack& stack)
+  Search(const Body& body, Engine engine, PointQueryStack& stack)
       : m_body(body), m_bruteForce(engine == Engine::BruteForce), m_stack(stack), m_frame(body) {}
 
   /// The first point of the surface from p along a unit direction, at most the distance `most`
@@ -145,7 +150,7 @@ class PenetrationTracker::Implementation::Search {
   }
 
  private:
-  const SearchableGeometry& m_body;
+  const Body& m_body;
   bool m_bruteForce;
   PointQueryStack& m_stack;
   PointFrame m_frame;
@@ -168,7 +173,7 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
   queries.findInsideVertices(all.vertices, all.body, all.inside);
   SpatialQueries::Source& source = queries.valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry &vertices = source.at(all.vertices), &body = source.at(all.body);
+  const Body &vertices = source.at(all.vertices), &body = source.at(all.body);
   const std::size_t size = all.inside.size(), parts = (size + kGrain - 1) / kGrain;
   const bool isSameSource = all.sourceId == source.id();
   const bool isNewStep = !isSameSource || all.step != source.step();
@@ -185,7 +190,8 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
   all.found.resize(size);
   all.now.resize(size);
   if (all.stacks.size() < parts) all.stacks.resize(parts);
-  const DerivedFrom<2>::Sources topologies{vertices.revisions.topology, body.revisions.topology};
+  const Implementation::Topologies topologies{vertices.revisions.elements.topology,
+                                              body.revisions.elements.topology};
   using VertexState = Implementation::VertexState;
   const std::span<const VertexState> previous = all.lastTopology.isCurrent(topologies)
                                                     ? std::span<const VertexState>(all.last)

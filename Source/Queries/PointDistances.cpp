@@ -18,7 +18,7 @@ namespace {
 /// Rounded up to float.
 float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
 
-NearestSearch searchOf(const SearchableGeometry& geometry, const Eigen::Vector3d& point) {
+NearestSearch searchOf(const Body& geometry, const Eigen::Vector3d& point) {
   const FloatFrame& frame = geometry.tree.frame();
   const Positions& now = geometry.mesh.now;
   Eigen::Vector3d inBody = point;
@@ -68,8 +68,7 @@ std::array<std::uint32_t, 3> featureOf(const Triangle& corners, TriangleFeature 
 
 }  // namespace
 
-PointDistances::PointDistances(const SearchableGeometry& geometry, const Eigen::Vector3d& point,
-                               bool bruteForce)
+PointDistances::PointDistances(const Body& geometry, const Eigen::Vector3d& point, bool bruteForce)
     : m_geometry(geometry),
       m_point(point),
       m_bruteForce(bruteForce),

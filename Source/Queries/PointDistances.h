@@ -5,7 +5,7 @@
 
 #include "Core/Threads.h"
 #include "Queries/NearestElements.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <Eigen/Core>
 
@@ -29,7 +29,7 @@ class PointDistances {
   };
 
   /// bruteForce: searches test every element.
-  PointDistances(const SearchableGeometry&, const Eigen::Vector3d& point, bool bruteForce);
+  PointDistances(const Body&, const Eigen::Vector3d& point, bool bruteForce);
 
   Near at(std::uint32_t place) const;
   /// Whether a is nearer than b, decided exactly, or as near with a lower element.
@@ -77,7 +77,7 @@ class PointDistances {
   Eigen::Vector3d radiiOf(const Triangle& corners) const;
   bool isTapered(const Triangle& corners) const;  ///< a segment whose radii differ
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const Eigen::Vector3d m_point;
   const bool m_bruteForce;
   NearestSearch m_search;

@@ -10,7 +10,7 @@
 #include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Queries/VertexSearch.h"
 #include "Shapes/DistinctContacts.h"
 #include "Shapes/PlacedShape.h"
@@ -98,10 +98,10 @@ class SpatialQueries::Source {
   /// owner or the snapshot is gone.
   virtual std::uint64_t state() const = 0;
   /// Throws UnknownGeometry.
-  virtual SearchableGeometry& at(GeometryId) const = 0;
+  virtual const Body& at(GeometryId) const = 0;
   /// All geometries, by ascending ids.
   virtual std::size_t geometryCount() const = 0;
-  virtual SearchableGeometry& geometry(std::size_t index) const = 0;
+  virtual const Body& geometry(std::size_t index) const = 0;
   virtual std::uint64_t step() const = 0;  ///< counts advance()
   virtual Engine engine() const = 0;
   virtual const OctreeSettings& octreeSettings() const = 0;
@@ -126,10 +126,10 @@ class SpatialQueries::Source {
 
   // Update the structures that are made when a query first needs them. Run by one thread at a time
   // for each geometry.
-  void prepareInside(SearchableGeometry& body, const InsideSettings&);
-  void prepareTetrahedra(SearchableGeometry& solid);
+  void prepareInside(const Body& body, const InsideSettings&);
+  void prepareTetrahedra(const Body& solid);
   /// For InsideRule::Closed; returns false for a body without an inside.
-  bool prepareIfClosed(SearchableGeometry& body);
+  bool prepareIfClosed(const Body& body);
 
  private:
   const std::shared_ptr<Pool> m_pool;
@@ -139,11 +139,11 @@ class SpatialQueries::Source {
 
 /// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a
 /// shape.
-void checkVertices(const SearchableGeometry& vertices, GeometryId body);
+void checkVertices(const Body& vertices, GeometryId body);
 /// Throws InvalidSettings for a length that is negative, NaN or, if `finite`, out of range.
 void checkLength(double length, const char* name, bool finite);
 /// Throws UnsupportedMethod for an analytical shape.
-void checkHasElements(const SearchableGeometry&);
+void checkHasElements(const Body&);
 /// The pose that is used for one that a user passes (withExactRotation()). Throws InvalidTransform.
 /// what: the start of the message.
 RigidTransform checkedPose(const RigidTransform&, const char* what);

@@ -16,8 +16,8 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
-RayHits::RayHits(const SearchableGeometry& geometry, const Ray& ray, bool bruteForce,
-                 std::vector<Met>& scratch, double radius)
+RayHits::RayHits(const Body& geometry, const Ray& ray, bool bruteForce, std::vector<Met>& scratch,
+                 double radius)
     : m_geometry(geometry),
       m_ray{ray.origin, ray.direction, ray.tMin, ray.tMax},
       m_bruteForce(bruteForce),
@@ -295,7 +295,7 @@ std::optional<RayHit> RayHits::first(double bound) {
   return endFirst(bound);
 }
 
-void RayHits::first(const SearchableGeometry& geometry, std::span<const Ray> rays, bool bruteForce,
+void RayHits::first(const Body& geometry, std::span<const Ray> rays, bool bruteForce,
                     std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
                     std::span<RayHit> out) {
   // The processor's caches hold a small octree, and turns then cost more than they save.

@@ -4,7 +4,7 @@
 
 #include "Math/RayTriangle.h"
 #include "Queries/RayTraversal.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <array>
 #include <cstddef>
@@ -37,14 +37,13 @@ class RayHits {
 
   /// bruteForce: every element is tested. scratch: kept by the caller. radius: L, of the ball whose
   /// centre moves along the ray; if it is not 0, all elements are solid and larger by it.
-  RayHits(const SearchableGeometry&, const Ray&, bool bruteForce, std::vector<Met>& scratch,
-          double radius = 0.0);
+  RayHits(const Body&, const Ray&, bool bruteForce, std::vector<Met>& scratch, double radius = 0.0);
 
   /// bound: t; if the first hit is not before it, the result is no hit or one that is not before
   /// it.
   std::optional<RayHit> first(double bound);
   /// The first hits of many rays, each as first(tMax); `none` where there is none.
-  static void first(const SearchableGeometry&, std::span<const Ray>, bool bruteForce,
+  static void first(const Body&, std::span<const Ray>, bool bruteForce,
                     std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
                     std::span<RayHit> out);
   bool any();
@@ -110,7 +109,7 @@ class RayHits {
   template <class F>
   bool hitsOfPart(std::size_t begin, std::size_t end, std::size_t furthest, F&& f) const;
 
-  const SearchableGeometry& m_geometry;
+  const Body& m_geometry;
   const RaySegment m_ray;
   const bool m_bruteForce;
   const double m_radius;

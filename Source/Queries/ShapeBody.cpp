@@ -105,17 +105,17 @@ bool enclose(const Shape& shape, Surface& out) {
 
 }  // namespace
 
-std::unique_ptr<SearchableGeometry> meshAround(GeometryId id, const Shape& shape, double scale,
-                                               const OctreeSettings& settings) {
+std::unique_ptr<Body> meshAround(GeometryId id, const Shape& shape, double scale,
+                                 const OctreeSettings& settings) {
   Surface surface;
   if (!enclose(shape, surface)) return nullptr;
-  auto geometry = std::make_unique<SearchableGeometry>(id);
+  auto geometry = std::make_unique<Body>(id);
   geometry->mesh.topology = MeshTopology(surface.positions.size(), surface.triangles);
   geometry->mesh.now = geometry->mesh.before = Positions(surface.positions);
-  geometry->revisions.topology = geometry->revisions.counter.next();
+  geometry->revisions.elements.topology = geometry->revisions.counter.next();
   GeometryOctree& tree = geometry->tree;
-  tree.sampleFrame(geometry->mesh, geometry->revisions.topology);
-  tree.update(geometry->mesh, geometry->revisions.topology, scale, settings, Threads(1));
+  tree.sampleFrame(geometry->mesh, geometry->revisions.elements.topology);
+  tree.update(geometry->mesh, geometry->revisions.elements.topology, scale, settings, Threads(1));
   return geometry;
 }
 

@@ -2,7 +2,7 @@
 
 #include <palpate/Settings.h>
 
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/Shape.h"
 
 #include <memory>
@@ -14,7 +14,6 @@ namespace palpate {
 /// volume. No point of the hull is further from a round shape than 3 % of the radius.
 ///
 /// scale: of the float frame, that of the geometry beside which it is searched.
-std::unique_ptr<SearchableGeometry> meshAround(GeometryId, const Shape&, double scale,
-                                               const OctreeSettings&);
+std::unique_ptr<Body> meshAround(GeometryId, const Shape&, double scale, const OctreeSettings&);
 
 }  // namespace palpate

@@ -187,7 +187,7 @@ std::optional<bool> meetsSlabs(const Convex& convex, const std::array<Vector3d, 
 }
 
 /// The shape in the floats of a geometry's octree; none beyond float's range.
-std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeometry& geometry) {
+std::optional<FloatConvex> floatsOf(const Convex& convex, const Body& geometry) {
   const FloatFrame& frame = geometry.tree.frame();
   const Positions& now = geometry.mesh.now;
   Vector3d p = convex.p, q = convex.q;
@@ -237,8 +237,8 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const SearchableGeomet
 
 }  // namespace
 
-void findWithin(const SearchableGeometry& geometry, const Vector3d& point, double distance,
-                bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
+void findWithin(const Body& geometry, const Vector3d& point, double distance, bool bruteForce,
+                Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
   const PointDistances distances(geometry, point, bruteForce);
   Convex ball;
   ball.p = ball.q = point;
@@ -255,7 +255,7 @@ void findWithin(const SearchableGeometry& geometry, const Vector3d& point, doubl
       out.push_back(at.element);
 }
 
-void findOverlapping(const SearchableGeometry& geometry, const AnalyticalGeometry& analytical,
+void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
                      const RigidTransform& pose, bool bruteForce, KeptShapes& kept,
                      PointQueryStack& stack, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out) {

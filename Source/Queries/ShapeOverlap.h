@@ -2,7 +2,7 @@
 
 #include "Core/Buffer.h"
 #include "Octree/PointQueries.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/PlacedShape.h"
 
 #include <palpate/AnalyticalGeometry.h>
@@ -14,8 +14,8 @@ namespace palpate {
 
 /// Appends the elements whose distance from a point, less the radius, is at most `distance`, in any
 /// order. Decided exactly. near: scratch.
-void findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double distance,
-                bool bruteForce, Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
+void findWithin(const Body&, const Eigen::Vector3d& point, double distance, bool bruteForce,
+                Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
 
 /// Appends the elements that meet a shape at a pose, in any order. A line whose radii differ
 /// between its ends is the hull of the balls there. Of other elements balls are decided as by
@@ -25,8 +25,8 @@ void findWithin(const SearchableGeometry&, const Eigen::Vector3d& point, double 
 /// Method   floats decide most nodes and elements for balls, capsules, boxes and hulls. Polygons
 ///          clipped in double decide most others.
 /// kept: memory of shapes.
-void findOverlapping(const SearchableGeometry&, const AnalyticalGeometry&, const RigidTransform&,
-                     bool bruteForce, KeptShapes& kept, PointQueryStack&,
-                     Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out);
+void findOverlapping(const Body&, const AnalyticalGeometry&, const RigidTransform&, bool bruteForce,
+                     KeptShapes& kept, PointQueryStack&, Buffer<std::uint32_t>& near,
+                     std::vector<std::uint32_t>& out);
 
 }  // namespace palpate

@@ -36,8 +36,7 @@ Penetration exchanged(Penetration p) {
   return p;
 }
 
-Penetration ofShapes(const SearchableGeometry& a, const SearchableGeometry& b,
-                     ShapePairScratch& scratch) {
+Penetration ofShapes(const Body& a, const Body& b, ShapePairScratch& scratch) {
   const Shape &first = a.shape->now, &second = b.shape->now;
   const ShapePairDistance found = first.distanceFrom(second, scratch);
   const double finite = std::min(first.isPlane() ? kInfinity : first.magnitude(),
@@ -53,8 +52,8 @@ Penetration ofShapes(const SearchableGeometry& a, const SearchableGeometry& b,
           true};
 }
 
-SurfacePoint vertexOf(const SearchableGeometry& mesh, const BodyVertices& vertices,
-                      std::uint32_t vertex, double depth) {
+SurfacePoint vertexOf(const Body& mesh, const BodyVertices& vertices, std::uint32_t vertex,
+                      double depth) {
   const std::uint32_t element = vertices.triangleOf[vertex];
   const Triangle& corners = mesh.mesh.topology.triangles[element];
   Vector3d weights = Vector3d::Zero();
@@ -64,8 +63,7 @@ SurfacePoint vertexOf(const SearchableGeometry& mesh, const BodyVertices& vertic
 }
 
 /// A mesh leaves a half-space along its normal.
-Penetration ofPlane(const SearchableGeometry& mesh, const SearchableGeometry& plane,
-                    BodyVertices& vertices) {
+Penetration ofPlane(const Body& mesh, const Body& plane, BodyVertices& vertices) {
   vertices.assign(mesh);
   const Shape& shape = plane.shape->now;
   const Vector3d normal = shape.axes().col(2);
@@ -91,8 +89,7 @@ Penetration ofPlane(const SearchableGeometry& mesh, const SearchableGeometry& pl
 /// A mesh that moves, and a round shape.
 class MeshAndRoundShape {
  public:
-  MeshAndRoundShape(const SearchableGeometry& mesh, const SearchableGeometry& shape,
-                    bool bruteForce)
+  MeshAndRoundShape(const Body& mesh, const Body& shape, bool bruteForce)
       : m_mesh(mesh), m_id(shape.id), m_shape(shape.shape->now), m_bruteForce(bruteForce) {}
 
   /// Goes back from where they are apart, to where they touch.
@@ -123,15 +120,15 @@ class MeshAndRoundShape {
     return found;
   }
 
-  const SearchableGeometry& m_mesh;
+  const Body& m_mesh;
   const GeometryId m_id;
   const Shape& m_shape;
   const bool m_bruteForce;
 };
 
 /// A mesh that moves, and a shape that `around` encloses.
-Penetration ofMesh(const SearchableGeometry& mesh, const SearchableGeometry& geometry,
-                   const SearchableGeometry& around, Engine engine, PenetrationScratch& scratch) {
+Penetration ofMesh(const Body& mesh, const Body& geometry, const Body& around, Engine engine,
+                   PenetrationScratch& scratch) {
   Penetration found = penetrationOf(mesh, around, engine, scratch);
   if (!found.intersecting) return apart(mesh.id, geometry.id);
   found.b = pointOfShape(geometry.id, found.b.position, found.depth);
@@ -154,9 +151,9 @@ Penetration ofMesh(const SearchableGeometry& mesh, const SearchableGeometry& geo
 
 }  // namespace
 
-Penetration shapePenetration(const SearchableGeometry& a, const SearchableGeometry& b,
-                             Engine engine, const OctreeSettings& settings,
-                             PenetrationScratch& scratch, ShapePairScratch& pairScratch) {
+Penetration shapePenetration(const Body& a, const Body& b, Engine engine,
+                             const OctreeSettings& settings, PenetrationScratch& scratch,
+                             ShapePairScratch& pairScratch) {
   if (a.shape && b.shape) return ofShapes(a, b, pairScratch);
   if (a.shape) return exchanged(shapePenetration(b, a, engine, settings, scratch, pairScratch));
   if (a.mesh.topology.triangles.empty()) return apart(a.id, b.id);

@@ -3,7 +3,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Queries/BodyPenetration.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Shapes/Shape.h"
 
 namespace palpate {
@@ -15,7 +15,7 @@ namespace palpate {
 ///          are enclosed by a mesh. From where that is separated, a round shape goes back along the
 ///          direction by its distance from the mesh, which cannot pass the place where they touch.
 ///          If the mesh is convex, the distance of the Minkowski difference gives the direction.
-Penetration shapePenetration(const SearchableGeometry& a, const SearchableGeometry& b, Engine,
-                             const OctreeSettings&, PenetrationScratch&, ShapePairScratch&);
+Penetration shapePenetration(const Body& a, const Body& b, Engine, const OctreeSettings&,
+                             PenetrationScratch&, ShapePairScratch&);
 
 }  // namespace palpate

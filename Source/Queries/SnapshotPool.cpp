@@ -14,38 +14,26 @@
 
 namespace palpate {
 
-namespace {
+namespace {}  // namespace
 
-DerivedFrom<2>::Sources topologyOf(const SearchableGeometry& geometry) {
-  return {geometry.revisions.topology, geometry.revisions.enabled};
-}
-
-DerivedFrom<7>::Sources stateOf(const SearchableGeometry& geometry) {
-  const Positions &now = geometry.mesh.now, &before = geometry.mesh.before;
-  return {geometry.revisions.topology, geometry.revisions.enabled, geometry.revisions.filter,
-          now.bodyRevision(),          now.transformRevision(),    before.bodyRevision(),
-          before.transformRevision()};
-}
-
-}  // namespace
-
-bool GeometryCopy::isCurrent(const SearchableGeometry& original) const {
-  return m_version.isCurrent(stateOf(original)) && geometry.name == original.name &&
+bool GeometryCopy::isCurrent(const Body& original) const {
+  return m_version.isCurrent(original.state()) && geometry.name == original.name &&
          geometry.tree.updates() == original.tree.updates();
 }
 
-int GeometryCopy::kept(const SearchableGeometry& original) const {
+int GeometryCopy::kept(const Body& original) const {
   return (geometry.tree.updates() == original.tree.updates() ? 2 : 0) +
-         (m_topologyVersion.isCurrent(topologyOf(original)) ? 1 : 0);
+         (m_elementsVersion.isCurrent(original.revisions.elements) ? 1 : 0);
 }
 
-void GeometryCopy::update(const SearchableGeometry& original) {
+void GeometryCopy::update(const Body& original) {
   m_version.invalidate();
   TriangleMesh& mesh = geometry.mesh;
-  if (const auto topology = topologyOf(original); !m_topologyVersion.isCurrent(topology)) {
+  if (const ElementsState& elements = original.revisions.elements;
+      !m_elementsVersion.isCurrent(elements)) {
     const bool isSameMesh =
-        m_topologyVersion.isValid() && geometry.revisions.topology == original.revisions.topology;
-    m_topologyVersion.invalidate();
+        m_elementsVersion.isValid() && geometry.revisions.elements.topology == elements.topology;
+    m_elementsVersion.invalidate();
     mesh.topology = original.mesh.topology;
     mesh.radii = original.mesh.radii;
     mesh.largestRadius = original.mesh.largestRadius;
@@ -54,7 +42,7 @@ void GeometryCopy::update(const SearchableGeometry& original) {
       geometry.solid->topology = original.solid->topology;
     }
     geometry.revisions = original.revisions;
-    m_topologyVersion.commit(topology);
+    m_elementsVersion.commit(elements);
   }
   mesh.now = original.mesh.now;
   mesh.before = original.mesh.before;
@@ -62,7 +50,7 @@ void GeometryCopy::update(const SearchableGeometry& original) {
   geometry.shape = original.shape;
   geometry.name = original.name;
   geometry.tree.copy(original.tree);
-  m_version.commit(stateOf(original));
+  m_version.commit(original.state());
 }
 
 /// What a snapshot shows: the source of its queries.
@@ -71,14 +59,12 @@ class Snapshot::Contents : public SpatialQueries::Source {
   explicit Contents(std::shared_ptr<Pool> scratch) : Source(std::move(scratch)) {}
 
   std::uint64_t state() const override { return m_state.load(std::memory_order_relaxed); }
-  SearchableGeometry& at(GeometryId id) const override {
+  const Body& at(GeometryId id) const override {
     if (GeometryCopy* const copy = find(id)) return searchable(copy->geometry);
     throw Error(ErrorCode::UnknownGeometry, nameOf(id) + " is not in this snapshot", id);
   }
   std::size_t geometryCount() const override { return m_geometries.size(); }
-  SearchableGeometry& geometry(std::size_t index) const override {
-    return m_geometries[index]->geometry;
-  }
+  const Body& geometry(std::size_t index) const override { return m_geometries[index]->geometry; }
   std::uint64_t step() const override { return m_step; }
   Engine engine() const override { return m_engine; }
   const OctreeSettings& octreeSettings() const override { return m_octreeSettings; }
@@ -202,7 +188,7 @@ SnapshotPool::Slot& SnapshotPool::freeSlot() {
 }
 
 /// A copy that is current or, if there is none, a free one that has most of what it needs.
-GeometryCopy& SnapshotPool::copyOf(const SearchableGeometry& original) {
+GeometryCopy& SnapshotPool::copyOf(const Body& original) {
   const auto begin =
       std::lower_bound(m_copies.begin(), m_copies.end(), original.id,
                        [](const auto& c, GeometryId id) { return c->geometry.id < id; });
@@ -255,8 +241,7 @@ bool Snapshot::contains(GeometryId id) const { return m_contents.find(id) != nul
 
 namespace {
 
-std::span<const Eigen::Vector3d> positionsOf(const SearchableGeometry& geometry,
-                                             const Positions& end) {
+std::span<const Eigen::Vector3d> positionsOf(const Body& geometry, const Positions& end) {
   if (geometry.shape) return {};
   return end.body();
 }
@@ -264,12 +249,12 @@ std::span<const Eigen::Vector3d> positionsOf(const SearchableGeometry& geometry,
 }  // namespace
 
 std::span<const Eigen::Vector3d> Snapshot::positions(GeometryId id) const {
-  const SearchableGeometry& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.at(id);
   return positionsOf(geometry, geometry.mesh.now);
 }
 
 std::span<const Eigen::Vector3d> Snapshot::positionsBefore(GeometryId id) const {
-  const SearchableGeometry& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.at(id);
   return positionsOf(geometry, geometry.mesh.before);
 }
 
@@ -280,7 +265,7 @@ ShapeMotion Snapshot::motion(GeometryId id) const {
 }
 
 Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double time) const {
-  const SearchableGeometry& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.at(id);
   const std::size_t size = positionsOf(geometry, geometry.mesh.now).size();
   if (vertex >= size)
     throw Error(ErrorCode::IndexOutOfRange,

@@ -4,7 +4,7 @@
 
 #include "Mesh/Revision.h"
 #include "Queries/QuerySource.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -21,17 +21,17 @@ class GeometryCopy : public CountedObject {
  public:
   explicit GeometryCopy(GeometryId id) : geometry(id) {}
 
-  bool isCurrent(const SearchableGeometry& original) const;
-  void update(const SearchableGeometry& original);
+  bool isCurrent(const Body& original) const;
+  void update(const Body& original);
   /// How much an update need not copy: 2 for the octree, 1 for the topology.
-  int kept(const SearchableGeometry& original) const;
+  int kept(const Body& original) const;
 
-  SearchableGeometry geometry;
+  Body geometry;
   std::size_t users = 0;  ///< snapshots; only SnapshotPool::take() reads and writes it
 
  private:
-  DerivedFrom<2> m_topologyVersion;  ///< topology and enabled elements
-  DerivedFrom<7> m_version;          ///< these, the filter, and body and transform of both ends
+  DerivedFrom<ElementsState> m_elementsVersion;
+  DerivedFrom<BodyState> m_version;
 };
 
 /// The memory of the snapshots of one OctreeBasedCD. The OctreeBasedCD and each snapshot hold it,
@@ -62,7 +62,7 @@ class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
   void reclaim();
   void forgetRemoved(const SpatialQueries::Source&);
   Slot& freeSlot();
-  GeometryCopy& copyOf(const SearchableGeometry&);
+  GeometryCopy& copyOf(const Body&);
 
   const std::shared_ptr<SpatialQueries::Source::Pool> m_scratch;
   std::vector<std::unique_ptr<GeometryCopy>> m_copies;  ///< by ascending ids

@@ -93,37 +93,36 @@ void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) 
                          static_cast<std::uint32_t>(std::countr_zero(word));
 }
 
-void SpatialQueries::Source::prepareInside(SearchableGeometry& body,
-                                           const InsideSettings& settings) {
+void SpatialQueries::Source::prepareInside(const Body& body, const InsideSettings& settings) {
   checkSettings(body, settings);
-  PreparedState& prepared = body.preparedFor[settings.rule == InsideRule::WindingNumber];
+  PreparedState& prepared = body.prepared->preparedFor[settings.rule == InsideRule::WindingNumber];
   const std::uint64_t now = state(), updates = body.tree.updates();
   if (prepared.isCurrent(now, updates)) return;
-  const std::lock_guard lock(body.preparation);
+  const std::lock_guard lock(body.prepared->mutex);
   const MemoryScope memory(budget(), MemoryStage::Queries);
   checkInside(body, settings.rule);
   if (settings.rule == InsideRule::WindingNumber && body.tree.octree().size() > 0)
-    body.windingNumbers.update(body, Workers(*this));
+    body.prepared->windingNumbers.update(body, Workers(*this));
   else if (settings.rule == InsideRule::Closed && body.solid)
     updateTetrahedra(body, octreeSettings(), Workers(*this));
   prepared.commit(now, updates);
 }
 
-bool SpatialQueries::Source::prepareIfClosed(SearchableGeometry& body) {
-  const std::lock_guard lock(body.preparation);
+bool SpatialQueries::Source::prepareIfClosed(const Body& body) {
+  const std::lock_guard lock(body.prepared->mutex);
   const MemoryScope memory(budget(), MemoryStage::Queries);
   if (!isClosed(body)) return false;
   if (body.solid) updateTetrahedra(body, octreeSettings(), Workers(*this));
   return true;
 }
 
-void SpatialQueries::Source::prepareTetrahedra(SearchableGeometry& solid) {
-  const std::lock_guard lock(solid.preparation);
+void SpatialQueries::Source::prepareTetrahedra(const Body& solid) {
+  const std::lock_guard lock(solid.prepared->mutex);
   const MemoryScope memory(budget(), MemoryStage::Queries);
   updateTetrahedra(solid, octreeSettings(), Workers(*this));
 }
 
-void checkVertices(const SearchableGeometry& vertices, GeometryId body) {
+void checkVertices(const Body& vertices, GeometryId body) {
   if (vertices.id == body)
     throw Error(
         ErrorCode::InvalidSettings,
@@ -155,7 +154,7 @@ void checkLength(double length, const char* name, bool finite) {
                                                 (finite ? kLengthRule : "a number of at least 0"));
 }
 
-void checkHasElements(const SearchableGeometry& geometry) {
+void checkHasElements(const Body& geometry) {
   if (geometry.shape)
     throw Error(ErrorCode::UnsupportedMethod, nameOf(geometry) + " is a shape: it has no elements",
                 geometry.id);
@@ -181,9 +180,9 @@ void checkPoints(std::span<const Eigen::Vector3d> points) {
   for (std::size_t i = 0; i < points.size(); ++i) checkPoint(points[i], i);
 }
 
-std::optional<SurfacePoint> closestPointOf(const SearchableGeometry& geometry,
-                                           const Eigen::Vector3d& point, double maxDistance,
-                                           bool bruteForce, PointDistances::Last& last) {
+std::optional<SurfacePoint> closestPointOf(const Body& geometry, const Eigen::Vector3d& point,
+                                           double maxDistance, bool bruteForce,
+                                           PointDistances::Last& last) {
   if (geometry.shape) {
     const SurfacePoint nearest = closestPointOnShape(geometry.id, geometry.shape->now, point);
     return nearest.distance <= maxDistance ? std::optional(nearest) : std::nullopt;
@@ -262,7 +261,7 @@ class RayQuery {
       : m_scratch(source), m_bruteForce(source.engine() == Engine::BruteForce) {}
 
   /// By ascending t; valid until the next call.
-  const std::vector<RayHit>& all(const SearchableGeometry& geometry, const Ray& ray) {
+  const std::vector<RayHit>& all(const Body& geometry, const Ray& ray) {
     std::vector<RayHit>& hits = m_scratch->hits;
     hits.clear();
     if (geometry.shape)
@@ -272,25 +271,25 @@ class RayQuery {
     return hits;
   }
   /// bound: as in RayHits::first().
-  std::optional<RayHit> first(const SearchableGeometry& geometry, const Ray& ray, double bound) {
+  std::optional<RayHit> first(const Body& geometry, const Ray& ray, double bound) {
     if (!geometry.shape) return on(geometry, ray).first(bound);
     const std::vector<RayHit>& hits = all(geometry, ray);
     return hits.empty() ? std::nullopt : std::optional(hits.front());
   }
   /// out: element kNoElement where there is none.
-  void first(const SearchableGeometry& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
+  void first(const Body& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
     const RayHit none{geometry.id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false};
     if (!geometry.shape)
       return RayHits::first(geometry, rays, m_bruteForce, m_scratch->metInFlight, none, out);
     for (std::size_t i = 0; i < rays.size(); ++i)
       out[i] = first(geometry, rays[i], kInfinity).value_or(none);
   }
-  bool any(const SearchableGeometry& geometry, const Ray& ray) {
+  bool any(const Body& geometry, const Ray& ray) {
     return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
   }
 
  private:
-  RayHits on(const SearchableGeometry& geometry, const Ray& ray) {
+  RayHits on(const Body& geometry, const Ray& ray) {
     return {geometry, bounded(ray), m_bruteForce, m_scratch->met};
   }
   /// A hit beyond double's range is none.
@@ -312,7 +311,7 @@ std::optional<RayHit> firstHitOfAll(SpatialQueries::Source& source, const Ray& r
     if (!best || hit.t < best->t) best = hit;
   };
   for (std::size_t i = 0; i < source.geometryCount(); ++i) {
-    const SearchableGeometry& geometry = source.geometry(i);
+    const Body& geometry = source.geometry(i);
     // The ray itself is not cut at the best hit, as this would change other hits.
     const auto first = query.first(geometry, ray, best ? best->t : ray.tMax);
     if (!first || (best && !(first->t < best->t))) continue;
@@ -332,7 +331,7 @@ std::optional<RayHit> SpatialQueries::firstHit(GeometryId id, const Ray& ray) co
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkRay(ray);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   return RayQuery(source).first(geometry, ray, ray.tMax);
 }
 
@@ -347,7 +346,7 @@ bool SpatialQueries::anyHit(GeometryId id, const Ray& ray) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkRay(ray);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   return RayQuery(source).any(geometry, ray);
 }
 
@@ -367,7 +366,7 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   const StandardFloatingPoint standard;
   checkSizes(rays.size(), out.size(), "rays");
   for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   forParts(source, rays.size(), [&](std::size_t begin, std::size_t end) {
     RayQuery(source).first(geometry, rays.subspan(begin, end - begin), out.subspan(begin));
   });
@@ -377,7 +376,7 @@ void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>&
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkRay(ray);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   RayQuery query(source);
   const std::vector<RayHit>& hits = query.all(geometry, ray);
   out.reserve(hits.size());  // nothing below throws
@@ -391,7 +390,7 @@ std::optional<SurfacePoint> SpatialQueries::closestPoint(GeometryId id,
   const StandardFloatingPoint standard;
   checkPoint(point);
   checkLength(maxDistance, "maxDistance", false);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   PointDistances::Last last;
   return closestPointOf(geometry, point, maxDistance, source.engine() == Engine::BruteForce, last);
 }
@@ -403,7 +402,7 @@ void SpatialQueries::closestPoints(GeometryId id, std::span<const Eigen::Vector3
   checkSizes(points.size(), out.size(), "points");
   checkPoints(points);
   checkLength(maxDistance, "maxDistance", false);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   const bool bruteForce = source.engine() == Engine::BruteForce;
   forParts(source, points.size(), [&](std::size_t begin, std::size_t end) {
     PointDistances::Last last;
@@ -418,7 +417,7 @@ bool SpatialQueries::contains(GeometryId id, const Eigen::Vector3d& point,
   Source& source = valid();
   const StandardFloatingPoint standard;
   checkPoint(point);
-  SearchableGeometry& body = source.at(id);
+  const Body& body = source.at(id);
   source.prepareInside(body, settings);
   const Source::Loan scratch(source);
   return isInside(body, point, settings, source.engine(), scratch->stack);
@@ -440,7 +439,7 @@ void SpatialQueries::signedDistances(GeometryId id, std::span<const Eigen::Vecto
   const StandardFloatingPoint standard;
   checkSizes(points.size(), out.size(), "points");
   checkPoints(points);
-  SearchableGeometry& body = source.at(id);
+  const Body& body = source.at(id);
   source.prepareInside(body, settings);
   if (body.tree.ordered().empty())
     throw Error(ErrorCode::NotClosed, nameOf(body) + " has no triangles and so no surface", id);
@@ -471,7 +470,7 @@ void SpatialQueries::nearestElements(GeometryId id, const Eigen::Vector3d& point
   checkLength(maxDistance, "maxDistance", false);
   if (k < 1)
     throw Error(ErrorCode::InvalidSettings, "k is " + std::to_string(k) + "; it must be 1 or more");
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(source);
   scratch->near.clear();
@@ -490,7 +489,7 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   const StandardFloatingPoint standard;
   checkPoint(point);
   checkLength(radius, "radius", true);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(source);
   std::vector<std::uint32_t>& found = scratch->elements;
@@ -523,7 +522,7 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   Source& source = valid();
   const StandardFloatingPoint standard;
   const RigidTransform pose = poseOfQuery(shape, rotation, translation);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(source);
   std::vector<std::uint32_t>& found = scratch->elements;
@@ -543,7 +542,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
   const StandardFloatingPoint standard;
   const RigidTransform pose = poseOfQuery(shape, rotation, translation);
   checkLength(thickness, "thickness", true);
-  const SearchableGeometry& geometry = source.at(id);
+  const Body& geometry = source.at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(source);
   Buffer<std::uint32_t>& near = scratch->nearShape;
@@ -572,7 +571,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
 GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry &a = source.at(idA), &b = source.at(idB);
+  const Body &a = source.at(idA), &b = source.at(idB);
   if (idA == idB)
     throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(a) + " twice",
                 idA);
@@ -594,11 +593,11 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
 Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  SearchableGeometry &a = source.at(idA), &b = source.at(idB);
+  const Body &a = source.at(idA), &b = source.at(idB);
   if (idA == idB)
     throw Error(ErrorCode::InvalidSettings, "penetration() was called for " + nameOf(a) + " twice",
                 idA);
-  for (SearchableGeometry* const body : {&a, &b}) {
+  for (const Body* const body : {&a, &b}) {
     if (body->shape && body->shape->now.isTwoSided())
       throw Error(ErrorCode::NotClosed,
                   nameOf(*body) + " is a two-sided plane, which has no inside", body->id);
@@ -637,7 +636,7 @@ void SpatialQueries::path(std::span<const Eigen::Vector3d> polyline, double radi
   found.inside.clear();
   found.outside.clear();
   for (const GeometryId id : bodies) {
-    SearchableGeometry& body = source.at(id);
+    const Body& body = source.at(id);
     const bool isBody = !body.shape && source.prepareIfClosed(body);
     if (body.shape)
       findPathParts(body.shape->now, path, radius, found.parts);
@@ -671,8 +670,8 @@ void SpatialQueries::findInsideVertices(GeometryId vertices, GeometryId body,
                                         const InsideSettings& settings) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry& owner = source.at(vertices);
-  SearchableGeometry& container = source.at(body);
+  const Body& owner = source.at(vertices);
+  const Body& container = source.at(body);
   checkVertices(owner, body);
   source.prepareInside(container, settings);
   const Source::Loan scratch(source);
@@ -684,8 +683,8 @@ void SpatialQueries::findEmbeddedVertices(GeometryId vertices, GeometryId body,
                                           std::vector<EmbeddedVertex>& out) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  const SearchableGeometry& owner = source.at(vertices);
-  SearchableGeometry& solid = source.at(body);
+  const Body& owner = source.at(vertices);
+  const Body& solid = source.at(body);
   checkVertices(owner, body);
   checkMeshType(solid, true, "findEmbeddedVertices() is for tetrahedral meshes");
   source.prepareTetrahedra(solid);
@@ -697,7 +696,7 @@ std::optional<TetrahedronPoint> SpatialQueries::findTetrahedron(
     GeometryId body, const Eigen::Vector3d& point) const {
   Source& source = valid();
   const StandardFloatingPoint standard;
-  SearchableGeometry& solid = source.at(body);
+  const Body& solid = source.at(body);
   checkMeshType(solid, true, "findTetrahedron() is for tetrahedral meshes");
   if (!isWithinRange(point))
     throw Error(ErrorCode::NonFinitePosition,

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 #include "Core/Threads.h"
 #include "Octree/PointQueries.h"
 
@@ -14,7 +14,7 @@ namespace palpate {
 /// octree after map().
 class PointFrame {
  public:
-  explicit PointFrame(const SearchableGeometry& geometry)
+  explicit PointFrame(const Body& geometry)
       : m_frame{worldOrigin(geometry), geometry.tree.frame().scale},
         m_map(worldMap(geometry, m_frame.origin, 0.0, false)) {}
 

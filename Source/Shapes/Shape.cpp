@@ -446,7 +446,8 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
 std::string faultOf(const RigidTransform& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
   const double off = deviationFromRotation(r);
-  if (!r.allFinite() || !(off <= kRoughRotation) || !(r.determinant() > 0))
+  if (!r.allFinite()) return "rotation has an entry that is not finite";
+  if (!(off <= kRoughRotation) || !(r.determinant() > 0))
     return "rotation is not a rotation matrix: R^T R differs from the identity by " + textOf(off) +
            ", at most 1e-05 is allowed, and its determinant is " + textOf(r.determinant());
   if (isWithinRange(transform.translation)) return {};

@@ -18,7 +18,7 @@ bool mayPierce(const GeometryInStep& a, const GeometryInStep& b) {
 }
 
 bool answers(Method method, double thickness, const GeometryInStep& a, const GeometryInStep& b) {
-  const Support* const row = supportOf(method, a.type(), b.type(), &a.mesh == &b.mesh);
+  const SupportedPairs* const row = supportOf(method, a.type(), b.type(), &a.mesh == &b.mesh);
   return row && (!row->has(kOneRadius) || (a.mesh.radii.empty() && b.mesh.radii.empty())) &&
          (!row->has(kNeedsReach) ||
           thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0);
@@ -119,7 +119,7 @@ bool isWithinBand(const DistanceField& field, double thickness, double largestRa
 
 std::optional<PairPlan> planByField(const PairSettings& settings, const GeometryInStep& a,
                                     const GeometryInStep& b, const PairPlan& exact) {
-  const GeometryInStep& body = bodyWithField(a, b);
+  const GeometryInStep& body = answersByFieldOfSecond(a.type(), b.field) ? b : a;
   const GeometryInStep& other = &body == &b ? a : b;
   if (settings.method != Method::Auto || exact.kind != PairKind::Meshes || !body.field ||
       !supportOf(Method::DistanceField, a.type(), b.type(), &a.mesh == &b.mesh) ||

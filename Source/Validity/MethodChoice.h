@@ -17,12 +17,12 @@ namespace palpate {
 /// The data of one geometry from which a method is chosen and Validity::trusted is decided.
 struct GeometryInStep {
   const TriangleMesh& mesh;
-  double smallestHeight;       ///< L: of all triangles with area, in the shape at rest
-  MotionRange range;           ///< from before to now
-  MotionRange correction;      ///< from `detected` to before
-  double arcDeviation;         ///< L: Validity::arcDeviation
-  double extent;               ///< L: of the geometry, along any axis of the world
-  Revision topology, enabled;  ///< GeometryRevisions
+  double smallestHeight;   ///< L: of all triangles with area, in the shape at rest
+  MotionRange range;       ///< from before to now
+  MotionRange correction;  ///< from `detected` to before
+  double arcDeviation;     ///< L: Validity::arcDeviation
+  double extent;           ///< L: of the geometry, along any axis of the world
+  ElementsState elements;
   const Positions& detected;   ///< the end `now` of the last detection
   const DistanceField* field;  ///< null if there is none
   GeometryType type() const { return mesh.topology.type; }
@@ -55,11 +55,10 @@ bool haveTriangles(const GeometryInStep& a, const GeometryInStep& b);
 /// geometries that intersect have features, or a feature and a shape, at distance 0.
 bool mayPierce(const GeometryInStep& a, const GeometryInStep& b);
 
-/// The geometry whose field answers a pair by Method::DistanceField: an added field, else the
-/// second mesh if both have one.
-template <class Any>
-Any& bodyWithField(Any& a, Any& b) {
-  return b.field && a.mesh.topology.type != GeometryType::Field ? b : a;
+/// Whether the field of the second geometry answers a pair by Method::DistanceField, not that of
+/// the first: an added field answers, else the second mesh's if both have one.
+inline bool answersByFieldOfSecond(GeometryType first, const DistanceField* ofSecond) {
+  return ofSecond && first != GeometryType::Field;
 }
 
 /// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that

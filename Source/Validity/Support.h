@@ -41,7 +41,7 @@ enum SupportConditions : unsigned {
 };
 
 /// A row of the table of support: a method answers pairs of these types, in either order.
-struct Support {
+struct SupportedPairs {
   Method method;
   GeometryTypes first, second;
   PairKind kind;
@@ -56,7 +56,7 @@ inline constexpr GeometryTypes kTriangles(GeometryType::Triangles), kPoints(Geom
 
 /// What the library supports, besides two conditions on shapes: not two planes, and sizes whose
 /// ratio is at most kMaxSizeRatio. Docs/SupportMatrix.md is for users.
-inline constexpr Support kSupport[] = {
+inline constexpr SupportedPairs kSupport[] = {
     {Method::Intersection, kTriangles, kTriangles, PairKind::Meshes},
     {Method::Proximity, kElements, kElements, PairKind::Meshes, kNeedsReach},
     {Method::Proximity, kShapes, kElements, PairKind::MeshAndShape},
@@ -74,8 +74,9 @@ inline constexpr Support kSupport[] = {
 };
 
 /// The row for a method and two types, or null. itself: the two are one geometry.
-constexpr const Support* supportOf(Method method, GeometryType a, GeometryType b, bool itself) {
-  for (const Support& row : kSupport)
+constexpr const SupportedPairs* supportOf(Method method, GeometryType a, GeometryType b,
+                                          bool itself) {
+  for (const SupportedPairs& row : kSupport)
     if (row.method == method && !(itself && row.has(kNotItself)) &&
         ((row.first.has(a) && row.second.has(b)) ||
          (!row.has(kInOrder) && row.first.has(b) && row.second.has(a))))

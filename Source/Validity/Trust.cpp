@@ -38,16 +38,6 @@ void addFastVertices(std::vector<std::uint32_t>& out, const GeometryInStep& mesh
   }
 }
 
-}  // namespace
-
-namespace {
-
-std::array<Revision, 8> statesOf(const GeometryInStep& a, const Positions& ofA,
-                                 const GeometryInStep& b, const Positions& ofB) {
-  return {a.topology, a.enabled, ofA.bodyRevision(), ofA.transformRevision(),
-          b.topology, b.enabled, ofB.bodyRevision(), ofB.transformRevision()};
-}
-
 /// Whether the pair uses Auto's motion tolerance.
 bool usesMotionTolerance(const PairSettings& settings, const GeometryInStep& a,
                          const GeometryInStep& b) {
@@ -126,6 +116,11 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
 
 }  // namespace
 
+std::array<Trust::SurfaceState, 2> Trust::statesOf(const GeometryInStep& a, const Positions& ofA,
+                                                   const GeometryInStep& b, const Positions& ofB) {
+  return {{{a.elements, ofA.state()}, {b.elements, ofB.state()}}};
+}
+
 void Trust::forget() {
   m_topologies.invalidate();
   for (KnownState* known : {&m_atStart, &m_atEnd}) known->version.invalidate();
@@ -153,7 +148,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   const bool startsApart = m_atStart.meeting == Meeting::Apart;
   plan.startsIntersecting = m_atStart.meeting == Meeting::Piercing;
 
-  const std::array<Revision, 4> topologies{a.topology, a.enabled, b.topology, b.enabled};
+  const std::array topologies{a.elements, b.elements};
   const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
   if (m_topologies.isCurrent(topologies)) {
     m_checkCredit = std::min(m_checkCredit + 1, most);

@@ -6,6 +6,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Validity/MethodChoice.h"
 
+#include <array>
 #include <optional>
 
 namespace palpate {
@@ -27,9 +28,16 @@ class Trust {
   void forget();
 
  private:
+  struct SurfaceState {
+    ElementsState elements;
+    PositionsState positions;
+    friend bool operator==(const SurfaceState&, const SurfaceState&) = default;
+  };
+  static std::array<SurfaceState, 2> statesOf(const GeometryInStep& a, const Positions& ofA,
+                                              const GeometryInStep& b, const Positions& ofB);
   /// One state of both geometries.
   struct KnownState {
-    DerivedFrom<8> version;
+    DerivedFrom<std::array<SurfaceState, 2>> version;
     std::optional<Meeting> meeting;      ///< none: unknown
     double clearance = 0;                ///< L: if Apart, by at least this distance
     std::optional<ElementPair> witness;  ///< if Piercing, a pair that does, if known
@@ -40,7 +48,7 @@ class Trust {
                ContactBuffers& counts);
 
   KnownState m_atStart, m_atEnd;  ///< of the step last detected
-  DerivedFrom<4> m_topologies;
+  DerivedFrom<std::array<ElementsState, 2>> m_topologies;
   bool m_isUnwelded = false;  ///< Validity::unwelded, for these topologies
   int m_checkCredit = 0;  ///< initial intersection checks saved for later, times kFramesPerCheck
 };

@@ -28,12 +28,13 @@ allowedIn() {
     Mesh) echo "Mesh/ Math/ Exact/ Core/" ;;
     Shapes) echo "Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Octree) echo "Octree/ Math/Box Core/" ;;
+    Bodies) echo "Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
-    Queries) echo "Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
-    DistanceField) echo "DistanceField/ Queries/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Queries) echo "Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    DistanceField) echo "DistanceField/ Queries/ Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     Vtk | Fcl) echo "$1/" ;;
   esac
 }

@@ -39,6 +39,8 @@ struct MeshDefects {
 /// Errors   none.
 PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
 /// Also finds the defects that positions show.
+/// Cost     grows with the pairs of triangles whose boxes overlap: quadratic around one vertex of all
+///          triangles, where 20,000 take 1 s.
 /// Errors   as OctreeBasedCD::addTriangleMesh(); messages name the mesh geometry 0.
 PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 

@@ -54,6 +54,29 @@ TEST_F(WholeFile, ReplacesAFileAndLeavesNoOther) {
   }
 }
 
+TEST_F(WholeFile, IsReadOrRefusedWithTheReason) {
+  writeWholeFile(in("file"), std::string_view("a\0b", 3), "the file");
+  EXPECT_EQ(readWholeFile(in("file"), "the file"), std::string("a\0b", 3));
+  ASSERT_EQ(mkfifo(in("pipe").c_str(), 0600), 0);
+  fs::create_symlink(in("nothing"), in("link"));
+  for (const auto& [path, reason] :
+       {std::pair(in("none"), "there is no such file"),
+        std::pair(in("link"), "there is no such file"), std::pair(in(""), "no regular file"),
+        std::pair(in("pipe"), "no regular file"),
+        std::pair(fs::path("/dev/null"), "no regular file"),
+        std::pair(fs::path("/proc/self/mem"), "an error")})
+    try {
+      readWholeFile(path, "the file");
+      ADD_FAILURE() << path;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::File);
+      EXPECT_NE(
+          std::string(error.what()).find("the file \"" + path.string() + "\" cannot be read: "),
+          std::string::npos);
+      EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
+    }
+}
+
 TEST_F(WholeFile, LeavesWhatIsNoRegularFile) {
   ASSERT_EQ(mkfifo(in("pipe").c_str(), 0600), 0);
   expectRefused(in("pipe"));

@@ -70,7 +70,7 @@ TEST(AffineClaim, HoldsOnlyIfNoSampleDisprovesIt) {
   Random random(1);
   int held = 0, disproved = 0;
   for (int i = 0; i < casesOf(3000); ++i) {
-    SearchableGeometry geometry(GeometryId{0});
+    Body geometry(GeometryId{0});
     std::vector<Vector3d> positions;
     const std::uint32_t triangles = 1 + random() % 12;
     for (std::uint32_t t = 0; t < triangles; ++t) {
@@ -82,9 +82,9 @@ TEST(AffineClaim, HoldsOnlyIfNoSampleDisprovesIt) {
     geometry.mesh.topology.vertexCount = positions.size();
     geometry.mesh.now = Positions(positions);
     geometry.mesh.before = geometry.mesh.now;
-    geometry.revisions.topology = geometry.revisions.counter.next();
-    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.topology, 1.0, {}, Threads(1));
+    geometry.revisions.elements.topology = geometry.revisions.counter.next();
+    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, 1.0, {}, Threads(1));
 
     AffineClaim claim;
     const Vector3d centre = randomPoint(random, -0.5, 0.5) - geometry.tree.frame().origin;

@@ -55,15 +55,15 @@ TEST(NearestTriangle, IsWithinItsTolerance) {
     SCOPED_TRACE(name);
     OctreeBasedCD collisions;
     const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
-    SearchableGeometry geometry(id);
+    Body geometry(id);
     geometry.mesh.now = Positions(mesh.positions);
     geometry.mesh.before = geometry.mesh.now;
     geometry.mesh.topology.vertexCount = mesh.positions.size();
     geometry.mesh.topology.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
-    geometry.revisions.topology = geometry.revisions.counter.next();
+    geometry.revisions.elements.topology = geometry.revisions.counter.next();
     const Threads threads(1);
-    const double spread = geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.topology, frameScale(spread), {},
+    const double spread = geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, frameScale(spread), {},
                          threads);
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : mesh.positions) box.extend(p);

@@ -339,7 +339,7 @@ TEST(SimplifyCertificate, BoundsHoldForAllPoints) {
   std::size_t proven = 0, refused = 0;
   for (const Mesh& mesh :
        {organMesh(random, 20, 24), boxMesh({-1, -1, 0}, {1, 1, 0.01}), starMesh(random)}) {
-    SearchableGeometry body(GeometryId{0});
+    Body body(GeometryId{0});
     makeClosedBody({mesh.positions, mesh.triangles}, Threads(1), body);
     OctreeBasedCD scene;
     const GeometryId id = scene.addTriangleMesh(mesh.positions, mesh.triangles);

@@ -181,8 +181,8 @@ TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
       failures += threw;
       if (threw) table.updateOctrees(settings, threads);
       for (std::size_t i = 0; i < table.all().size(); ++i) {
-        const Geometry& geometry = *table.all()[i];
-        const Geometry& wanted = *expected.all()[i];
+        const Body& geometry = table.all()[i]->body;
+        const Body& wanted = expected.all()[i]->body;
         const GeometryOctree& tree = geometry.tree;
         const Octree& octree = tree.octree();
         ASSERT_TRUE(tree.isValid() && octree.isBuilt());

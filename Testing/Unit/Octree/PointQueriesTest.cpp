@@ -30,7 +30,7 @@ struct QueryCase {
     const Mesh mesh = testing::soup(random, size, extent);
     const GeometryId id = table.add(mesh.positions, mesh.triangles);
     table.updateOctrees({}, Threads(1));
-    octree = &table.at(id).tree.octree();
+    octree = &table.at(id).body.tree.octree();
     for (int ends = 1; ends <= 2; ++ends) {
       BoxMap& map = maps.emplace_back();
       for (int i = 0; i < ends; ++i) {

@@ -206,39 +206,39 @@ TEST(Snapshot, SharesGeometriesThatDidNotMove) {
 class TestSource : public SpatialQueries::Source {
  public:
   void add(const Mesh& mesh) {
-    auto added = std::make_unique<SearchableGeometry>(GeometryId(m_nextId++));
+    auto added = std::make_unique<Body>(GeometryId(m_nextId++));
     added->mesh.topology = MeshTopology(mesh.positions.size(), mesh.triangles);
-    added->revisions.topology = added->revisions.counter.next();
+    added->revisions.elements.topology = added->revisions.counter.next();
     m_geometries.push_back(std::move(added));
     move(m_geometries.size() - 1, mesh.positions);
   }
   void move(std::size_t i, const Positions& positions) {
-    SearchableGeometry& geometry = *m_geometries[i];
+    Body& geometry = *m_geometries[i];
     geometry.mesh.now.setBody(
         std::make_shared<const CountedVector<Eigen::Vector3d>>(positions.begin(), positions.end()),
         m_revisions.next());
     geometry.mesh.before = geometry.mesh.now;
-    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.topology, 1.0, m_settings, m_thread);
+    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, 1.0, m_settings, m_thread);
   }
   void remove(std::size_t i) { m_geometries.erase(m_geometries.begin() + i); }
 
   mutable std::function<void()> onCount;  ///< called once, by geometryCount()
 
   std::uint64_t state() const override { return 1; }
-  SearchableGeometry& at(GeometryId) const override { return *m_geometries.front(); }
+  Body& at(GeometryId) const override { return *m_geometries.front(); }
   std::size_t geometryCount() const override {
     if (onCount) std::exchange(onCount, nullptr)();
     return m_geometries.size();
   }
-  SearchableGeometry& geometry(std::size_t i) const override { return *m_geometries[i]; }
+  Body& geometry(std::size_t i) const override { return *m_geometries[i]; }
   std::uint64_t step() const override { return 1; }
   Engine engine() const override { return Engine::Octree; }
   const OctreeSettings& octreeSettings() const override { return m_settings; }
   const Threads& threads() const override { return m_thread; }
 
  private:
-  std::vector<std::unique_ptr<SearchableGeometry>> m_geometries;
+  std::vector<std::unique_ptr<Body>> m_geometries;
   RevisionCounter m_revisions;
   std::uint32_t m_nextId = 0;
   OctreeSettings m_settings;

@@ -72,8 +72,11 @@ class GeometryOctree {
   double boxMilliseconds = 0, octreeMilliseconds = 0;
 
  private:
-  using Derived = DerivedFrom<3>;  ///< topology, positions now, positions before
-  Derived::Sources sources(const TriangleMesh&, Revision topology) const;
+  struct State {
+    Revision topology, now, before;  ///< positions in the body's frame
+    friend bool operator==(const State&, const State&) = default;
+  };
+  State stateOf(const TriangleMesh&, Revision topology) const;
   void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
@@ -91,7 +94,7 @@ class GeometryOctree {
   Octree m_octree;
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
-  Derived m_treeVersion;
+  DerivedFrom<State> m_treeVersion;
   std::uint64_t m_updates = 0;
   bool m_isBuilt = false;  ///< for the topology of m_treeVersion; the tree can be refitted
 };

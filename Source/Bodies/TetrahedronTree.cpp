@@ -1,4 +1,4 @@
-#include "Queries/TetrahedronTree.h"
+#include "Bodies/TetrahedronTree.h"
 
 #include <algorithm>
 #include <utility>

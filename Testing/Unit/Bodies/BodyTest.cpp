@@ -27,7 +27,7 @@ class Searched {
            double elementSize = 0.1) {
     const Mesh mesh = soup(random, 60, elementSize);
     geometry.mesh.topology = MeshTopology(mesh.positions.size(), mesh.triangles);
-    geometry.revisions.topology = geometry.revisions.counter.next();
+    geometry.revisions.elements.topology = geometry.revisions.counter.next();
     const auto bodyOf = [&](double motion) {
       CountedVector<Vector3d> body;
       for (const Vector3d& p : mesh.positions)
@@ -45,8 +45,8 @@ class Searched {
       geometry.mesh.before.setBody(bodyOf(0.1), m_revisions.next());
     }
     geometry.tree.setSwept(true);
-    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.topology,
+    geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology,
                          std::ldexp(1.0, -std::ilogb(size)), {}, m_thread);
   }
   const palpate::Positions& at(bool isEnd) const {
@@ -57,7 +57,7 @@ class Searched {
     return geometry.mesh.topology.triangles[element];
   }
 
-  SearchableGeometry geometry{GeometryId{0}};
+  Body geometry{GeometryId{0}};
 
  private:
   RevisionCounter m_revisions;

@@ -1,7 +1,7 @@
-#include "Queries/WindingNumber.h"
+#include "Bodies/WindingNumber.h"
 
 #include "Math/Tolerances.h"
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <algorithm>
 #include <array>
@@ -49,7 +49,7 @@ void WindingNumbers::Cluster::enclose(const Cluster& part) {
 }
 
 /// Computes the cluster of the triangles that a node holds itself, without its children.
-void WindingNumbers::computeOwnCluster(const SearchableGeometry& body, OctreeNode node) {
+void WindingNumbers::computeOwnCluster(const Body& body, OctreeNode node) {
   Cluster& all = m_clusters[node] = {};
   const auto [begin, end] = body.tree.octree().ownRange(node);
   const Positions& now = body.mesh.now;
@@ -70,9 +70,8 @@ void WindingNumbers::computeOwnCluster(const SearchableGeometry& body, OctreeNod
     }
 }
 
-void WindingNumbers::update(const SearchableGeometry& body, const Threads& threads) {
-  const DerivedFrom<2>::Sources now{body.mesh.now.bodyRevision(),
-                                    body.mesh.now.transformRevision()};
+void WindingNumbers::update(const Body& body, const Threads& threads) {
+  const PositionsState now = body.mesh.now.state();
   if (m_clustersVersion.isCurrent(now) && m_treeUpdates == body.tree.updates()) return;
   m_clustersVersion.invalidate();
   const Octree& octree = body.tree.octree();
@@ -124,8 +123,8 @@ static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
 }
 
 template <class F>
-SolidAngleShare WindingNumbers::sum(const SearchableGeometry& body, const Vector3d& p,
-                                    bool bruteForce, PointQueryStack& stack, F&& isEnough) const {
+SolidAngleShare WindingNumbers::sum(const Body& body, const Vector3d& p, bool bruteForce,
+                                    PointQueryStack& stack, F&& isEnough) const {
   const Octree& octree = body.tree.octree();
   const Positions& now = body.mesh.now;
   for (const double farRadii : kFarRadii) {
@@ -153,16 +152,15 @@ SolidAngleShare WindingNumbers::sum(const SearchableGeometry& body, const Vector
   return sumOfAll(body.mesh, p);
 }
 
-WindingNumbers::Result WindingNumbers::evaluate(const SearchableGeometry& body, const Vector3d& p,
-                                                double margin, bool bruteForce,
-                                                PointQueryStack& stack) const {
+WindingNumbers::Result WindingNumbers::evaluate(const Body& body, const Vector3d& p, double margin,
+                                                bool bruteForce, PointQueryStack& stack) const {
   return decide(sum(body, p, bruteForce, stack,
                     [&](const SolidAngleShare& found) { return decide(found, margin).decided; }),
                 margin);
 }
 
-SolidAngleShare WindingNumbers::value(const SearchableGeometry& body, const Vector3d& p,
-                                      double error, PointQueryStack& stack) const {
+SolidAngleShare WindingNumbers::value(const Body& body, const Vector3d& p, double error,
+                                      PointQueryStack& stack) const {
   return sum(body, p, false, stack,
              [&](const SolidAngleShare& found) { return found.error <= error; });
 }

@@ -1,4 +1,4 @@
-#include "Queries/GeometryOctree.h"
+#include "Bodies/GeometryOctree.h"
 
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
@@ -25,24 +25,23 @@ void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&
 
 }  // namespace
 
-GeometryOctree::Derived::Sources GeometryOctree::sources(const TriangleMesh& mesh,
-                                                         Revision topology) const {
-  // Without motion, boxes over the step equal those at its end, and both have the same sources.
+GeometryOctree::State GeometryOctree::stateOf(const TriangleMesh& mesh, Revision topology) const {
+  // Without motion, boxes over the step equal those at its end, and both have the same state.
   const Positions& before = m_swept ? mesh.before : mesh.now;
   return {topology, mesh.now.bodyRevision(), before.bodyRevision()};
 }
 
 bool GeometryOctree::isCurrent(const TriangleMesh& mesh, Revision topology, double scale) const {
-  return m_treeVersion.isCurrent(sources(mesh, topology)) && m_frame.scale == scale;
+  return m_treeVersion.isCurrent(stateOf(mesh, topology)) && m_frame.scale == scale;
 }
 
 bool GeometryOctree::encloses(const TriangleMesh& mesh, Revision topology) const {
-  return m_treeVersion.isValid() && m_isBuilt && m_treeVersion.sources()[0] == topology &&
-         m_treeVersion.sources()[1] == mesh.now.bodyRevision();
+  return m_treeVersion.isValid() && m_isBuilt && m_treeVersion.state().topology == topology &&
+         m_treeVersion.state().now == mesh.now.bodyRevision();
 }
 
 double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) {
-  if (!m_treeVersion.isCurrent(sources(mesh, topology))) {
+  if (!m_treeVersion.isCurrent(stateOf(mesh, topology))) {
     m_treeVersion.invalidate();
     const SampledExtent extent = sampleExtent(mesh.now.body());
     m_frame.origin = extent.median;
@@ -53,8 +52,8 @@ double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) 
 
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
                             const OctreeSettings& settings, const Threads& threads) {
-  const Derived::Sources now = sources(mesh, topology);
-  const bool isSameTopology = m_treeVersion.sources()[0] == topology;
+  const State now = stateOf(mesh, topology);
+  const bool isSameTopology = m_treeVersion.state().topology == topology;
   const bool canRefit = m_isBuilt && isSameTopology;
   m_treeVersion.invalidate();
   m_isBuilt = false;
@@ -151,7 +150,7 @@ void GeometryOctree::copy(const GeometryOctree& other) {
     std::copy(other.m_ordered.begin(), other.m_ordered.end(), m_ordered.begin());
   }
   m_updates = other.m_updates;
-  m_treeVersion.commit(other.m_treeVersion.sources());
+  m_treeVersion.commit(other.m_treeVersion.state());
 }
 
 void GeometryOctree::releaseMemory() {

@@ -1,4 +1,4 @@
-#include "Queries/SearchableGeometry.h"
+#include "Bodies/Body.h"
 
 #include <palpate/Error.h>
 
@@ -44,7 +44,7 @@ bool mayBeClamped(const GeometryOctree& tree) {
 
 /// Whether forEachBodyEnd() can be used. If b turns in the step, positions move on curves in its
 /// body.
-bool hasBodyMap(const SearchableGeometry& a, const SearchableGeometry& b, bool wholeStep) {
+bool hasBodyMap(const Body& a, const Body& b, bool wholeStep) {
   const Positions &now = b.mesh.now, &before = b.mesh.before;
   return a.isPlaced() && b.isPlaced() &&
          (!wholeStep || now.transform().rotation == before.transform().rotation) &&
@@ -77,8 +77,7 @@ Matrix3d inverseOf(const Matrix3d& m) {
 /// length of the inverse's product with a unit vector exceeds 1 by less than 2 kOrthonormal. So
 /// does the thickness along a direction of b's body.
 template <class F>
-void forEachBodyEnd(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-                    bool wholeStep, F&& f) {
+void forEachBodyEnd(const Body& a, const Body& b, double thickness, bool wholeStep, F&& f) {
   const FloatFrame &from = a.tree.frame(), &to = b.tree.frame();
   const auto largest = [](const Vector3d& v) { return v.cwiseAbs().maxCoeff(); };
   const double sizes =
@@ -101,8 +100,8 @@ void forEachBodyEnd(const SearchableGeometry& a, const SearchableGeometry& b, do
 
 /// Sets the map of boxes, and that of k-DOPs if both octrees have them. The boxes of the roots
 /// decide first, because the map of k-DOPs takes longer.
-void setBodyMap(TreePair& trees, BoxMap& map, const SearchableGeometry& a,
-                const SearchableGeometry& b, double thickness, bool wholeStep) {
+void setBodyMap(TreePair& trees, BoxMap& map, const Body& a, const Body& b, double thickness,
+                bool wholeStep) {
   forEachBodyEnd(a, b, thickness, wholeStep, [&](const MapEnd& end) { end.addTo(map); });
   const Octree &ofA = a.tree.octree(), &ofB = b.tree.octree();
   if (&a == &b || ofA.dops().directions == 3 || ofA.dops().directions != ofB.dops().directions ||
@@ -114,13 +113,12 @@ void setBodyMap(TreePair& trees, BoxMap& map, const SearchableGeometry& a,
 
 }  // namespace
 
-Vector3d worldOrigin(const SearchableGeometry& geometry) {
+Vector3d worldOrigin(const Body& geometry) {
   const Vector3d& origin = geometry.tree.frame().origin;
   return geometry.isPlaced() ? geometry.mesh.now.transform()(origin) : origin;
 }
 
-BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, double thickness,
-                bool wholeStep) {
+BoxMap worldMap(const Body& geometry, const Vector3d& origin, double thickness, bool wholeStep) {
   BoxMap map;
   if (!geometry.isPlaced()) return map;
   const FloatFrame& frame = geometry.tree.frame();
@@ -139,8 +137,7 @@ BoxMap worldMap(const SearchableGeometry& geometry, const Vector3d& origin, doub
   return map;
 }
 
-TreePair treesOf(const SearchableGeometry& a, const SearchableGeometry& b, double thickness,
-                 bool wholeStep, BoxFrame frame) {
+TreePair treesOf(const Body& a, const Body& b, double thickness, bool wholeStep, BoxFrame frame) {
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
   trees.isClamped = mayBeClamped(a.tree) || mayBeClamped(b.tree);
   if (frame == BoxFrame::Body && hasBodyMap(a, b, wholeStep)) {
@@ -169,17 +166,17 @@ std::string GeometryLabel::number() const {
 std::string nameOf(const GeometryLabel& label) { return "geometry " + label.number(); }
 
 void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
-              const Threads& threads, SearchableGeometry& out) {
+              const Threads& threads, Body& out) {
   out.mesh.now = Positions(std::vector(positions.begin(), positions.end()));
   out.mesh.before = out.mesh.now;
   out.mesh.topology.vertexCount = positions.size();
   out.mesh.topology.triangles.assign(triangles.begin(), triangles.end());
-  out.revisions.topology = out.revisions.counter.next();
-  const double spread = out.tree.sampleFrame(out.mesh, out.revisions.topology);
-  out.tree.update(out.mesh, out.revisions.topology, frameScale(spread), {}, threads);
+  out.revisions.elements.topology = out.revisions.counter.next();
+  const double spread = out.tree.sampleFrame(out.mesh, out.revisions.elements.topology);
+  out.tree.update(out.mesh, out.revisions.elements.topology, frameScale(spread), {}, threads);
 }
 
-SearchableGeometry& searchable(SearchableGeometry& geometry) {
+const Body& searchable(const Body& geometry) {
   if (!geometry.isField()) return geometry;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry) +
@@ -193,7 +190,7 @@ std::string nameOf(GeometryType type) {
   return kNames[static_cast<std::size_t>(type)];
 }
 
-void checkMeshType(const SearchableGeometry& geometry, bool tetrahedra, const char* call) {
+void checkMeshType(const Body& geometry, bool tetrahedra, const char* call) {
   if (geometry.mesh.topology.hasFaces() && (geometry.solid != nullptr) == tetrahedra) return;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(geometry) + " is " +

@@ -12,7 +12,7 @@
 
 namespace palpate {
 
-struct SearchableGeometry;
+struct Body;
 
 /// The generalised winding number of any triangles about points: the sum of their solid angles, as
 /// shares of the sphere, signed by the side that faces the point. For a closed body it is the
@@ -32,15 +32,15 @@ class WindingNumbers {
   };
 
   /// Updates the clusters to the body's positions now. The body's octree must be up to date.
-  void update(const SearchableGeometry& body, const Threads&);
+  void update(const Body& body, const Threads&);
   /// Call after update(). Returns whether the winding number's magnitude is at least 1/2. Not
   /// decided if it is within `margin` of 1/2, or if rounding errors leave this open. The answer is
   /// that of the sum over all triangles, and does not depend on the octree.
-  Result evaluate(const SearchableGeometry& body, const Eigen::Vector3d&, double margin,
-                  bool bruteForce, PointQueryStack&) const;
+  Result evaluate(const Body& body, const Eigen::Vector3d&, double margin, bool bruteForce,
+                  PointQueryStack&) const;
   /// Call after update(). The winding number, which may have either sign, with an error bound. The
   /// bound is at most `error`, unless rounding errors are larger.
-  SolidAngleShare value(const SearchableGeometry& body, const Eigen::Vector3d&, double error,
+  SolidAngleShare value(const Body& body, const Eigen::Vector3d&, double error,
                         PointQueryStack&) const;
 
  private:
@@ -52,18 +52,18 @@ class WindingNumbers {
     void add(const Cluster&);
     void enclose(const Cluster&);
   };
-  void computeOwnCluster(const SearchableGeometry& body, OctreeNode);
+  void computeOwnCluster(const Body& body, OctreeNode);
   SolidAngleShare clusterShare(const Cluster&, const Eigen::Vector3d& p, double distance) const;
   /// The sum of clusters and triangles for which isEnough(sum) is true, or else that of all
   /// triangles.
   template <class F>
-  SolidAngleShare sum(const SearchableGeometry& body, const Eigen::Vector3d&, bool bruteForce,
-                      PointQueryStack&, F&& isEnough) const;
+  SolidAngleShare sum(const Body& body, const Eigen::Vector3d&, bool bruteForce, PointQueryStack&,
+                      F&& isEnough) const;
 
-  DerivedFrom<2> m_clustersVersion;  ///< positions in the body's frame, and the transform
-  std::uint64_t m_treeUpdates = 0;   ///< GeometryOctree::updates() for which m_clusters hold
-  Buffer<Cluster> m_clusters;        ///< by octree node
-  double m_magnitude = 0;            ///< L: of the coordinates
+  DerivedFrom<PositionsState> m_clustersVersion;
+  std::uint64_t m_treeUpdates = 0;  ///< GeometryOctree::updates() for which m_clusters hold
+  Buffer<Cluster> m_clusters;       ///< by octree node
+  double m_magnitude = 0;           ///< L: of the coordinates
 };
 
 }  // namespace palpate
