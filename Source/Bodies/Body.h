@@ -3,15 +3,15 @@
 #include <palpate/DistanceField.h>
 #include <palpate/Types.h>
 
-#include "Core/MemoryBudget.h"
+#include "Bodies/GeometryOctree.h"
+#include "Bodies/PreparedData.h"
+#include "Octree/BoxMap.h"
+#include "Octree/Traversal.h"
+#include "Shapes/PlacedShape.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TetrahedralTopology.h"
 #include "Mesh/TriangleMesh.h"
-#include "Octree/BoxMap.h"
-#include "Octree/Traversal.h"
-#include "Bodies/GeometryOctree.h"
-#include "Bodies/PreparedData.h"
-#include "Shapes/PlacedShape.h"
+#include "Core/MemoryBudget.h"
 
 #include <Eigen/Core>
 

@@ -1,8 +1,8 @@
 #include "Bodies/GeometryOctree.h"
 
+#include "Mesh/TriangleBoxes.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Mesh/TriangleBoxes.h"
 
 #include <algorithm>
 #include <array>

@@ -3,14 +3,14 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
-#include "Core/Arena.h"
-#include "Core/Buffer.h"
-#include "Core/Threads.h"
+#include "Octree/Octree.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
 #include "Mesh/UnfoldedStars.h"
-#include "Octree/Octree.h"
+#include "Core/Arena.h"
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
 
 #include <cstdint>
 #include <span>

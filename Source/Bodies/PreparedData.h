@@ -2,10 +2,10 @@
 
 #include "Bodies/TetrahedronTree.h"
 #include "Bodies/WindingNumber.h"
-#include "Core/MemoryBudget.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TetrahedralTopology.h"
+#include "Core/MemoryBudget.h"
 
 #include <array>
 #include <atomic>

@@ -3,10 +3,10 @@
 #include <palpate/Settings.h>
 #include <palpate/Types.h>
 
+#include "Octree/Octree.h"
+#include "Mesh/FloatPositions.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Mesh/FloatPositions.h"
-#include "Octree/Octree.h"
 
 #include <cstdint>
 #include <span>

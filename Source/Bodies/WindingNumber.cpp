@@ -1,7 +1,7 @@
 #include "Bodies/WindingNumber.h"
 
-#include "Math/Tolerances.h"
 #include "Bodies/Body.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <array>

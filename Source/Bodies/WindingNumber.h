@@ -1,10 +1,10 @@
 #pragma once
 
+#include "Octree/PointQueries.h"
+#include "Mesh/Revision.h"
+#include "Math/SolidAngle.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Math/SolidAngle.h"
-#include "Mesh/Revision.h"
-#include "Octree/PointQueries.h"
 
 #include <Eigen/Core>
 

@@ -1,10 +1,10 @@
 #include "CollisionDetection/BodyContacts.h"
 
+#include "Queries/Containment.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Queries/Containment.h"
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "CollisionDetection/PairTable.h"
-#include "NarrowPhase/NarrowPhase.h"
 #include "Queries/BodyPenetration.h"
+#include "NarrowPhase/NarrowPhase.h"
 
 #include <cstddef>
 #include <cstdint>

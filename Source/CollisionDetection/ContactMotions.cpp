@@ -2,8 +2,8 @@
 #include <palpate/Error.h>
 
 #include "CollisionDetection/ShapePointMotion.h"
-#include "Core/FloatingPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/FloatingPoint.h"
 
 #include <Eigen/Geometry>
 

@@ -6,8 +6,8 @@
 
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/PairTable.h"
-#include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Buffer.h"
 
 #include <cstdint>
 #include <span>

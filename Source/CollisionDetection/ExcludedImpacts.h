@@ -3,8 +3,8 @@
 #include <palpate/CollisionData.h>
 
 #include "NarrowPhase/NarrowPhase.h"
-#include "Math/NormalCone.h"
 #include "Mesh/ExcludedDirections.h"
+#include "Math/NormalCone.h"
 
 #include <algorithm>
 #include <array>

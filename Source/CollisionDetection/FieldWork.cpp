@@ -2,10 +2,10 @@
 
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/PairResults.h"
-#include "Core/MemoryBudget.h"
-#include "Core/Stopwatch.h"
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldContacts.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Stopwatch.h"
 
 namespace palpate {
 

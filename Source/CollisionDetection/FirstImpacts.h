@@ -2,9 +2,9 @@
 
 #include <palpate/CollisionData.h>
 
-#include "CollisionDetection/Order.h"
-#include "Core/Buffer.h"
+#include "NarrowPhase/Order.h"
 #include "Math/NormalCone.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <cstdint>

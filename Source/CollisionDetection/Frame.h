@@ -7,8 +7,8 @@
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/PairWork.h"
-#include "Core/Threads.h"
 #include "Octree/Traversal.h"
+#include "Core/Threads.h"
 
 #include <cstddef>
 #include <memory>

@@ -5,12 +5,12 @@
 
 #include "CollisionDetection/GeometryStep.h"
 #include "CollisionDetection/RigidBody.h"
+#include "Validity/MethodChoice.h"
 #include "DistanceField/SurfaceProxy.h"
+#include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
-#include "Octree/PointQueries.h"
-#include "Bodies/Body.h"
-#include "Validity/MethodChoice.h"
 
 #include <array>
 #include <cstdint>

@@ -1,31 +1,13 @@
 #pragma once
 
 #include "CollisionDetection/GeometryTable.h"
-#include "Core/Threads.h"
-#include "Mesh/TetrahedralTopology.h"
 
-#include <span>
-#include <vector>
+#include <cstddef>
 
 namespace palpate {
 
-// Checks of the user's input. Each function throws an Error that describes the fault.
+// Checks of calls that change a geometry. Each function throws an Error that describes the fault.
 
-/// Copies the positions to `out` while checking them. which: " before", " now" or nothing, for the
-/// message. If `before` is given, `moved` receives the motion from there; this costs half as much
-/// as reading both arrays again.
-void checkPositions(const GeometryLabel&, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
-                    const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
-                    MotionRange* moved = nullptr);
-/// Returns a copy of the positions of a new topology.
-CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
-void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
-                 GeometryType);
-TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen::Vector3d> rest,
-                                    std::span<const Tetrahedron>);
-void checkRadii(const GeometryLabel&, std::span<const double>);
-void checkOnePerVertex(const GeometryLabel&, std::span<const Eigen::Vector3d>,
-                       std::span<const double> radii);
 /// Throws unless the field is of this mesh, which may have one.
 void checkAttachable(const Geometry&, const DistanceField&);
 void checkProxy(const Geometry&, const SurfaceProxySettings&);

@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "CollisionDetection/GeometryChecks.h"
+#include "Bodies/InputChecks.h"
 #include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
 

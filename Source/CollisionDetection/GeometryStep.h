@@ -2,13 +2,13 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Threads.h"
+#include "Bodies/Body.h"
+#include "Shapes/PlacedShape.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Positions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
-#include "Bodies/Body.h"
-#include "Shapes/PlacedShape.h"
+#include "Core/Threads.h"
 
 #include <cstdint>
 #include <memory>

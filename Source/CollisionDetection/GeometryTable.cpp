@@ -1,6 +1,7 @@
 #include "CollisionDetection/GeometryTable.h"
 
 #include "CollisionDetection/GeometryChecks.h"
+#include "Bodies/InputChecks.h"
 
 #include <Eigen/Geometry>
 

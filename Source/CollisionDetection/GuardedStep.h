@@ -3,8 +3,8 @@
 #include <palpate/StepGuard.h>
 
 #include "CollisionDetection/StepSource.h"
-#include "Math/ImpactQuery.h"
 #include "Mesh/Positions.h"
+#include "Math/ImpactQuery.h"
 
 #include <array>
 #include <cstdint>

@@ -3,13 +3,13 @@
 #include <palpate/FrameStatistics.h>
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
-#include "Core/MemoryBudget.h"
-#include "Core/Threads.h"
 #include "DistanceField/PlacedProxy.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
+#include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Threads.h"
 
 #include <cstddef>
 #include <cstdint>

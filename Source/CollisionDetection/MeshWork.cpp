@@ -1,13 +1,13 @@
 #include "CollisionDetection/MeshWork.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "Core/Stopwatch.h"
-#include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Math/Tolerances.h"
+#include "Core/Stopwatch.h"
 
 #include <algorithm>
 #include <limits>

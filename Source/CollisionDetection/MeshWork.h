@@ -3,10 +3,10 @@
 #include "CollisionDetection/JobScratch.h"
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/PairTable.h"
-#include "Core/MemoryBudget.h"
 #include "NarrowPhase/FeaturePairs.h"
-#include "Octree/Traversal.h"
 #include "Bodies/Body.h"
+#include "Octree/Traversal.h"
+#include "Core/MemoryBudget.h"
 
 #include <cstddef>
 #include <span>

@@ -6,12 +6,12 @@
 #include "CollisionDetection/BodyContacts.h"
 #include "CollisionDetection/FirstImpacts.h"
 #include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/Order.h"
 #include "CollisionDetection/PairTable.h"
-#include "Core/Buffer.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Shapes/DistinctContacts.h"
+#include "Core/Buffer.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -4,12 +4,12 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/GeometryTable.h"
-#include "DistanceField/SurfaceProxy.h"
 #include "Validity/Trust.h"
+#include "DistanceField/FieldContacts.h"
+#include "DistanceField/SurfaceProxy.h"
+#include "NarrowPhase/NarrowPhase.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
-#include "DistanceField/FieldContacts.h"
-#include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
 #include <atomic>

@@ -3,9 +3,9 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/ProxyWork.h"
+#include "Queries/ElementsNearShape.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Queries/ElementsNearShape.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,10 +1,10 @@
 #include "CollisionDetection/RigidBody.h"
 
 #include "CollisionDetection/Geometry.h"
-#include "Math/StableLength.h"
-#include "Math/Tolerances.h"
 #include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
+#include "Math/StableLength.h"
+#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 #pragma once
 
+#include "Octree/PointQueries.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
-#include "Octree/PointQueries.h"
 
 #include <array>
 #include <cstdint>

@@ -3,10 +3,10 @@
 #include <palpate/Error.h>
 
 #include "CollisionDetection/PairTable.h"
-#include "Core/Text.h"
+#include "Validity/MethodChoice.h"
 #include "Math/Range.h"
 #include "Math/Tolerances.h"
-#include "Validity/MethodChoice.h"
+#include "Core/Text.h"
 
 #include <algorithm>
 #include <filesystem>

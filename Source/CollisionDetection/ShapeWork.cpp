@@ -2,11 +2,11 @@
 
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/PairResults.h"
-#include "Core/MemoryBudget.h"
-#include "Core/Stopwatch.h"
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeContacts.h"
 #include "Shapes/ShapeNearings.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Stopwatch.h"
 
 namespace palpate {
 

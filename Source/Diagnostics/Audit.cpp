@@ -5,9 +5,9 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/ExcludedImpacts.h"
 #include "CollisionDetection/FirstImpacts.h"
-#include "CollisionDetection/Order.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
+#include "NarrowPhase/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Shapes/DistinctContacts.h"
 

@@ -1,10 +1,10 @@
 #include <palpate/Capture.h>
 
-#include "CollisionDetection/SettingsCheck.h"
 #include "Diagnostics/Audit.h"
+#include "CollisionDetection/SettingsCheck.h"
+#include "Shapes/Shape.h"
 #include "Core/FloatingPoint.h"
 #include "Core/WholeFile.h"
-#include "Shapes/Shape.h"
 
 #include <algorithm>
 #include <array>

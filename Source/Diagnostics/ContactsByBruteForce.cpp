@@ -1,7 +1,6 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 
 #include "DistanceField/FieldContacts.h"
-#include "Math/ClosestPoint.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Intersection.h"
@@ -12,6 +11,7 @@
 #include "NarrowPhase/TouchNormal.h"
 #include "Shapes/ShapeContacts.h"
 #include "Shapes/ShapeNearings.h"
+#include "Math/ClosestPoint.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,5 +1,5 @@
-#include "CollisionDetection/DiagnosticsInterface.h"
 #include "Diagnostics/ContactsByBruteForce.h"
+#include "CollisionDetection/DiagnosticsInterface.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "DistanceField/SurfaceSign.h"
-#include "Octree/PointQueries.h"
 #include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
 
 #include <Eigen/Core>
 

@@ -2,16 +2,17 @@
 
 #include <palpate/Error.h>
 
-#include "Core/FloatingPoint.h"
-#include "Core/Text.h"
-#include "Math/Range.h"
-#include "Core/Threads.h"
-#include "DistanceField/ClosedBody.h"
 #include "DistanceField/FieldBuilder.h"
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldFile.h"
+#include "Queries/ClosedBody.h"
 #include "Queries/Containment.h"
 #include "Bodies/Body.h"
+#include "Bodies/InputChecks.h"
+#include "Math/Range.h"
+#include "Core/FloatingPoint.h"
+#include "Core/Text.h"
+#include "Core/Threads.h"
 
 #include <string>
 #include <utility>

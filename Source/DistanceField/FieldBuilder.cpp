@@ -2,12 +2,12 @@
 
 #include <palpate/Error.h>
 
-#include "Core/Text.h"
 #include "DistanceField/CellCertifier.h"
 #include "DistanceField/CornerTable.h"
 #include "DistanceField/NearestTriangle.h"
 #include "DistanceField/SurfaceSign.h"
 #include "Math/Tolerances.h"
+#include "Core/Text.h"
 
 #include <Eigen/Geometry>
 

@@ -2,9 +2,9 @@
 
 #include <palpate/DistanceField.h>
 
-#include "Core/Threads.h"
 #include "DistanceField/FieldCells.h"
 #include "Bodies/Body.h"
+#include "Core/Threads.h"
 
 namespace palpate {
 

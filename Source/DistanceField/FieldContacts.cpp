@@ -2,8 +2,8 @@
 
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldMinimum.h"
-#include "Math/Tolerances.h"
 #include "Shapes/Shape.h"
+#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 

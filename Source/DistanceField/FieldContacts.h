@@ -3,11 +3,11 @@
 #include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
-#include "Mesh/TriangleMesh.h"
-#include "Octree/PointQueries.h"
 #include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
 #include "Shapes/ShapeContacts.h"
+#include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <Eigen/Core>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Math/VertexTriangleDistances.h"
 #include "Bodies/Body.h"
+#include "Math/VertexTriangleDistances.h"
 
 #include <Eigen/Core>
 

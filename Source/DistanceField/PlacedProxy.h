@@ -2,10 +2,10 @@
 
 #include <palpate/CollisionData.h>
 
-#include "Core/Buffer.h"
 #include "DistanceField/SurfaceProxy.h"
 #include "Mesh/Motion.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <cstddef>

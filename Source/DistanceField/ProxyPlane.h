@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Core/Buffer.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <Eigen/Core>
 

@@ -2,10 +2,10 @@
 
 #include <palpate/Error.h>
 
-#include "Core/FloatingPoint.h"
 #include "DistanceField/ProxyPlane.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/FloatingPoint.h"
 
 #include <Eigen/Geometry>
 
@@ -78,7 +78,13 @@ struct Part {
 class SurfaceProxyBuilder {
  public:
   SurfaceProxyBuilder(const TriangleMesh& body, const ProxySettings& settings, SurfaceProxy& out)
-      : m_topology(body.topology), m_positions(body.now.body()), m_settings(settings), m_out(out) {}
+      : m_topology(body.topology),
+        m_positions(body.now.body()),
+        m_settings(settings),
+        m_mostListed(std::min(settings.mostListed,
+                              std::max(std::uint64_t{1} << 23,
+                                       settings.mostListedEach * body.topology.triangles.size()))),
+        m_out(out) {}
 
   void build(const Threads& threads) {
     placeCells();
@@ -103,7 +109,7 @@ class SurfaceProxyBuilder {
         ProxyPlanes::Scratch scratch;
         if (!isDivided(next[i].node, parent.items, next[i].items, scratch, found[i]))
           next[i].items = {};
-        count(next[i].items.size, kept, m_settings.mostListed / kListedPerItem, kInLists);
+        count(next[i].items.size, kept, m_mostListed / kListedPerItem, kInLists);
       });
       for (Part& part : found) parts.push_back(std::move(part));
       std::erase_if(next, [](const Visited& visited) { return visited.items.size == 0; });
@@ -357,9 +363,7 @@ class SurfaceProxyBuilder {
                       ": the thickness and the radii are too large for the body, or it has too "
                       "many triangles apart from each other");
   }
-  void countListed(std::size_t size) const {
-    count(size, m_listed, m_settings.mostListed, kInLists);
-  }
+  void countListed(std::size_t size) const { count(size, m_listed, m_mostListed, kInLists); }
 
   /// Appends leaves, lists and blocks. Returns the indices of the part's first leaf and block.
   std::array<std::uint32_t, 2> join(Part& part) {
@@ -401,6 +405,7 @@ class SurfaceProxyBuilder {
   const MeshTopology& m_topology;
   const std::span<const Vector3d> m_positions;
   const ProxySettings m_settings;
+  const std::uint64_t m_mostListed;
   SurfaceProxy& m_out;
   std::optional<ProxyPlanes> m_planes;
   ProxyItems m_items;

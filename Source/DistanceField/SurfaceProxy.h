@@ -1,8 +1,8 @@
 #pragma once
 
+#include "Mesh/TriangleMesh.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Mesh/TriangleMesh.h"
 
 #include <array>
 #include <cstdint>
@@ -16,8 +16,9 @@ struct ProxySettings {
   double allowedError = 0;  ///< L: largest proven error of a leaf's plane
   double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
   /// Most triangles that are compared with nodes while the leaves are built, and most in lists of
-  /// leaves and of nodes that are divided last.
-  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 25;
+  /// leaves and of nodes that are divided last. Of the latter also at most mostListedEach a
+  /// triangle, where that is more than 2^23.
+  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 26, mostListedEach = 512;
   friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
 };
 

@@ -1,7 +1,7 @@
 #include "DistanceField/SurfaceSign.h"
 
-#include "Math/Tolerances.h"
 #include "Queries/Containment.h"
+#include "Math/Tolerances.h"
 
 #include <cmath>
 #include <numbers>

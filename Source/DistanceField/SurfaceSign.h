@@ -1,8 +1,8 @@
 #pragma once
 
 #include "DistanceField/BoundaryCurve.h"
-#include "Octree/PointQueries.h"
 #include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
 
 #include <Eigen/Core>
 

@@ -1,8 +1,8 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
-#include "Exact/FilteredSigns.h"
 #include "Math/Foot.h"
 #include "Math/Tolerances.h"
+#include "Exact/FilteredSigns.h"
 #include "Core/FloatingPoint.h"
 
 #include <algorithm>

@@ -1,9 +1,9 @@
 #include "Math/Nearing.h"
 
-#include "Exact/Rational.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Exact/Rational.h"
 
 #include <algorithm>
 #include <cmath>

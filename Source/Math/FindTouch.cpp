@@ -1,7 +1,7 @@
-#include "Exact/CubicRoot.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
+#include "Exact/CubicRoot.h"
 
 #include <algorithm>
 #include <optional>

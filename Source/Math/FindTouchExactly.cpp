@@ -1,6 +1,6 @@
-#include "Core/Assert.h"
-#include "Exact/AlgebraicTime.h"
 #include "Math/ImpactQuery.h"
+#include "Exact/AlgebraicTime.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <bit>

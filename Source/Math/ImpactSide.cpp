@@ -1,10 +1,10 @@
 #include "Math/ClosestPoint.h"
-#include "Exact/CubicRoot.h"
-#include "Exact/ExactVector.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Exact/CubicRoot.h"
+#include "Exact/ExactVector.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Exact/Predicates.h"
 #include "Math/ExactClosestPoint.h"
+#include "Exact/Predicates.h"
 
 #include <cstddef>
 #include <cstdint>

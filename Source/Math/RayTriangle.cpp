@@ -1,10 +1,10 @@
 #include "Math/RayTriangle.h"
 
+#include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
 #include "Exact/ErrorBounds.h"
 #include "Exact/Rational.h"
-#include "Math/ClosestPoint.h"
-#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 #include "Math/RelativeMotion.h"
 
-#include "Exact/CubicRoot.h"
 #include "Math/Tolerances.h"
+#include "Exact/CubicRoot.h"
 
 #include <algorithm>
 

@@ -1,9 +1,9 @@
 #include "Math/RoundSegment.h"
 
-#include "Exact/Compensated.h"
 #include "Math/Foot.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Exact/Compensated.h"
 
 #include <Eigen/Geometry>
 

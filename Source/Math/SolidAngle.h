@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Exact/Predicates.h"
 #include "Math/Tolerances.h"
+#include "Exact/Predicates.h"
 
 #include <Eigen/Geometry>
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Math/NormalCone.h"
 #include "Mesh/TriangleMesh.h"
+#include "Math/NormalCone.h"
 
 #include <Eigen/Core>
 

@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "Core/Buffer.h"
 #include "Math/Box.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <span>

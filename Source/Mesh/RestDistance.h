@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Core/Threads.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Threads.h"
 
 #include <span>
 

@@ -2,8 +2,8 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Buffer.h"
 #include "Mesh/Positions.h"
+#include "Core/Buffer.h"
 
 #include <cstdint>
 #include <span>

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "Core/Buffer.h"
-#include "Core/Threads.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
 
 #include <cstdint>
 #include <span>

@@ -1,9 +1,9 @@
 #include <palpate/Error.h>
 #include <palpate/Types.h>
 
-#include "Core/Text.h"
 #include "Math/Range.h"
 #include "Math/StableLength.h"
+#include "Core/Text.h"
 
 #include <array>
 #include <cmath>

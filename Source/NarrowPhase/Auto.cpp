@@ -1,9 +1,9 @@
 #include "NarrowPhase/Auto.h"
 
-#include "Math/Tolerances.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Math/Tolerances.h"
 
 #include <array>
 #include <cstddef>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Math/ImpactQuery.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Math/ImpactQuery.h"
 
 #include <array>
 #include <span>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Core/Buffer.h"
-#include "Mesh/TriangleMesh.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <Eigen/Geometry>
 

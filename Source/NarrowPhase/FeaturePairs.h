@@ -2,9 +2,9 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Buffer.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <cstdint>

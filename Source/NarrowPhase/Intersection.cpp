@@ -8,8 +8,8 @@
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
-#include "Exact/Predicates.h"
 #include "Math/TriangleIntersection.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <bit>

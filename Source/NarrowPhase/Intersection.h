@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Math/TriangleIntersection.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Math/TriangleIntersection.h"
 
 #include <span>
 

@@ -2,9 +2,9 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Buffer.h"
 #include "Mesh/Positions.h"
 #include "Math/TriangleIntersection.h"
+#include "Core/Buffer.h"
 
 #include <span>
 

@@ -4,11 +4,11 @@
 #include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
-#include "Mesh/TriangleMesh.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "Shapes/ShapeContacts.h"
+#include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <compare>

@@ -4,8 +4,8 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
-#include "Exact/Predicates.h"
 #include "Math/ClosestPoint.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <tuple>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Core/Buffer.h"
-#include "Math/TriangleIntersection.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Math/TriangleIntersection.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <compare>

@@ -2,8 +2,8 @@
 
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
 #include "Math/Box.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <cstddef>

@@ -1,9 +1,9 @@
 #pragma once
 
+#include "Octree/Keys.h"
+#include "Math/Box.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Math/Box.h"
-#include "Octree/Keys.h"
 
 #include <array>
 #include <cstdint>

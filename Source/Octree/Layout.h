@@ -2,10 +2,10 @@
 
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
-#include "Core/Threads.h"
 #include "Octree/KeySort.h"
 #include "Octree/Octree.h"
+#include "Core/Buffer.h"
+#include "Core/Threads.h"
 
 #include <array>
 #include <cstdint>

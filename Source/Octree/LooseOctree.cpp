@@ -2,8 +2,8 @@
 
 #include <palpate/Error.h>
 
-#include "Core/FloatingPoint.h"
 #include "Octree/Forest.h"
+#include "Core/FloatingPoint.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,9 +2,9 @@
 
 #include <palpate/Error.h>
 
-#include "Core/Assert.h"
 #include "Octree/Fit.h"
 #include "Octree/OctreeBuilder.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <numeric>

@@ -3,12 +3,12 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
+#include "Octree/Dops.h"
+#include "Octree/Keys.h"
+#include "Math/Box.h"
 #include "Core/Arena.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Math/Box.h"
-#include "Octree/Dops.h"
-#include "Octree/Keys.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Core/Buffer.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
+#include "Core/Buffer.h"
 
 #include <cstddef>
 #include <cstdint>

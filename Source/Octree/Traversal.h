@@ -2,11 +2,11 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Buffer.h"
-#include "Math/Box.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Dops.h"
 #include "Octree/Octree.h"
+#include "Math/Box.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <array>

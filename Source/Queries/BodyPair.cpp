@@ -1,9 +1,9 @@
 #include "Queries/BodyPair.h"
 
-#include "Math/RayCrossing.h"
-#include "Math/Tolerances.h"
 #include "Queries/Containment.h"
 #include "Queries/GeometryDistances.h"
+#include "Math/RayCrossing.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <bit>

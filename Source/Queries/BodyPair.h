@@ -3,11 +3,11 @@
 #include <palpate/CountedVector.h>
 #include <palpate/Settings.h>
 
-#include "Math/TriangleIntersection.h"
-#include "Octree/PointQueries.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/RayHits.h"
 #include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
+#include "Math/TriangleIntersection.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -1,11 +1,11 @@
 #include "Queries/BodyPenetration.h"
 
+#include "Queries/BodyOverlap.h"
+#include "Queries/HullSeparation.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/TranslationExit.h"
-#include "Queries/BodyOverlap.h"
-#include "Queries/HullSeparation.h"
 
 #include <Eigen/Geometry>
 

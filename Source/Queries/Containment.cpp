@@ -2,13 +2,13 @@
 
 #include <palpate/Error.h>
 
-#include "Core/Text.h"
-#include "Math/RayCrossing.h"
-#include "Math/StableLength.h"
-#include "Math/Tolerances.h"
 #include "Queries/Embedding.h"
 #include "Queries/OuterSurface.h"
 #include "Queries/PointDistances.h"
+#include "Math/RayCrossing.h"
+#include "Math/StableLength.h"
+#include "Math/Tolerances.h"
+#include "Core/Text.h"
 
 #include <algorithm>
 #include <bit>

@@ -3,9 +3,9 @@
 #include <palpate/ClosedMesh.h>
 #include <palpate/Settings.h>
 
-#include "Core/Threads.h"
-#include "Bodies/Body.h"
 #include "Queries/VertexSearch.h"
+#include "Bodies/Body.h"
+#include "Core/Threads.h"
 
 #include <vector>
 

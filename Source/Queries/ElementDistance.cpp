@@ -2,12 +2,12 @@
 
 #include <palpate/Intersection.h>
 
-#include "Exact/Compensated.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ConvexMinimum.h"
 #include "Math/RayTriangle.h"
 #include "Math/RoundSegment.h"
 #include "Math/StableLength.h"
+#include "Exact/Compensated.h"
 
 #include <algorithm>
 #include <cmath>

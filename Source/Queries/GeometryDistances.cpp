@@ -1,13 +1,13 @@
 #include "Queries/GeometryDistances.h"
 
+#include "Queries/ElementDistance.h"
+#include "Queries/PairTraversal.h"
+#include "Queries/PointDistances.h"
+#include "Octree/BoxMap.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Octree/BoxMap.h"
-#include "Queries/ElementDistance.h"
-#include "Queries/PairTraversal.h"
-#include "Queries/PointDistances.h"
 
 #include <Eigen/Geometry>
 

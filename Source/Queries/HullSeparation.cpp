@@ -1,7 +1,7 @@
 #include "Queries/HullSeparation.h"
 
-#include "Exact/Predicates.h"
 #include "Math/StableLength.h"
+#include "Exact/Predicates.h"
 
 #include <Eigen/Geometry>
 

@@ -2,12 +2,12 @@
 
 #include <palpate/Distance.h>
 
+#include "Queries/GeometryDistances.h"
+#include "Queries/PairTraversal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/TriangleIntersection.h"
-#include "Queries/GeometryDistances.h"
-#include "Queries/PairTraversal.h"
 
 #include <Eigen/Geometry>
 

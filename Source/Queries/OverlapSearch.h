@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Core/Buffer.h"
-#include "Mesh/FloatPositions.h"
 #include "Octree/Octree.h"
+#include "Mesh/FloatPositions.h"
+#include "Core/Buffer.h"
 
 #include <palpate/Types.h>
 

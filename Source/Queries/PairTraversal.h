@@ -1,9 +1,9 @@
 #pragma once
 
-#include "Mesh/FloatPositions.h"
-#include "Mesh/TriangleMesh.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
+#include "Mesh/FloatPositions.h"
+#include "Mesh/TriangleMesh.h"
 
 #include <array>
 #include <cstddef>

@@ -1,12 +1,12 @@
 #include "Queries/PathIntervals.h"
 
-#include "Exact/Compensated.h"
-#include "Exact/Predicates.h"
-#include "Math/StableLength.h"
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
 #include "Queries/VertexSearch.h"
+#include "Math/StableLength.h"
+#include "Exact/Compensated.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,10 +2,10 @@
 
 #include <palpate/Error.h>
 
-#include "Core/FloatingPoint.h"
-#include "Exact/Predicates.h"
-#include "Math/Tolerances.h"
 #include "Queries/QuerySource.h"
+#include "Math/Tolerances.h"
+#include "Exact/Predicates.h"
+#include "Core/FloatingPoint.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,9 +3,9 @@
 #include <palpate/Distance.h>
 #include <palpate/SpatialQueries.h>
 
-#include "Core/Threads.h"
 #include "Queries/NearestElements.h"
 #include "Bodies/Body.h"
+#include "Core/Threads.h"
 
 #include <Eigen/Core>
 

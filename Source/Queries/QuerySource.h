@@ -3,18 +3,19 @@
 #include <palpate/Settings.h>
 #include <palpate/SpatialQueries.h>
 
-#include "Core/MemoryBudget.h"
-#include "Core/Threads.h"
 #include "Queries/BodyPenetration.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
 #include "Queries/PointDistances.h"
 #include "Queries/RayHits.h"
-#include "Bodies/Body.h"
 #include "Queries/VertexSearch.h"
+#include "Bodies/Body.h"
 #include "Shapes/DistinctContacts.h"
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
+#include "Core/FloatingPoint.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Threads.h"
 
 #include <array>
 #include <atomic>
@@ -22,13 +23,16 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 namespace palpate {
 
 /// The geometries that SpatialQueries search, and the scratch of their calls. The owner of the
-/// geometries implements the virtual functions.
+/// geometries implements the virtual functions. The queries are defined by question, in
+/// NearestQueries.cpp, RayQueries.cpp, OverlapQueries.cpp, InsideQueries.cpp, DistanceQueries.cpp,
+/// PathQueries.cpp and RigidMesh.cpp.
 class SpatialQueries::Source {
  public:
   /// Scratch of one call, which remembers its peak.
@@ -124,6 +128,18 @@ class SpatialQueries::Source {
     const Threads& m_threads;
   };
 
+  /// One call of a query: its valid source, and the standard floating-point environment.
+  class Call {
+   public:
+    explicit Call(const SpatialQueries& queries) : m_source(queries.valid()) {}
+    Source* operator->() const { return &m_source; }
+    Source& operator*() const { return m_source; }
+
+   private:
+    Source& m_source;
+    const StandardFloatingPoint m_standard;
+  };
+
   // Update the structures that are made when a query first needs them. Run by one thread at a time
   // for each geometry.
   void prepareInside(const Body& body, const InsideSettings&);
@@ -140,6 +156,20 @@ class SpatialQueries::Source {
 /// Throws InvalidSettings if both geometries are the same, and UnsupportedMethod if `vertices` is a
 /// shape.
 void checkVertices(const Body& vertices, GeometryId body);
+/// Throws NonFinitePosition. index: of a batch.
+void checkPoint(const Eigen::Vector3d& point, std::optional<std::size_t> index = {});
+void checkPoints(std::span<const Eigen::Vector3d>);
+/// Throws InvalidSettings unless there is room for as many answers as are asked for.
+void checkSizes(std::size_t asked, std::size_t room, const char* name);
+/// Calls f(begin, end) for parts of a batch, on all threads.
+template <class F>
+void forParts(SpatialQueries::Source& source, std::size_t size, F&& f) {
+  constexpr std::size_t kGrain = 64;
+  const SpatialQueries::Source::Workers workers(source);
+  const Threads& threads = workers;
+  threads.forChunks(size, kGrain,
+                    [&](std::size_t, std::size_t begin, std::size_t end) { f(begin, end); });
+}
 /// Throws InvalidSettings for a length that is negative, NaN or, if `finite`, out of range.
 void checkLength(double length, const char* name, bool finite);
 /// Throws UnsupportedMethod for an analytical shape.

@@ -1,9 +1,9 @@
 #include "Queries/RayHits.h"
 
+#include "Queries/ElementDistance.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
-#include "Queries/ElementDistance.h"
 
 #include <Eigen/Geometry>
 

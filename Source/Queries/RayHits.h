@@ -2,9 +2,9 @@
 
 #include <palpate/SpatialQueries.h>
 
-#include "Math/RayTriangle.h"
 #include "Queries/RayTraversal.h"
 #include "Bodies/Body.h"
+#include "Math/RayTriangle.h"
 
 #include <array>
 #include <cstddef>

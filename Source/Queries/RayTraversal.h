@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Math/RayTriangle.h"
-#include "Mesh/TriangleMesh.h"
 #include "Octree/Octree.h"
+#include "Mesh/TriangleMesh.h"
+#include "Math/RayTriangle.h"
 
 #include <Eigen/Core>
 

@@ -1,8 +1,8 @@
 #include "Queries/ShapeBody.h"
 
-#include "Core/Threads.h"
-#include "Math/StableLength.h"
 #include "Shapes/Polytope.h"
+#include "Math/StableLength.h"
+#include "Core/Threads.h"
 
 #include <Eigen/Geometry>
 

@@ -1,13 +1,13 @@
 #include "Queries/ShapeOverlap.h"
 
+#include "Queries/ElementsNearShape.h"
+#include "Queries/OverlapSearch.h"
+#include "Queries/PointDistances.h"
+#include "Shapes/Shape.h"
 #include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Queries/ElementsNearShape.h"
-#include "Queries/PointDistances.h"
 #include "Math/TriangleIntersection.h"
-#include "Queries/OverlapSearch.h"
-#include "Shapes/Shape.h"
 
 #include <Eigen/Geometry>
 

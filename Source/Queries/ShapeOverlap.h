@@ -1,9 +1,9 @@
 #pragma once
 
-#include "Core/Buffer.h"
-#include "Octree/PointQueries.h"
 #include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
 #include "Shapes/PlacedShape.h"
+#include "Core/Buffer.h"
 
 #include <palpate/AnalyticalGeometry.h>
 

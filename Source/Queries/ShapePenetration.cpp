@@ -1,10 +1,10 @@
 #include "Queries/ShapePenetration.h"
 
-#include "Math/Tolerances.h"
 #include "Queries/BodyOverlap.h"
 #include "Queries/GeometryDistances.h"
 #include "Queries/HullSeparation.h"
 #include "Queries/ShapeBody.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <cmath>

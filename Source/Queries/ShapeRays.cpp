@@ -1,9 +1,9 @@
 #include "Queries/ShapeRays.h"
 
-#include "Exact/Compensated.h"
 #include "Math/RayTriangle.h"
 #include "Math/RoundSegment.h"
 #include "Math/StableLength.h"
+#include "Exact/Compensated.h"
 
 #include <Eigen/Geometry>
 

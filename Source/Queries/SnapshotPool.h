@@ -2,9 +2,9 @@
 
 #include <palpate/Snapshot.h>
 
-#include "Mesh/Revision.h"
 #include "Queries/QuerySource.h"
 #include "Bodies/Body.h"
+#include "Mesh/Revision.h"
 
 #include <cstddef>
 #include <cstdint>

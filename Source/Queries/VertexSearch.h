@@ -1,8 +1,8 @@
 #pragma once
 
 #include "Bodies/Body.h"
-#include "Core/Threads.h"
 #include "Octree/PointQueries.h"
+#include "Core/Threads.h"
 
 #include <cstdint>
 #include <span>

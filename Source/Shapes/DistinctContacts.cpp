@@ -1,8 +1,8 @@
 #include "Shapes/DistinctContacts.h"
 
-#include "Math/NormalCone.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
+#include "Math/NormalCone.h"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 #include "Shapes/Polytope.h"
 
 #include "Shapes/ShapeLengths.h"
-#include "Exact/Compensated.h"
 #include "Math/Foot.h"
+#include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
 
 #include <algorithm>

@@ -2,9 +2,9 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Buffer.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Predicates.h"
+#include "Core/Buffer.h"
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #include "Shapes/Polytope.h"
-#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
+#include "Exact/Compensated.h"
 
 #include <algorithm>
 #include <cmath>

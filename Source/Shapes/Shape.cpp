@@ -1,14 +1,14 @@
 #include "Shapes/Shape.h"
 
-#include "Core/Text.h"
 #include "Shapes/ShapeLengths.h"
 #include "Mesh/Rotation.h"
 #include "Math/ClosestPoint.h"
-#include "Exact/Compensated.h"
 #include "Math/Foot.h"
-#include "Exact/Predicates.h"
 #include "Math/Range.h"
 #include "Math/Tolerances.h"
+#include "Exact/Compensated.h"
+#include "Exact/Predicates.h"
+#include "Core/Text.h"
 
 #include <Eigen/Geometry>
 

@@ -2,8 +2,8 @@
 
 #include "Shapes/ShapeLengths.h"
 #include "Math/ClosestPoint.h"
-#include "Exact/Predicates.h"
 #include "Math/Tolerances.h"
+#include "Exact/Predicates.h"
 
 #include <algorithm>
 #include <limits>

@@ -3,9 +3,9 @@
 #include <palpate/CollisionData.h>
 #include <palpate/Settings.h>
 
-#include "Core/Buffer.h"
-#include "Mesh/TriangleMesh.h"
 #include "Shapes/PlacedShape.h"
+#include "Mesh/TriangleMesh.h"
+#include "Core/Buffer.h"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
+#include "Exact/Compensated.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "Mesh/TriangleMesh.h"
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
+#include "Mesh/TriangleMesh.h"
 
 #include <cstdint>
 #include <span>

@@ -1,9 +1,9 @@
 #include "Shapes/Shape.h"
 #include "Shapes/ShapeLengths.h"
 
+#include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
-#include "Math/Tolerances.h"
 
 #include <Eigen/Geometry>
 

@@ -1,8 +1,8 @@
 #include "Shapes/ShapeStep.h"
 
 #include "Shapes/ShapeLengths.h"
-#include "Exact/Compensated.h"
 #include "Math/Tolerances.h"
+#include "Exact/Compensated.h"
 
 #include <algorithm>
 #include <limits>

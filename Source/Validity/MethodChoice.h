@@ -4,11 +4,11 @@
 #include <palpate/Settings.h>
 #include <palpate/Validity.h>
 
+#include "Validity/Support.h"
+#include "NarrowPhase/NarrowPhase.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
-#include "NarrowPhase/NarrowPhase.h"
-#include "Validity/Support.h"
 
 #include <optional>
 

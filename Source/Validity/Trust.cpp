@@ -1,8 +1,8 @@
 #include "Validity/Trust.h"
 
-#include "Math/Tolerances.h"
-#include "NarrowPhase/Meeting.h"
 #include "Validity/IntersectionAtEnd.h"
+#include "NarrowPhase/Meeting.h"
+#include "Math/Tolerances.h"
 
 #include <algorithm>
 #include <limits>

@@ -2,9 +2,9 @@
 
 #include <palpate/CollisionData.h>
 
-#include "Mesh/Revision.h"
-#include "NarrowPhase/NarrowPhase.h"
 #include "Validity/MethodChoice.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Mesh/Revision.h"
 
 #include <array>
 #include <optional>

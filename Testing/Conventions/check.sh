@@ -32,6 +32,7 @@ allowedIn() {
     NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Queries) echo "Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     DistanceField) echo "DistanceField/ Queries/ Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Simplify) echo "Simplify/ Queries/ Bodies/ Octree/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
@@ -69,7 +70,7 @@ checkPlaces() {
         "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
-        "<meshoptimizer.h") place=Source/DistanceField/SimplifyTriangles.cpp ;;
+        "<meshoptimizer.h") place=Source/Simplify/Meshoptimizer/Simplify.cpp ;;
         "<gmp"*) place=Source/Exact/Exact.h ;;
         "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
@@ -85,7 +86,7 @@ checkPlaces() {
 # that these and the standard library do not.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
-  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Adapters/Vtk/Public
+  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/Vtk/Public
     -ISource/Adapters/Fcl/Public -isystem "$2") header include
   # The files that a compilation, with these options, reads.
   reached() { "${compile[@]}" -fsyntax-only -MD -MF /dev/stdout "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
@@ -109,7 +110,7 @@ checkHeaders() {
   local errors
   errors=$(find Source -name '*.h' -not -path '*/Adapters/*' -exec grep -l '^#pragma once' {} + |
     { xargs grep -L '"Core/Simd.h"' || true; } | sort | sed 's|.*|#include "&"|' |
-    "$1" -std=c++20 -x c++ -fsyntax-only -DPALPATE_SCALAR -DPALPATE_THREADS_STD -I. -ISource -ISource/Public -isystem "$2" - 2>&1) ||
+    "$1" -std=c++20 -x c++ -fsyntax-only -DPALPATE_SCALAR -DPALPATE_THREADS_STD -I. -ISource -ISource/Public -ISource/Simplify/Public -isystem "$2" - 2>&1) ||
     fault "headers do not compile together: $errors"
 }
 

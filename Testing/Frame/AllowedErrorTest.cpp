@@ -7,7 +7,7 @@
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
 #include "DistanceField/FieldContacts.h"
-#include "../Unit/DistanceField/FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

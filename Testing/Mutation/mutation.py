@@ -140,7 +140,7 @@ def configure(tree, build, library):
     write(headers, ''.join(f'#include <{h}>\n' for h in [
         'gtest/gtest.h', 'Eigen/Core', 'Eigen/Geometry', 'algorithm', 'array', 'cmath', 'functional', 'map', 'memory',
         'random', 'set', 'span', 'string', 'vector']))
-    text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{testing} -I{ROOT}/Examples/Common {packages} $
+    text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{tree}/Source/Simplify/Public -I{testing} -I{ROOT}/Examples/Common {packages} $
   -DPALPATE_SHARED_DATA='"{data}"' -DPALPATE_SOURCE_DIR='"{ROOT}"'
 rule precompile
   command = c++ $flags -x c++-header -c $in -o $out
@@ -183,7 +183,7 @@ def check_headers(faults, tree):
     headers = {f['file'] for f in faults if f['file'].endswith('.h')}
     headers = sorted(h for h in headers if '#pragma once' in (ROOT / 'Source' / h).read_text())
     eigen = subprocess.run(['pkg-config', '--cflags', 'eigen3'], text=True, stdout=subprocess.PIPE, check=True).stdout
-    command = ['c++', '-std=c++20', '-fsyntax-only', '-x', 'c++', '-', f'-I{tree}/Source', f'-I{tree}/Source/Public',
+    command = ['c++', '-std=c++20', '-fsyntax-only', '-x', 'c++', '-', f'-I{tree}/Source', f'-I{tree}/Source/Public', f'-I{tree}/Source/Simplify/Public',
                *eigen.split()]
     while True:
         plant(faults, tree)

@@ -6,7 +6,7 @@
 #include "Common/ExpectRefused.h"
 #include "Common/Sanitized.h"
 #include "DistanceField/FieldContacts.h"
-#include "FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 #include <palpate/DistanceField.h>
 
 #include "Common/Sanitized.h"
-#include "FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>

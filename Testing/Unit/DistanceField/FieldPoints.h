@@ -2,7 +2,7 @@
 
 #include <palpate/DistanceField.h>
 
-#include "FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <Eigen/Geometry>
 

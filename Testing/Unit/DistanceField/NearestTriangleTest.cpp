@@ -5,7 +5,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
-#include "FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <gtest/gtest.h>
 
@@ -62,9 +62,10 @@ TEST(NearestTriangle, IsWithinItsTolerance) {
     geometry.mesh.topology.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
     geometry.revisions.elements.topology = geometry.revisions.counter.next();
     const Threads threads(1);
-    const double spread = geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, frameScale(spread), {},
-                         threads);
+    const double spread =
+        geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, frameScale(spread),
+                         {}, threads);
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : mesh.positions) box.extend(p);
     const double size = box.diagonal().norm();

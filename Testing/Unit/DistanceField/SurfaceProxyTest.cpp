@@ -7,7 +7,7 @@
 
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
-#include "FieldMeshes.h"
+#include "Common/FieldMeshes.h"
 
 #include <gtest/gtest.h>
 

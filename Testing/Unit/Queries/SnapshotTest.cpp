@@ -219,7 +219,8 @@ class TestSource : public SpatialQueries::Source {
         m_revisions.next());
     geometry.mesh.before = geometry.mesh.now;
     geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
-    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, 1.0, m_settings, m_thread);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, 1.0, m_settings,
+                         m_thread);
   }
   void remove(std::size_t i) { m_geometries.erase(m_geometries.begin() + i); }
 

@@ -2,8 +2,8 @@
 
 #include <palpate/Types.h>
 
-#include "Core/Threads.h"
 #include "Bodies/Body.h"
+#include "Core/Threads.h"
 
 namespace palpate {
 
@@ -17,7 +17,5 @@ void makeCheckedBody(const TriangleMeshView&, const Threads&, Body& out);
 
 /// Throws InvalidSettings unless a setting is positive and at most kLargestMeasure.
 void checkPositive(double length, const char* name);
-/// Throws InvalidSettings for a number of threads out of range.
-void checkThreads(int threads);
 
 }  // namespace palpate

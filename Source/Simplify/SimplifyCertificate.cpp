@@ -1,4 +1,4 @@
-#include "DistanceField/SimplifyCertificate.h"
+#include "Simplify/SimplifyCertificate.h"
 
 #include "Queries/Containment.h"
 #include "Queries/PointDistances.h"

@@ -2,10 +2,11 @@
 
 #include <palpate/Simplify.h>
 
-#include "Core/Threads.h"
-#include "DistanceField/SimplifyCertificate.h"
-#include "DistanceField/SimplifyOffset.h"
+#include "Simplify/SimplifyBy.h"
+#include "Simplify/SimplifyCertificate.h"
+#include "Simplify/SimplifyOffset.h"
 #include "Bodies/Body.h"
+#include "Core/Threads.h"
 
 #include <Eigen/Core>
 
@@ -23,7 +24,8 @@ namespace palpate {
 class Simplifier {
  public:
   /// largest: L, of the mesh's coordinates. The body's octree must be up to date.
-  Simplifier(const Body& body, const SimplifySettings&, double largest, const Threads&);
+  Simplifier(CollapseEdges, const Body& body, const SimplifySettings&, double largest,
+             const Threads&);
   SimplifiedMesh run();
 
  private:
@@ -52,13 +54,14 @@ class Simplifier {
   std::optional<ElementPair> findCrossing() const;
 
   Corners cornersOf(const Triangle&) const;
-  double errorOf(std::uint8_t level) const;   ///< L: for simplifyTriangles()
+  double errorOf(std::uint8_t level) const;   ///< L: for CollapseEdges
   double offsetOf(std::uint8_t level) const;  ///< L: the least offset of planes
   /// Calls f(index, stack) for [0, size), on all threads, and reports the progress.
   template <class F>
   void forEach(std::size_t size, F&& f);
   void report(double share);
 
+  const CollapseEdges m_collapse;
   const Body& m_body;
   const SimplifySettings& m_settings;
   const Threads& m_threads;

@@ -1,4 +1,4 @@
-#include "DistanceField/SimplifyTriangles.h"
+#include "Simplify/SimplifyBy.h"
 
 #include <Eigen/Geometry>
 #include <meshoptimizer.h>
@@ -8,8 +8,10 @@
 
 namespace palpate {
 
-std::vector<Triangle> simplifyTriangles(std::span<const Eigen::Vector3d> positions,
-                                        std::span<const Triangle> triangles, double error) {
+/// By quadric error metrics: where the metric of a collapse exceeds the error, the edge stays. The
+/// metric estimates the distance of the surfaces and does not bound it.
+static std::vector<Triangle> collapseEdges(std::span<const Eigen::Vector3d> positions,
+                                           std::span<const Triangle> triangles, double error) {
   if (triangles.empty()) return {};
   constexpr std::uint32_t kUnused = 0xffffffff;
   std::vector<std::uint32_t> numbers(positions.size(), kUnused), vertices;
@@ -41,6 +43,10 @@ std::vector<Triangle> simplifyTriangles(std::span<const Eigen::Vector3d> positio
   for (std::size_t i = 0; i < simplified.size(); ++i)
     result[i / 3][i % 3] = vertices[simplified[i]];
   return result;
+}
+
+SimplifiedMesh simplify(const TriangleMeshView& mesh, const SimplifySettings& settings) {
+  return simplifyBy(&collapseEdges, mesh, settings);
 }
 
 }  // namespace palpate

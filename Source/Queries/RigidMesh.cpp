@@ -2,17 +2,19 @@
 
 #include <palpate/Error.h>
 
-#include "CollisionDetection/GeometryTable.h"
-#include "CollisionDetection/Order.h"
-#include "Core/FloatingPoint.h"
-#include "NarrowPhase/NarrowPhase.h"
-#include "Octree/Traversal.h"
 #include "Queries/QuerySource.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "NarrowPhase/Order.h"
+#include "Bodies/Body.h"
+#include "Bodies/InputChecks.h"
+#include "Octree/Traversal.h"
+#include "Core/FloatingPoint.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
-// Contacts of a mesh at a pose of its own. This query is here, because it runs the narrow phase.
+// SpatialQueries::contacts(): contacts of a mesh at a pose of its own.
 namespace palpate {
 
 struct RigidMesh::Implementation {
@@ -30,17 +32,18 @@ struct RigidMesh::Implementation {
     }
   };
 
-  Geometry& place(const RigidTransform& pose, const Body& beside, const OctreeSettings& settings) {
-    Geometry& mesh = *table.all().front();
-    table.setTransform(mesh.body.id, std::nullopt, pose);
+  const Body& place(const RigidTransform& pose, const Body& beside,
+                    const OctreeSettings& settings) {
+    body.mesh.now.place(pose, body.revisions.counter.next());
+    body.mesh.before.placeAs(body.mesh.now);
     const double scale = beside.tree.frame().scale;
-    if (!mesh.body.tree.isCurrent(mesh.body.mesh, mesh.body.revisions.elements.topology, scale)) {
-      mesh.body.tree.sampleFrame(mesh.body.mesh, mesh.body.revisions.elements.topology);
-      mesh.body.tree.update(mesh.body.mesh, mesh.body.revisions.elements.topology, scale, settings,
-                            one);
+    const Revision topology = body.revisions.elements.topology;
+    if (!body.tree.isCurrent(body.mesh, topology, scale)) {
+      body.tree.sampleFrame(body.mesh, topology);
+      body.tree.update(body.mesh, topology, scale, settings, one);
     }
-    mesh.body.tree.updateDops(mesh.body.mesh, settings.bounds, one);
-    return mesh;
+    body.tree.updateDops(body.mesh, settings.bounds, one);
+    return body;
   }
   void findByOctree(const Body& a, const Body& b, Job& job) {
     const TreePair trees = treesOf(a, b, job.pair.maxFeatureDistance(), false, BoxFrame::Body);
@@ -58,7 +61,7 @@ struct RigidMesh::Implementation {
     }
   }
 
-  GeometryTable table;  ///< holds the mesh alone
+  Body body{GeometryId{0}};
   const Threads one{1};
   TraversalStack stack;
   PairSink sink;
@@ -72,7 +75,14 @@ struct RigidMesh::Implementation {
 RigidMesh::RigidMesh(std::span<const Eigen::Vector3d> positions,
                      std::span<const Triangle> triangles)
     : m_implementation(std::make_unique<Implementation>()) {
-  m_implementation->table.add(positions, triangles);
+  Body& body = m_implementation->body;
+  checkCounts(body, positions, triangles, GeometryType::Triangles);
+  body.mesh.rest = checkedRest(body, positions);
+  body.mesh.topology = MeshTopology(positions.size(), triangles);
+  body.mesh.now.setBody(std::make_shared<const CountedVector<Eigen::Vector3d>>(body.mesh.rest),
+                        body.revisions.counter.next());
+  body.mesh.before.setBodyOf(body.mesh.now);
+  body.revisions.elements.topology = body.revisions.counter.next();
 }
 RigidMesh::RigidMesh(RigidMesh&&) noexcept = default;
 RigidMesh& RigidMesh::operator=(RigidMesh&&) noexcept = default;
@@ -81,25 +91,24 @@ RigidMesh::~RigidMesh() = default;
 void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
                               const Eigen::Vector3d& translation, double thickness,
                               CollisionData& out) const {
-  Source& source = valid();
-  const StandardFloatingPoint standard;
+  const Source::Call source(*this);
   if (!mesh.m_implementation)
     throw Error(ErrorCode::InvalidCall, "this RigidMesh object was moved from");
   const RigidTransform pose = checkedPose({rotation, translation}, "the query's mesh");
   checkLength(thickness, "thickness", true);
-  const Body& a = source.at(id);
+  const Body& a = source->at(id);
   checkHasElements(a);
   RigidMesh::Implementation& all = *mesh.m_implementation;
-  const Geometry& b = all.place(pose, a, source.octreeSettings());
+  const Body& b = all.place(pose, a, source->octreeSettings());
   all.found.clear();
-  const MeshPair pair{a.mesh, b.body.mesh, {Method::Proximity, thickness}};
+  const MeshPair pair{a.mesh, b.mesh, {Method::Proximity, thickness}};
   RigidMesh::Implementation::Job job{pair, all};
   const auto countA = static_cast<std::uint32_t>(a.mesh.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(b.body.mesh.topology.triangles.size());
-  if (source.engine() == Engine::BruteForce)
+             countB = static_cast<std::uint32_t>(b.mesh.topology.triangles.size());
+  if (source->engine() == Engine::BruteForce)
     all.findByBruteForce(countA, countB, job);
   else if (countA > 0 && countB > 0)
-    all.findByOctree(a, b.body, job);
+    all.findByOctree(a, b, job);
   ContactBuffers* const buffers[] = {&all.found};
   orderContacts(buffers, 0, all.order, all.sorted);
   CollisionData::Contents& sorted = all.sorted;

@@ -1,4 +1,4 @@
-#include "DistanceField/SimplifyOffset.h"
+#include "Simplify/SimplifyOffset.h"
 
 #include "Mesh/TriangleMesh.h"
 

@@ -1,4 +1,4 @@
-#include "CollisionDetection/Order.h"
+#include "NarrowPhase/Order.h"
 
 #include <algorithm>
 #include <numeric>

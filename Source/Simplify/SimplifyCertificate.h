@@ -1,9 +1,9 @@
 #pragma once
 
-#include "Math/TriangleIntersection.h"
-#include "Octree/PointQueries.h"
-#include "Bodies/Body.h"
 #include "Queries/VertexSearch.h"
+#include "Bodies/Body.h"
+#include "Octree/PointQueries.h"
+#include "Math/TriangleIntersection.h"
 
 #include <Eigen/Core>
 

@@ -1,13 +1,12 @@
-#include "DistanceField/Simplifier.h"
+#include "Simplify/Simplifier.h"
 
 #include <palpate/ClosedMesh.h>
 #include <palpate/Error.h>
 
-#include "Core/Text.h"
-#include "DistanceField/ClosedBody.h"
-#include "DistanceField/SimplifyTriangles.h"
-#include "Octree/Traversal.h"
+#include "Queries/ClosedBody.h"
 #include "Queries/PointDistances.h"
+#include "Octree/Traversal.h"
+#include "Core/Text.h"
 
 #include <Eigen/Geometry>
 
@@ -51,9 +50,10 @@ constexpr std::uint32_t kNone = 0xffffffff;
 
 }  // namespace
 
-Simplifier::Simplifier(const Body& body, const SimplifySettings& settings, double largest,
-                       const Threads& threads)
-    : m_body(body),
+Simplifier::Simplifier(CollapseEdges collapse, const Body& body, const SimplifySettings& settings,
+                       double largest, const Threads& threads)
+    : m_collapse(collapse),
+      m_body(body),
       m_settings(settings),
       m_threads(threads),
       m_certificate(body, settings.maxDistance, largest),
@@ -192,8 +192,7 @@ void Simplifier::collapseLevel(std::uint8_t level) {
   for (std::size_t t = 0; t < m_input.size(); ++t)
     if (m_levels[t] == level && m_sides[m_components[m_input[t][0]]] != 0)
       triangles.push_back(m_input[t]);
-  if (level < kVerbatim)
-    triangles = simplifyTriangles(m_body.mesh.now.body(), triangles, errorOf(level));
+  if (level < kVerbatim) triangles = m_collapse(m_body.mesh.now.body(), triangles, errorOf(level));
   m_triangles.insert(m_triangles.end(), triangles.begin(), triangles.end());
   m_levelOf.resize(m_triangles.size(), level);
 }

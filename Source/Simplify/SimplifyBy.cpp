@@ -1,14 +1,15 @@
-#include <palpate/Simplify.h>
+#include "Simplify/SimplifyBy.h"
 
 #include <palpate/Error.h>
 #include <palpate/SpatialQueries.h>
 
+#include "Simplify/Simplifier.h"
+#include "Queries/ClosedBody.h"
+#include "Bodies/Body.h"
+#include "Bodies/InputChecks.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
 #include "Core/Threads.h"
-#include "DistanceField/ClosedBody.h"
-#include "DistanceField/Simplifier.h"
-#include "Bodies/Body.h"
 
 #include <algorithm>
 #include <string>
@@ -50,7 +51,8 @@ double checkSize(const TriangleMeshView& mesh, double maxDistance) {
 
 }  // namespace
 
-SimplifiedMesh simplify(const TriangleMeshView& mesh, const SimplifySettings& settings) {
+SimplifiedMesh simplifyBy(CollapseEdges collapse, const TriangleMeshView& mesh,
+                          const SimplifySettings& settings) {
   const StandardFloatingPoint standard;
   checkPositive(settings.maxDistance, "maxDistance");
   checkThreads(settings.threads);
@@ -58,7 +60,7 @@ SimplifiedMesh simplify(const TriangleMeshView& mesh, const SimplifySettings& se
   Body body(GeometryId{0});
   makeClosedBody(mesh, threads, body);
   const double largest = checkSize(mesh, settings.maxDistance);
-  return Simplifier(body, settings, largest, threads).run();
+  return Simplifier(collapse, body, settings, largest, threads).run();
 }
 
 }  // namespace palpate

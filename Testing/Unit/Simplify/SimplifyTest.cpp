@@ -5,9 +5,9 @@
 
 #include "Common/ExpectRefused.h"
 #include "Common/Sanitized.h"
-#include "DistanceField/ClosedBody.h"
-#include "DistanceField/SimplifyCertificate.h"
-#include "FieldMeshes.h"
+#include "Queries/ClosedBody.h"
+#include "Simplify/SimplifyCertificate.h"
+#include "Common/FieldMeshes.h"
 
 #include <gtest/gtest.h>
 

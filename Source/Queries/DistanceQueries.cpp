@@ -1,0 +1,53 @@
+#include <palpate/SpatialQueries.h>
+
+#include <palpate/Error.h>
+
+#include "Queries/GeometryDistances.h"
+#include "Queries/QuerySource.h"
+#include "Queries/ShapePenetration.h"
+
+namespace palpate {
+
+GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const {
+  const Source::Call source(*this);
+  const Body &a = source->at(idA), &b = source->at(idB);
+  if (idA == idB)
+    throw Error(ErrorCode::InvalidSettings, "distance() was called for " + nameOf(a) + " twice",
+                idA);
+  const bool bruteForce = source->engine() == Engine::BruteForce;
+  const Source::Loan scratch(*source);
+  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce, scratch->pairs);
+  if (!a.shape) return distanceBetween(a, idB, b.shape->now, bruteForce);
+  if (!b.shape) {
+    const GeometryDistance found = distanceBetween(b, idA, a.shape->now, bruteForce);
+    return {found.b, found.a, found.distance};
+  }
+  const Shape &first = a.shape->now, &second = b.shape->now;
+  if (first.isPlane() && second.isPlane())
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
+                idA);
+  return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
+}
+
+Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
+  const Source::Call source(*this);
+  const Body &a = source->at(idA), &b = source->at(idB);
+  if (idA == idB)
+    throw Error(ErrorCode::InvalidSettings, "penetration() was called for " + nameOf(a) + " twice",
+                idA);
+  for (const Body* const body : {&a, &b}) {
+    if (body->shape && body->shape->now.isTwoSided())
+      throw Error(ErrorCode::NotClosed,
+                  nameOf(*body) + " is a two-sided plane, which has no inside", body->id);
+    if (!body->shape && !body->solid) source->prepareInside(*body, {});
+  }
+  const Source::Loan scratch(*source);
+  if (!a.shape && !b.shape) return penetrationOf(a, b, source->engine(), scratch->penetration);
+  if (a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane())
+    throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
+                idA);
+  return shapePenetration(a, b, source->engine(), source->octreeSettings(), scratch->penetration,
+                          scratch->shapeContacts.shapePair);
+}
+
+}  // namespace palpate

@@ -1,0 +1,80 @@
+#include <palpate/SpatialQueries.h>
+
+#include <palpate/Error.h>
+
+#include "Queries/ElementsNearShape.h"
+#include "Queries/QuerySource.h"
+#include "Queries/ShapeOverlap.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+
+namespace palpate {
+
+namespace {
+
+/// Throws InvalidShape or InvalidTransform.
+RigidTransform poseOfQuery(const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
+                           const Eigen::Vector3d& translation) {
+  std::optional<std::size_t> element;
+  if (const std::string fault = faultOf(shape, element); !fault.empty())
+    throw Error(ErrorCode::InvalidShape, "the query's shape: " + fault, {}, element);
+  return checkedPose({rotation, translation}, "the query's shape");
+}
+
+}  // namespace
+
+void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
+                                 const Eigen::Matrix3d& rotation,
+                                 const Eigen::Vector3d& translation,
+                                 std::vector<std::uint32_t>& elements) const {
+  const Source::Call source(*this);
+  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
+  const Body& geometry = source->at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(*source);
+  std::vector<std::uint32_t>& found = scratch->elements;
+  found.clear();
+  if (!geometry.tree.ordered().empty())
+    findOverlapping(geometry, shape, pose, source->engine() == Engine::BruteForce, scratch->shapes,
+                    scratch->stack, scratch->nearShape, found);
+  scratch->sort(found);
+  elements.reserve(found.size());  // nothing below throws
+  elements.assign(found.begin(), found.end());
+}
+
+void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
+                              const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+                              double thickness, std::vector<ShapeContact>& out) const {
+  const Source::Call source(*this);
+  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
+  checkLength(thickness, "thickness", true);
+  const Body& geometry = source->at(id);
+  checkHasElements(geometry);
+  const Source::Loan scratch(*source);
+  Buffer<std::uint32_t>& near = scratch->nearShape;
+  Buffer<ShapeContact>& found = scratch->shapeContacts.shape;
+  near.clear();
+  found.clear();
+  if (!geometry.tree.ordered().empty()) {
+    const PlacedShape& tool = placeAtRest(shape, pose, scratch->shapes);
+    if (source->engine() == Engine::BruteForce)
+      for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
+    else
+      findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius,
+                       scratch->stack, near);
+    const PairSettings settings{Method::Proximity, thickness};
+    findShapeContacts(geometry.mesh, tool, settings, near, scratch->shapeContacts);
+    std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {
+      return std::tie(a.element, a.id, a.vertices) < std::tie(b.element, b.id, b.vertices);
+    });
+    found.resize(
+        scratch->distinctContacts.keep(geometry.mesh, tool.now, pose, pose, settings, found));
+  }
+  out.reserve(found.size());  // nothing below throws
+  out.assign(found.begin(), found.end());
+}
+
+}  // namespace palpate

@@ -1,0 +1,185 @@
+#include <palpate/SpatialQueries.h>
+
+#include <palpate/Error.h>
+
+#include "Queries/QuerySource.h"
+#include "Queries/RayHits.h"
+#include "Queries/ShapeRays.h"
+#include "Math/ClosestPoint.h"
+#include "Math/Range.h"
+#include "Math/StableLength.h"
+#include "Core/Text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+namespace palpate {
+
+namespace {
+
+/// The vertex and the edge of the element that are nearest to where the ray hits it. Of equally
+/// near ones the first in the element's order.
+Pick pickOf(const RayHit& hit, const Ray& ray, const Positions& now) {
+  const Eigen::Vector3d point = ray.origin + hit.t * ray.direction;
+  Pick pick{hit, hit.vertices[0], {hit.vertices[0], hit.vertices[1]}};
+  double leastVertex = kInfinity, leastEdge = kInfinity;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t p = hit.vertices[i], q = hit.vertices[(i + 1) % 3];
+    if (const double distance = stableLength(now[p] - point); distance < leastVertex) {
+      leastVertex = distance;
+      pick.vertex = p;
+    }
+    const Eigen::Vector3d a = now[p], b = now[q];
+    const double distance = finiteVertexTriangleDistance(point, a, b, b).distance;
+    if (p != q && distance < leastEdge) {
+      leastEdge = distance;
+      pick.edge = {std::min(p, q), std::max(p, q)};
+    }
+  }
+  return pick;
+}
+
+/// index: of a batch.
+void checkRay(const Ray& ray, std::optional<std::size_t> index = {}) {
+  const auto refuse = [&](ErrorCode code, const std::string& fault) {
+    throw Error(code, (index ? "ray " + std::to_string(*index) : "the ray") + " has " + fault);
+  };
+  if (!isWithinRange(ray.origin) || !isWithinRange(ray.direction))
+    refuse(ErrorCode::NonFinitePosition, "origin " + textOf(ray.origin) + " and direction " +
+                                             textOf(ray.direction) + "; both must be " +
+                                             kRangeRule);
+  if (ray.direction == Eigen::Vector3d::Zero())
+    refuse(ErrorCode::InvalidSettings, "a direction of length 0");
+  if (!std::isfinite(ray.tMin) || !(ray.tMin <= ray.tMax))
+    refuse(ErrorCode::InvalidSettings, "tMin " + textOf(ray.tMin) + " and tMax " +
+                                           textOf(ray.tMax) +
+                                           "; tMin must be finite and at most tMax");
+}
+
+/// The hits of rays, in scratch of one call.
+class RayQuery {
+ public:
+  explicit RayQuery(SpatialQueries::Source& source)
+      : m_scratch(source), m_bruteForce(source.engine() == Engine::BruteForce) {}
+
+  /// By ascending t; valid until the next call.
+  const std::vector<RayHit>& all(const Body& geometry, const Ray& ray) {
+    std::vector<RayHit>& hits = m_scratch->hits;
+    hits.clear();
+    if (geometry.shape)
+      addShapeHits(geometry.id, geometry.shape->now, bounded(ray), hits);
+    else
+      on(geometry, ray).all(hits);
+    return hits;
+  }
+  /// bound: as in RayHits::first().
+  std::optional<RayHit> first(const Body& geometry, const Ray& ray, double bound) {
+    if (!geometry.shape) return on(geometry, ray).first(bound);
+    const std::vector<RayHit>& hits = all(geometry, ray);
+    return hits.empty() ? std::nullopt : std::optional(hits.front());
+  }
+  /// out: element kNoElement where there is none.
+  void first(const Body& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
+    const RayHit none{geometry.id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false};
+    if (!geometry.shape)
+      return RayHits::first(geometry, rays, m_bruteForce, m_scratch->metInFlight, none, out);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      out[i] = first(geometry, rays[i], kInfinity).value_or(none);
+  }
+  bool any(const Body& geometry, const Ray& ray) {
+    return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
+  }
+
+ private:
+  RayHits on(const Body& geometry, const Ray& ray) {
+    return {geometry, bounded(ray), m_bruteForce, m_scratch->met};
+  }
+  /// A hit beyond double's range is none.
+  static Ray bounded(Ray ray) {
+    ray.tMax = std::min(ray.tMax, std::numeric_limits<double>::max());
+    return ray;
+  }
+
+  const SpatialQueries::Source::Loan m_scratch;
+  const bool m_bruteForce;
+};
+
+/// The first hit of all geometries. frontFacesOnly: other hits do not count.
+std::optional<RayHit> firstHitOfAll(SpatialQueries::Source& source, const Ray& ray,
+                                    bool frontFacesOnly) {
+  RayQuery query(source);
+  std::optional<RayHit> best;
+  const auto take = [&](const RayHit& hit) {
+    if (!best || hit.t < best->t) best = hit;
+  };
+  for (std::size_t i = 0; i < source.geometryCount(); ++i) {
+    const Body& geometry = source.geometry(i);
+    // The ray itself is not cut at the best hit, as this would change other hits.
+    const auto first = query.first(geometry, ray, best ? best->t : ray.tMax);
+    if (!first || (best && !(first->t < best->t))) continue;
+    if (!frontFacesOnly) {
+      take(*first);
+      continue;
+    }
+    for (const RayHit& hit : query.all(geometry, ray))
+      if (hit.frontFace) take(hit);
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<RayHit> SpatialQueries::firstHit(GeometryId id, const Ray& ray) const {
+  const Source::Call source(*this);
+  checkRay(ray);
+  const Body& geometry = source->at(id);
+  return RayQuery(*source).first(geometry, ray, ray.tMax);
+}
+
+std::optional<RayHit> SpatialQueries::firstHit(const Ray& ray) const {
+  const Source::Call source(*this);
+  checkRay(ray);
+  return firstHitOfAll(*source, ray, false);
+}
+
+bool SpatialQueries::anyHit(GeometryId id, const Ray& ray) const {
+  const Source::Call source(*this);
+  checkRay(ray);
+  const Body& geometry = source->at(id);
+  return RayQuery(*source).any(geometry, ray);
+}
+
+std::optional<Pick> SpatialQueries::pick(const Ray& ray, bool frontFacesOnly) const {
+  const Source::Call source(*this);
+  checkRay(ray);
+  const auto hit = firstHitOfAll(*source, ray, frontFacesOnly);
+  if (!hit) return {};
+  if (hit->element == kNoElement) return Pick{*hit, kNoElement, {kNoElement, kNoElement}};
+  return pickOf(*hit, ray, source->at(hit->geometry).mesh.now);
+}
+
+void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
+                               std::span<RayHit> out) const {
+  const Source::Call source(*this);
+  checkSizes(rays.size(), out.size(), "rays");
+  for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
+  const Body& geometry = source->at(id);
+  forParts(*source, rays.size(), [&](std::size_t begin, std::size_t end) {
+    RayQuery(*source).first(geometry, rays.subspan(begin, end - begin), out.subspan(begin));
+  });
+}
+
+void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>& out) const {
+  const Source::Call source(*this);
+  checkRay(ray);
+  const Body& geometry = source->at(id);
+  RayQuery query(*source);
+  const std::vector<RayHit>& hits = query.all(geometry, ray);
+  out.reserve(hits.size());  // nothing below throws
+  out.assign(hits.begin(), hits.end());
+}
+
+}  // namespace palpate
