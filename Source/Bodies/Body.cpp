@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -119,6 +120,7 @@ Vector3d worldOrigin(const Body& geometry) {
 }
 
 BoxMap worldMap(const Body& geometry, const Vector3d& origin, double thickness, bool wholeStep) {
+  PALPATE_ASSERT(geometry.tree.frame().scale > 0.0);
   BoxMap map;
   if (!geometry.isPlaced()) return map;
   const FloatFrame& frame = geometry.tree.frame();
@@ -138,6 +140,8 @@ BoxMap worldMap(const Body& geometry, const Vector3d& origin, double thickness, 
 }
 
 TreePair treesOf(const Body& a, const Body& b, double thickness, bool wholeStep, BoxFrame frame) {
+  PALPATE_ASSERT(a.tree.isValid() && b.tree.isValid());
+  PALPATE_ASSERT(a.tree.frame().scale == b.tree.frame().scale);
   TreePair trees{&a.tree.octree(), &b.tree.octree()};
   trees.isClamped = mayBeClamped(a.tree) || mayBeClamped(b.tree);
   if (frame == BoxFrame::Body && hasBodyMap(a, b, wholeStep)) {

@@ -3,6 +3,7 @@
 #include "Mesh/TriangleBoxes.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -52,6 +53,7 @@ double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) 
 
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
                             const OctreeSettings& settings, const Threads& threads) {
+  PALPATE_ASSERT(scale > 0.0);
   const State now = stateOf(mesh, topology);
   const bool isSameTopology = m_treeVersion.state().topology == topology;
   const bool canRefit = m_isBuilt && isSameTopology;
@@ -110,6 +112,7 @@ bool GeometryOctree::needsDops(const TriangleMesh& mesh, OctreeBounds bounds) co
 /// is doubled. OutwardRounding covers the conversion to float.
 void GeometryOctree::updateDops(const TriangleMesh& mesh, OctreeBounds bounds,
                                 const Threads& threads) {
+  PALPATE_ASSERT(isValid());
   if (!needsDops(mesh, bounds)) return;
   const int count = directionCount(bounds);
   const auto directions = dopDirections(count);
@@ -136,6 +139,7 @@ void GeometryOctree::updateDops(const TriangleMesh& mesh, OctreeBounds bounds,
 }
 
 void GeometryOctree::copy(const GeometryOctree& other) {
+  PALPATE_ASSERT(other.isValid());
   if (isValid() && m_updates == other.m_updates) return;
   const bool isSameLayout = isValid() && m_octree.layout() == other.m_octree.layout();
   m_treeVersion.invalidate();

@@ -1,5 +1,7 @@
 #include "Bodies/TetrahedronTree.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <utility>
 
@@ -26,6 +28,7 @@ void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
 
 void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
                              double bulk, const OctreeSettings& settings, const Threads& threads) {
+  PALPATE_ASSERT(!m_isBuilt || m_ordered.size() == tetrahedra.size());
   const std::size_t size = tetrahedra.size();
   const bool wasBuilt = std::exchange(m_isBuilt, false);
   if (!wasBuilt) {

@@ -2,6 +2,7 @@
 
 #include "Bodies/Body.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -71,6 +72,7 @@ void WindingNumbers::computeOwnCluster(const Body& body, OctreeNode node) {
 }
 
 void WindingNumbers::update(const Body& body, const Threads& threads) {
+  PALPATE_ASSERT(body.tree.isValid() && body.tree.octree().isBuilt());
   const PositionsState now = body.mesh.now.state();
   if (m_clustersVersion.isCurrent(now) && m_treeUpdates == body.tree.updates()) return;
   m_clustersVersion.invalidate();
@@ -124,7 +126,7 @@ static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
 
 template <class F>
 SolidAngleShare WindingNumbers::sum(const Body& body, const Vector3d& p, bool bruteForce,
-                                    PointQueryStack& stack, F&& isEnough) const {
+                                    F&& isEnough) const {
   const Octree& octree = body.tree.octree();
   const Positions& now = body.mesh.now;
   for (const double farRadii : kFarRadii) {
@@ -137,7 +139,7 @@ SolidAngleShare WindingNumbers::sum(const Body& body, const Vector3d& p, bool br
       farSum.add(clusterShare(cluster, p, distance));
       return false;
     };
-    forEachEntered(octree, isNear, stack, [&](std::uint32_t begin, std::uint32_t end) {
+    forEachEntered(octree, isNear, [&](std::uint32_t begin, std::uint32_t end) {
       for (std::uint32_t i = begin; i < end; ++i) {
         const auto& [a, b, c] = body.tree.ordered()[i];
         nearSum.add(solidAngleShare(p, now[a], now[b], now[c]));
@@ -153,16 +155,17 @@ SolidAngleShare WindingNumbers::sum(const Body& body, const Vector3d& p, bool br
 }
 
 WindingNumbers::Result WindingNumbers::evaluate(const Body& body, const Vector3d& p, double margin,
-                                                bool bruteForce, PointQueryStack& stack) const {
-  return decide(sum(body, p, bruteForce, stack,
+                                                bool bruteForce) const {
+  PALPATE_ASSERT(bruteForce || m_clustersVersion.isCurrent(body.mesh.now.state()));
+  return decide(sum(body, p, bruteForce,
                     [&](const SolidAngleShare& found) { return decide(found, margin).decided; }),
                 margin);
 }
 
-SolidAngleShare WindingNumbers::value(const Body& body, const Vector3d& p, double error,
-                                      PointQueryStack& stack) const {
-  return sum(body, p, false, stack,
-             [&](const SolidAngleShare& found) { return found.error <= error; });
+SolidAngleShare WindingNumbers::value(const Body& body, const Vector3d& p, double error) const {
+  PALPATE_ASSERT(m_clustersVersion.isCurrent(body.mesh.now.state()));
+  PALPATE_ASSERT(error > 0.0);
+  return sum(body, p, false, [&](const SolidAngleShare& found) { return found.error <= error; });
 }
 
 }  // namespace palpate

@@ -36,12 +36,10 @@ class WindingNumbers {
   /// Call after update(). Returns whether the winding number's magnitude is at least 1/2. Not
   /// decided if it is within `margin` of 1/2, or if rounding errors leave this open. The answer is
   /// that of the sum over all triangles, and does not depend on the octree.
-  Result evaluate(const Body& body, const Eigen::Vector3d&, double margin, bool bruteForce,
-                  PointQueryStack&) const;
+  Result evaluate(const Body& body, const Eigen::Vector3d&, double margin, bool bruteForce) const;
   /// Call after update(). The winding number, which may have either sign, with an error bound. The
   /// bound is at most `error`, unless rounding errors are larger.
-  SolidAngleShare value(const Body& body, const Eigen::Vector3d&, double error,
-                        PointQueryStack&) const;
+  SolidAngleShare value(const Body& body, const Eigen::Vector3d&, double error) const;
 
  private:
   /// Moments of a set of triangles about their centre of mass, for points far away.
@@ -57,7 +55,7 @@ class WindingNumbers {
   /// The sum of clusters and triangles for which isEnough(sum) is true, or else that of all
   /// triangles.
   template <class F>
-  SolidAngleShare sum(const Body& body, const Eigen::Vector3d&, bool bruteForce, PointQueryStack&,
+  SolidAngleShare sum(const Body& body, const Eigen::Vector3d&, bool bruteForce,
                       F&& isEnough) const;
 
   DerivedFrom<PositionsState> m_clustersVersion;

@@ -6,6 +6,7 @@
 #include "DistanceField/FieldContacts.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 namespace palpate {
 
@@ -37,6 +38,7 @@ void describeField(const PairRecord& record, CollisionData::Contents& contents) 
 }  // namespace
 
 std::size_t FieldWork::start(const FrameStart& frame) {
+  PALPATE_ASSERT(m_record->usesField());
   const PlacedField placed = m_record->placedField();
   m_record->fieldContacts(placed).start(m_record->mesh().body);
   const std::size_t elements = m_record->fieldScratch->elements.size();
@@ -46,6 +48,7 @@ std::size_t FieldWork::start(const FrameStart& frame) {
 }
 
 void FieldWork::run(int round, std::size_t job, JobScratch& scratch) const {
+  PALPATE_ASSERT(job < m_jobs && round < 3);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
   const PlacedField placed = m_record->placedField();

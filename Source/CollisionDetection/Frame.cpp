@@ -4,6 +4,7 @@
 #include "Core/MemoryBudget.h"
 #include "Core/Spin.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -134,6 +135,7 @@ void Frame::runRounds(const Threads& threads) {
 
 /// Writes a pair's results and adds what its jobs counted.
 void Frame::join(Pair& pair, const FrameJoin& join, bool keepsCandidates) {
+  PALPATE_ASSERT(pair.firstJob + pair.jobCount <= m_jobs.size());
   const MemoryScope memory(MemoryStage::Results);
   PairRecord& record = *pair.record;
   const std::size_t exactBefore = join.statistics.exactDecisions;

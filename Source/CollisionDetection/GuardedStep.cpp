@@ -1,6 +1,7 @@
 #include "CollisionDetection/GuardedStep.h"
 
 #include "Math/Nearing.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -415,6 +416,7 @@ void GuardedStep::throwRemains(const GuardedPairs& pairs, const Touch& touch) co
 }
 
 void GuardedStep::apply(GeometryTable& geometries, const Threads& threads) {
+  PALPATE_ASSERT(!m_bodies.empty());
   for (const Body& body : m_bodies) {
     TriangleMesh& mesh = body.geometry->body.mesh;
     const auto fraction = [&](std::size_t node) {

@@ -5,7 +5,6 @@
 
 #include "DistanceField/PlacedProxy.h"
 #include "NarrowPhase/NarrowPhase.h"
-#include "Octree/PointQueries.h"
 #include "Octree/Traversal.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
@@ -31,7 +30,6 @@ struct JobScratch : CountedObject {
 
   TraversalStack stack;
   PairSink sink;
-  PointQueryStack queries;
   Buffer<std::uint32_t> elements;
   Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
 

@@ -8,6 +8,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Math/Tolerances.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -102,6 +103,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
 }
 
 void MeshWork::traverseJob(std::size_t job, JobScratch& scratch) const {
+  PALPATE_ASSERT(m_nodePairs && job * m_grain < m_count);
   const std::size_t begin = job * m_grain, size = std::min(m_count - begin, m_grain);
   traverse(m_trees, std::span(*m_nodePairs).subspan(m_first + begin, size), scratch.stack,
            scratch.sink);
@@ -230,6 +232,7 @@ void MeshWork::runByBruteForce(JobScratch& scratch) const {
 }
 
 void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
+  PALPATE_ASSERT(jobs.empty() || m_record->plan.kind == PairKind::Meshes);
   PairRecord& record = *m_record;
   PairResults& results = join.results;
   auto& [pierced, leaving, piercingContacts, knownSides, bodies] = results.meshes;

@@ -1,5 +1,7 @@
 #include "CollisionDetection/PairResults.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 
 namespace palpate {
@@ -42,6 +44,7 @@ void PairResults::sortFacts(const PairRecord& record) {
 }
 
 std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {
+  PALPATE_ASSERT(preferred <= m_found.size());
   return orderContacts(m_found, preferred, m_orderScratch, record.next.contents());
 }
 
@@ -62,6 +65,7 @@ void PairResults::keepFirstImpacts(PairRecord& record, double end) {
 }
 
 void PairResults::keepDistinct(PairRecord& record) {
+  PALPATE_ASSERT(record.plan.kind == PairKind::MeshAndShape);
   const MeshPair pair = record.meshes();
   auto& contacts = record.next.contents().shape;
   contacts.resize(m_distinctContacts.keep(pair.mesh(), pair.shape().now,

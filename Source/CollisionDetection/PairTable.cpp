@@ -3,6 +3,7 @@
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Mesh/RestDistance.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +18,7 @@ std::string nameOf(const GeometryLabel& a, const GeometryLabel& b) {
 }
 
 FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
+  PALPATE_ASSERT(usesField());
   if (!fieldScratch) fieldScratch = std::make_unique<FieldScratch>();
   const MeshPair both = meshes();
   return {both.mesh(), placed, both.settings.contacts, both.thicknessAtEnd(), *fieldScratch};
@@ -24,6 +26,7 @@ FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
 
 bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
                              const Threads& threads) {
+  PALPATE_ASSERT(kind() == PairKind::Proxy);
   const ProxyState state{b->body.revisions.elements, b->body.mesh.now.bodyRevision()};
   const ProxySettings wanted{pair.settings.thickness + a->body.mesh.largestRadius,
                              pair.settings.allowedError, pair.settings.widestNormalCone};

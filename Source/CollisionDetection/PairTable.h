@@ -10,6 +10,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <atomic>
@@ -62,6 +63,7 @@ struct PairRecord : CountedObject {
     return answersByFieldOfSecond(a->body.mesh.topology.type, b->body.field.get()) ? *b : *a;
   }
   PlacedField placedField() const {
+    PALPATE_ASSERT(usesField());
     return {*body().body.field, body().body.mesh.now};
   }  ///< if usesField()
   /// If usesField(): for the contacts with the field. Allocates fieldScratch when first called.

@@ -6,6 +6,7 @@
 #include "Queries/ElementsNearShape.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -46,6 +47,7 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 }  // namespace
 
 void ParticleWork::place() {
+  PALPATE_ASSERT(m_record->b->proxy != nullptr);
   m_proxy.emplace(*m_record->b->proxy, m_record->b->body.mesh, m_record->plan.proxyThickness);
 }
 
@@ -72,6 +74,7 @@ void ParticleWork::runByBruteForce(JobScratch& scratch) {
 
 void ParticleWork::findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce,
                                 JobScratch& scratch) const {
+  PALPATE_ASSERT(m_proxy && begin <= end);
   const TriangleMesh& points = m_record->a->body.mesh;
   const PairPlan& plan = m_record->plan;
   const ParticleStep step{m_record->b->motion.range(), m_record->pair.settings.thickness,
@@ -95,7 +98,7 @@ void ParticleWork::findOthers(JobScratch& scratch) const {
     if (swept) box.extend(points.before[point]);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
     findElementsNear(m_record->b->body, {box.min() - margin, box.max() + margin}, swept,
-                     scratch.queries, scratch.elements);
+                     scratch.elements);
     scratch.kept.clear();
     for (const std::uint32_t element : scratch.elements) scratch.kept.push_back({point, element});
     std::erase_if(scratch.kept, isDisabled);

@@ -3,6 +3,7 @@
 #include "CollisionDetection/PairResults.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 
@@ -17,6 +18,7 @@ void describeProxy(const SurfaceProxy& proxy, const PlacedProxy& placed, Jobs jo
 }
 
 void ProxyWork::place() {
+  PALPATE_ASSERT(m_record->proxy != nullptr);
   m_proxy.emplace(*m_record->proxy, m_record->b->body.mesh, m_record->pair.settings.thickness);
 }
 
@@ -38,6 +40,7 @@ void ProxyWork::runByBruteForce(JobScratch& scratch) {
 
 void ProxyWork::find(std::size_t begin, std::size_t end, bool byBruteForce,
                      JobScratch& scratch) const {
+  PALPATE_ASSERT(m_proxy && begin <= end);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
   m_proxy->find(m_record->a->body.mesh, begin, end, byBruteForce, nullptr, scratch.hits);

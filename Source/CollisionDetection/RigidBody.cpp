@@ -73,12 +73,11 @@ class RigidSearch::Step {
     };
     const GeometryOctree& tree = m_geometry.body.tree;
     if (tree.encloses(m_geometry.body.mesh, m_geometry.body.revisions.elements.topology)) {
-      forEachOverlapping(tree.octree(), mayExceed, m_search.m_queries,
-                         [&](std::uint32_t begin, std::uint32_t end) {
-                           for (std::uint32_t i = begin; i < end; ++i)
-                             if (mayExceed(tree.octree().boxes()[i]))
-                               for (const std::uint32_t v : tree.ordered()[i]) testOne(v);
-                         });
+      forEachOverlapping(tree.octree(), mayExceed, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end; ++i)
+          if (mayExceed(tree.octree().boxes()[i]))
+            for (const std::uint32_t v : tree.ordered()[i]) testOne(v);
+      });
     } else {
       for (std::uint32_t v = 0; v < body.size(); ++v) testOne(v);
     }

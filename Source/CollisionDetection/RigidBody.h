@@ -36,7 +36,6 @@ class RigidSearch {
   class Step;
 
   std::array<std::uint32_t, 7> m_furthest{};  ///< vertices of the last step, tried first
-  PointQueryStack m_queries;
   double m_largest = 0;  ///< L: magnitude of the coordinates in the body's frame
   DerivedFrom<Revision> m_largestVersion;
 };

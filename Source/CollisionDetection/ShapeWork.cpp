@@ -7,6 +7,7 @@
 #include "Shapes/ShapeNearings.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
+#include "Core/Assert.h"
 
 namespace palpate {
 
@@ -25,6 +26,7 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
 }
 
 void ShapeWork::findPair(const MeshPair& meshes, JobScratch& scratch) const {
+  PALPATE_ASSERT(meshes.isShapePair());
   if (meshes.keepsApart)
     findShapePairNearing(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings.timeTolerance,
                          scratch.contacts);
@@ -33,9 +35,10 @@ void ShapeWork::findPair(const MeshPair& meshes, JobScratch& scratch) const {
 }
 
 void ShapeWork::findNearMesh(const MeshPair& meshes, JobScratch& scratch) const {
+  PALPATE_ASSERT(meshes.hasShape() && !meshes.isShapePair());
   const auto& [analytical, now, before] = meshes.shape();
   findElementsNear(m_record->mesh().body, m_record->plan.swept() ? before : now, now,
-                   meshes.maxFeatureDistance(), scratch.queries, scratch.elements);
+                   meshes.maxFeatureDistance(), scratch.elements);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
   if (meshes.keepsApart)

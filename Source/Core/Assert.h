@@ -2,8 +2,9 @@
 
 #include <cassert>
 
-/// Internal invariants: checked in debug and validation builds, never on user input (that throws).
-#if defined(PALPATE_VALIDATE) || !defined(NDEBUG)
+/// Internal invariants, never on user input (that throws). Checked in all builds but Release, where
+/// they cost nothing.
+#if defined(PALPATE_ASSERTIONS) || defined(PALPATE_VALIDATE) || !defined(NDEBUG)
 #include <cstdio>
 #include <cstdlib>
 #define PALPATE_ASSERT(condition)                                                        \

@@ -1,5 +1,6 @@
 #include "DistanceField/AffineClaim.h"
 
+#include "Octree/Walk.h"
 #include "Math/Tolerances.h"
 
 #include <algorithm>
@@ -167,26 +168,10 @@ class ClaimProof {
       : m_claim(claim), m_search(search) {}
 
   HWY_ATTR bool run() {
-    const OctreeBlock* const blocks = m_search.octree.blocks();
-    // Each block on at most 61 levels adds its siblings at most.
-    std::array<std::uint32_t, 512> stack;
-    std::size_t depth = 0;
-    stack[depth++] = 0;
-    while (depth > 0) {
-      const std::uint32_t index = stack[--depth];
-      const OctreeBlock& block = blocks[index];
-      // The root is alone in block 0.
-      for (std::uint32_t bits = entered(block, 0, index == 0 ? 1 : 8); bits != 0;
-           bits &= bits - 1) {
-        const auto slot = static_cast<unsigned>(std::countr_zero(bits));
-        const std::uint32_t begin = block.begin[slot];
-        std::uint32_t end = begin + block.count(slot);
-        if (!block.isLeaf(slot)) {
-          end = blocks[block.child[slot]].begin[0];
-          stack[depth++] = block.child[slot];
-        }
-        if (!addElements(begin, end)) return false;
-      }
+    if (!entered(m_search.octree.blocks()[0], 0, 1)) return true;
+    for (Walk walk(m_search.octree); walk.next();) {
+      if (!addElements(walk.begin(), walk.end())) return false;
+      if (walk.hasChildren()) walk.enter(entered(walk.children(), 0, kChildren));
     }
     return m_count == 0 || test();
   }

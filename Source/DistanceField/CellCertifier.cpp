@@ -5,6 +5,7 @@
 #include "DistanceField/AffineClaim.h"
 #include "DistanceField/NearestTriangle.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +20,8 @@ double InterpolatedCell::halfDiagonal() const { return std::numbers::sqrt3 * hal
 
 CellCertifier::CellCertifier(const Body& geometry, const SurfaceSign& sign, double tolerance)
     : m_geometry(geometry), m_sign(sign), m_tolerance(tolerance) {
+  PALPATE_ASSERT(geometry.tree.octree().isBuilt());
+  PALPATE_ASSERT(tolerance >= 0.0);
   const FloatBox box = geometry.tree.octree().box(0);
   float reach = 0;
   for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
@@ -127,7 +130,7 @@ bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
         {reach, std::abs(affine.level - side.atCentre), side.atCentre + rise - affine.level});
     if (!side.needsCrossing) continue;
     const double toPlane = std::abs(affine.level - side.atCentre) + affine.error;
-    if (m_sign.in(cell.centre, radius + toPlane / frame.scale, stack) !=
+    if (m_sign.in(cell.centre, radius + toPlane / frame.scale) !=
         SurfaceSign::Reliability::Reliable)
       return false;
     const bool isPositive =

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "DistanceField/FieldCells.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -27,6 +28,7 @@ class CornerTable {
   }
   /// The number of a corner, which is added if it is new. There must be room for it.
   std::uint32_t find(const Corner& corner) {
+    PALPATE_ASSERT(hasRoom(1));
     const std::uint64_t key =
         corner[0] | std::uint64_t{corner[1]} << kBits | std::uint64_t{corner[2]} << 2 * kBits;
     std::uint32_t& slot = slotOf(key);

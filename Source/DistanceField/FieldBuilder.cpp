@@ -228,9 +228,8 @@ class FieldBuilder {
       if (!m_sign.isClosed())
         m_threads.forChunks(end - first, kGrain,
                             [&](std::size_t, std::size_t from, std::size_t to) {
-                              PointQueryStack stack;
                               for (std::size_t i = first + from; i < first + to; ++i)
-                                findSign(m_cells[i], stack);
+                                findSign(m_cells[i]);
                             });
       evaluateCorners(first);
       inSlices(first, end, 0.5, [&](std::size_t from, std::size_t to) {
@@ -260,12 +259,11 @@ class FieldBuilder {
     return isWithin ? State::Certified : State::Split;
   }
   /// Finds whether the cell has a reliable sign, or has to be split to know more.
-  void findSign(Cell& cell, PointQueryStack& stack) const {
+  void findSign(Cell& cell) const {
     if (cell.isReliable || cell.isUnreliable) return;
     const double half = halfSideOf(cell);
     const Vector3d centre = positionOf(m_corners[cell.corners[0]]) + Vector3d::Constant(half);
-    const auto reliability =
-        m_sign.in(centre, std::numbers::sqrt3 * half * (1.0 + kFieldError), stack);
+    const auto reliability = m_sign.in(centre, std::numbers::sqrt3 * half * (1.0 + kFieldError));
     cell.isReliable = reliability == SurfaceSign::Reliability::Reliable;
     cell.isUnreliable = reliability == SurfaceSign::Reliability::Unreliable;
     cell.isSplitForSign =

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Math/StableLength.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Core>
 
@@ -102,6 +103,7 @@ class FieldLookup {
 
   /// L. The point must be finite.
   double value(const Eigen::Vector3d& point) const {
+    PALPATE_ASSERT(point.allFinite());
     const Place place = at(point);
     const double inDomain = m_frame.unit * clamped(interpolate(place));
     return place.isOutside ? inDomain + stableLength(outsideOf(point)) : inDomain;

@@ -4,6 +4,7 @@
 #include "DistanceField/FieldMinimum.h"
 #include "Shapes/Shape.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -265,7 +266,7 @@ double valueBeyond(const PlacedField& placed, double distance) {
 /// The bound is that of FeaturesNearField::excludes(), from the centre of a node's box.
 template <class Visit>
 void forEachElementNear(const Body& geometry, const PlacedField& placed, double limit,
-                        PointQueryStack& stack, Visit&& visit) {
+                        Visit&& visit) {
   const Octree& octree = geometry.tree.octree();
   if (octree.size() == 0) return;
   const Eigen::AlignedBox3d region = placed.domain();
@@ -307,7 +308,7 @@ void forEachElementNear(const Body& geometry, const PlacedField& placed, double 
   };
   bool goesOn = true;
   forEachOverlapping(
-      octree, [&](const FloatBox& box) { return goesOn && mayBeNear(box); }, stack,
+      octree, [&](const FloatBox& box) { return goesOn && mayBeNear(box); },
       [&](std::uint32_t begin, std::uint32_t end) {
         for (std::uint32_t i = begin; i < end && goesOn; ++i)
           if (mayBeInDomain(octree.boxes()[i])) goesOn = visit(octree.order()[i]);
@@ -350,12 +351,11 @@ bool FieldContacts::isFurther(const Body& geometry, double distance) {
   std::uint32_t& nearest = m_scratch.nearest;
   if (nearest < topology.triangles.size() && !isAbove(nearest)) return false;
   bool isFurther = true;
-  forEachElementNear(geometry, m_field, target + m_mesh.largestRadius, m_scratch.stack,
-                     [&](std::uint32_t element) {
-                       isFurther = isAbove(element);
-                       if (!isFurther) nearest = element;
-                       return isFurther;
-                     });
+  forEachElementNear(geometry, m_field, target + m_mesh.largestRadius, [&](std::uint32_t element) {
+    isFurther = isAbove(element);
+    if (!isFurther) nearest = element;
+    return isFurther;
+  });
   return isFurther;
 }
 
@@ -376,11 +376,10 @@ void FieldContacts::start(const Body& geometry) {
   const MeshTopology& topology = m_mesh.topology;
   FieldScratch& scratch = m_scratch;
   scratch.elements.clear();
-  forEachElementNear(geometry, m_field, m_thickness + m_mesh.largestRadius, scratch.stack,
-                     [&](std::uint32_t t) {
-                       if (topology.isEnabled(t)) scratch.elements.push_back(t);
-                       return true;
-                     });
+  forEachElementNear(geometry, m_field, m_thickness + m_mesh.largestRadius, [&](std::uint32_t t) {
+    if (topology.isEnabled(t)) scratch.elements.push_back(t);
+    return true;
+  });
   startValues();
   if (scratch.least.size() < topology.edges.size()) scratch.least.resize(topology.edges.size());
   scratch.vertices.clear();
@@ -397,6 +396,7 @@ void FieldContacts::start(const Body& geometry) {
 }
 
 void FieldContacts::findValues(std::size_t begin, std::size_t end) {
+  PALPATE_ASSERT(begin <= end && end <= m_scratch.vertices.size());
   std::array<Vector3d, kValuesAtOnce> points;
   std::array<double, kValuesAtOnce> values;
   for (std::size_t first = begin; first < end; first += kValuesAtOnce) {
@@ -409,6 +409,7 @@ void FieldContacts::findValues(std::size_t begin, std::size_t end) {
 }
 
 void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
+  PALPATE_ASSERT(begin <= end && end <= m_scratch.elements.size());
   const MeshTopology& topology = m_mesh.topology;
   const Buffer<double>& values = m_scratch.values;
   FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);
@@ -425,6 +426,7 @@ void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBu
 }
 
 void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBuffers& out) {
+  PALPATE_ASSERT(begin <= end && end <= m_scratch.elements.size());
   const MeshTopology& topology = m_mesh.topology;
   if (!topology.hasFaces()) return;
   FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);

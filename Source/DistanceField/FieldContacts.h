@@ -50,7 +50,6 @@ double depthToleranceOf(const DistanceField&);
 
 /// What the contacts of one pair share. Keeps its peak capacity.
 struct FieldScratch {
-  PointQueryStack stack;
   Buffer<std::uint32_t> elements;  ///< that may be near
   Buffer<std::uint32_t> vertices;  ///< of these elements, each once
   Buffer<std::uint32_t> stamps;    ///< per vertex: the last pair that needed it

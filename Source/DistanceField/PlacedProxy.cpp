@@ -2,6 +2,7 @@
 
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -116,6 +117,7 @@ PlacedProxy::PlacedProxy(const SurfaceProxy& proxy, const TriangleMesh& body, do
       m_body(&body),
       m_thickness(thickness),
       m_outerSideOnly(body.outerSideOnly && !proxy.isClosed()) {
+  PALPATE_ASSERT(thickness >= 0.0);
   Matrix3d rotation = Matrix3d::Identity();
   Vector3d translation = Vector3d::Zero();
   if (body.now.isPlaced()) {

@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <cmath>
 #include <numbers>
@@ -22,6 +23,7 @@ const Vector3d kAside{0.0131, 0.0277, 0.0193};
 }  // namespace
 
 SurfaceSign::SurfaceSign(const Body& body, bool isClosed) : m_body(body), m_isClosed(isClosed) {
+  PALPATE_ASSERT(body.tree.octree().isBuilt());
   if (!isClosed) m_boundary.emplace(body.mesh);
 }
 
@@ -30,14 +32,13 @@ bool SurfaceSign::isInside(const Vector3d& point, PointQueryStack& stack) const 
   return palpate::isInside(m_body, point, {.rule = rule}, Engine::Octree, stack);
 }
 
-SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius,
-                                         PointQueryStack& stack) const {
+SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius) const {
   if (m_isClosed || m_boundary->isEmpty()) return Reliability::Reliable;
   const double way = (1.0 + kAside.norm()) * radius,
                change = way * m_boundary->steepness(centre, radius, kMostDefect / way);
   if (!(change < kMostDefect)) return Reliability::Unknown;
   const SolidAngleShare number =
-      m_body.prepared->windingNumbers.value(m_body, centre + radius * kAside, kNumberError, stack);
+      m_body.prepared->windingNumbers.value(m_body, centre + radius * kAside, kNumberError);
   const double defect = std::abs(number.value - std::round(number.value)),
                doubt = change + number.error + kFieldError;
   if (defect + doubt < kMostDefect) return Reliability::Reliable;

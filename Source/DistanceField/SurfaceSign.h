@@ -31,7 +31,7 @@ class SurfaceSign {
   bool isClosed() const { return m_isClosed; }
   bool isInside(const Eigen::Vector3d&, PointQueryStack&) const;
   /// Of the points of a ball.
-  Reliability in(const Eigen::Vector3d& centre, double radius, PointQueryStack&) const;
+  Reliability in(const Eigen::Vector3d& centre, double radius) const;
   /// L: all points further than this from a convex set around the mesh are reliable, and outside.
   double reach() const;
 

@@ -2,6 +2,7 @@
 
 #include "Exact/CubicRoot.h"
 #include "Exact/ErrorBounds.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -54,12 +55,14 @@ double QuadraticTime::timeLowerBound() const {
 }
 
 std::vector<QuadraticTime> rootsInside(const Form<1>& form) {
+  PALPATE_ASSERT(form[0] != 0 || form[1] != 0);
   std::vector<QuadraticTime> roots;
   if (sgn(form[0]) * sgn(form[1]) < 0) roots.push_back({abs(form[0]), abs(form[1]), 0, 0});
   return roots;
 }
 
 std::vector<QuadraticTime> rootsInside(const Form<2>& form) {
+  PALPATE_ASSERT(form[0] != 0 || form[1] != 0 || form[2] != 0);
   const int sign = sgn(form[2]);
   if (sign == 0) return rootsInside(Form<1>{form[0], form[1]});
   // sign · form has a positive leading coefficient. Its roots are (-b ± √(b² - 4 a c)) / 2 a.

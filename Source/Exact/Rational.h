@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Exact/ExactVector.h"
+#include "Core/Assert.h"
 
 #include <cmath>
 #include <cstddef>
@@ -32,6 +33,7 @@ inline int bits(const Integer& a) { return static_cast<int>(mpz_sizeinbase(a.get
 
 /// numerator 2^exponent / denominator, within an ulp; denominator must be positive.
 inline double quotient(const Integer& numerator, const Integer& denominator, int exponent) {
+  PALPATE_ASSERT(denominator > 0);
   if (numerator == 0) return 0.0;
   // The quotient has 64 or 65 bits and is truncated to 63, so that only one rounding to double
   // remains.

@@ -1,6 +1,7 @@
 #include "Math/ExactClosestPoint.h"
 
 #include "Exact/Rational.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -180,6 +181,7 @@ Foot footOnPoint(const Vector3d& p, const Vector3d& a) {
 }
 
 Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
+  PALPATE_ASSERT(a != b);
   const auto [at, exponent] = Integers(p, a, b);
   const Vector<Integer> from = at[0] - at[1], edge = at[2] - at[1];
   const Integer numerator = dot(from, edge), denominator = dot(edge, edge);

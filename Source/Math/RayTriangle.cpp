@@ -5,6 +5,7 @@
 #include "Exact/Compensated.h"
 #include "Exact/ErrorBounds.h"
 #include "Exact/Rational.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -173,6 +174,7 @@ namespace {
 std::optional<RayInterval> intersectRayExactly(const RaySegment& ray, const Eigen::Vector3d& a,
                                                const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                                                std::size_t* exactDecisions) {
+  PALPATE_ASSERT(ray.direction != Eigen::Vector3d::Zero() && ray.tMin <= ray.tMax);
   if (exactDecisions) ++*exactDecisions;
   const exact::RayProblem problem(ray, a, b, c);
   const auto interval = exact::intersect(ray, problem);

@@ -3,6 +3,7 @@
 #include <palpate/CountedVector.h>
 
 #include "Mesh/Revision.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Core>
 
@@ -67,6 +68,7 @@ class Positions {
   std::span<const Eigen::Vector3d> body() const { return *m_body; }
   bool hasSameBody(const Positions& other) const { return m_body == other.m_body; }
   void setBody(Body body, Revision revision = {}) noexcept {
+    PALPATE_ASSERT(body != nullptr);
     m_body = std::move(body);
     m_data = m_body->data();
     m_bodyRevision = revision;
@@ -75,6 +77,7 @@ class Positions {
   bool isPlaced() const { return m_placed; }
   const RigidTransform& transform() const { return m_transform; }
   void place(const RigidTransform& transform, Revision revision) noexcept {
+    PALPATE_ASSERT(transform.rotation.allFinite() && transform.translation.allFinite());
     m_transform = transform;
     m_placed = true;
     m_transformRevision = revision;

@@ -1,6 +1,7 @@
 #include "Mesh/TetrahedralTopology.h"
 
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <utility>
@@ -92,6 +93,9 @@ CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
 TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
                                std::span<const Tetrahedron> tetrahedra,
                                std::optional<OverusedFace>& fault) {
+  PALPATE_ASSERT(std::all_of(tetrahedra.begin(), tetrahedra.end(), [&](const Tetrahedron& t) {
+    return *std::max_element(t.begin(), t.end()) < rest.size();
+  }));
   const CountedVector<std::uint32_t> beyond = opposites(tetrahedra, fault);
   TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}};
   if (fault) return topology;

@@ -1,5 +1,7 @@
 #include "Mesh/TriangleMesh.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <tuple>
 #include <utility>
@@ -11,6 +13,9 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
       triangles(newTriangles.begin(), newTriangles.end()),
       triangleEdges(newTriangles.size()),
       isUsed(newVertexCount, false) {
+  PALPATE_ASSERT(std::all_of(newTriangles.begin(), newTriangles.end(), [&](const Triangle& t) {
+    return std::max({t[0], t[1], t[2]}) < newVertexCount;
+  }));
   struct Side {
     Segment edge;
     std::uint32_t triangle, side;

@@ -4,6 +4,7 @@
 
 #include "Mesh/Positions.h"
 #include "Core/Buffer.h"
+#include "Core/Assert.h"
 
 #include <cstdint>
 #include <span>
@@ -18,6 +19,7 @@ struct IndexLists {
   CountedVector<std::uint32_t> offsets{0};
   CountedVector<std::uint32_t> items;
   std::span<const std::uint32_t> operator[](std::size_t i) const {
+    PALPATE_ASSERT(i + 1 < offsets.size());
     return std::span(items).subspan(offsets[i], offsets[i + 1] - offsets[i]);
   }
 };

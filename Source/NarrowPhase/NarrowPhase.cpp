@@ -4,6 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 
@@ -51,6 +52,7 @@ void ContactBuffers::clear() {
 
 void findContacts(const MeshPair& pair, std::span<const ElementPair> candidates,
                   ContactBuffers& out) {
+  PALPATE_ASSERT(!pair.hasShape() && !pair.field);
   const Method method = pair.settings.method;
   if (method == Method::Proximity) return findProximity(pair, candidates, out);
   if (method == Method::Intersection) return findIntersections(pair, candidates, out);

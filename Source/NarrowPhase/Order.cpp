@@ -1,5 +1,7 @@
 #include "NarrowPhase/Order.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <numeric>
 
@@ -60,6 +62,8 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
 }  // namespace
 
 void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch& scratch) {
+  PALPATE_ASSERT(
+      std::all_of(pairs.begin(), pairs.end(), [&](const ElementPair& p) { return p.a < firsts; }));
   if (pairs.size() < firsts / 8) {  // the counters would cost more than they save
     std::sort(pairs.begin(), pairs.end());
     return;
@@ -81,6 +85,7 @@ void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch
 
 std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                           OrderScratch& scratch, CollisionData::Contents& out) {
+  PALPATE_ASSERT(preferred <= buffers.size());
   const std::size_t count =
       order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
             out.vertexTriangle, byVertex, &scratch.preferred[0]) +

@@ -14,8 +14,8 @@ HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, st
   const hn::CappedTag<float, 8> d;
   for (std::size_t b = end; b-- > begin;) {
     const OctreeBlock& block = blocks[b];
-    OctreeBlock& parent = blocks[parents[b] >> 3];
-    const unsigned slot = parents[b] & 7;
+    OctreeBlock& parent = blocks[blockOf(parents[b])];
+    const unsigned slot = slotOf(parents[b]);
     FloatBox box;
     for (int k = 0; k < 3; ++k) {
       auto lower = hn::Load(d, block.lower[k]), upper = hn::Load(d, block.upper[k]);

@@ -178,7 +178,7 @@ bool Layout::nextChild(OpenNode& parent, Job& child) {
   const Job& job = parent.job;
   for (unsigned slot = parent.nextSlot; slot < 8; ++slot) {
     const std::uint32_t begin = parent.begins[slot], size = parent.begins[slot + 1] - begin;
-    const OctreeNode node = parent.link * 8 + slot;
+    const OctreeNode node = nodeOf(parent.link, slot);
     if (size <= m_maxPerLeaf) {
       // The next group overwrites that of an empty slot: this avoids a branch that would be
       // mispredicted.

@@ -60,7 +60,7 @@ class Layout {
   std::size_t bytes() const;
 
  private:
-  static constexpr int kMaxDepth = 60;  ///< as OctreeSettings::maxDepth
+  static constexpr int kMaxDepth = kMaxLevels - 1;  ///< as OctreeSettings::maxDepth
 
   /// A node whose children are being laid out.
   struct OpenNode {

@@ -44,8 +44,8 @@ Eigen::AlignedBox3d cubeInScene(const Tree& tree, const std::array<double, 3>& l
 CellOfNode cellOf(const Octree& octree, OctreeNode node) {
   std::vector<unsigned> path;
   while (node != 0) {
-    path.push_back(node & 7);
-    node = octree.parent(node >> 3);
+    path.push_back(slotOf(node));
+    node = octree.parent(blockOf(node));
   }
   Cube cube = octree.rootCube();
   for (auto octant = path.rbegin(); octant != path.rend(); ++octant) cube = cube.child(*octant);
@@ -84,7 +84,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   const Tree& tree = *std::prev(next);
   const Octree& octree = *tree.octree;
   const OctreeNode node = index - tree.firstNode;
-  if (node >= octree.pool().used() * 8 || octree.isEmpty(node))
+  if (node >= octree.pool().used() * kChildren || octree.isEmpty(node))
     throw Error(ErrorCode::IndexOutOfRange,
                 "octree node " + std::to_string(index) + " does not exist or is empty");
   const auto [cube, depth] = cellOf(octree, node);
@@ -102,7 +102,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
     result.fittedBox.max()[k] = nextUp(tree.origin[k] + box.upper[k] / tree.scale);
   }
   result.geometries = std::uint64_t{1} << (static_cast<std::uint32_t>(tree.geometry) % 64);
-  if (node != 0) result.parent = NodeId{tree.firstNode + octree.parent(node >> 3)};
+  if (node != 0) result.parent = NodeId{tree.firstNode + octree.parent(blockOf(node))};
   const OctreeNode first = octree.firstChild(node);
   result.leaf = first == 0;
   for (unsigned slot = 0; !result.leaf && slot < 8; ++slot)
@@ -142,7 +142,7 @@ OctreeStatistics LooseOctree::statistics() const {
           std::max<std::size_t>(statistics.maxElementsInNode, end - begin);
     });
   }
-  statistics.nodesAllocated = 8 * statistics.blocksAllocated;
+  statistics.nodesAllocated = kChildren * statistics.blocksAllocated;
   return statistics;
 }
 

@@ -42,6 +42,7 @@ void Octree::reset(std::size_t size) {
 }
 
 void Octree::copy(const Octree& other) {
+  PALPATE_ASSERT(other.isBuilt());
   const bool isSameLayout = isBuilt() && m_layout == other.m_layout;
   m_stage = Stage::Empty;
   const auto copyBuffer = [](auto& to, const auto& from) {
@@ -104,7 +105,7 @@ void Octree::fit(const Threads& threads) {
                       double areas = 0;
                       for (std::size_t g = from; g < to; ++g) {
                         const OctreeNode node = nodes.groupNodes[g];
-                        nodes.pool[node >> 3].setBox(node & 7, m_groupBoxes[g]);
+                        nodes.pool[blockOf(node)].setBox(slotOf(node), m_groupBoxes[g]);
                         areas += halfArea(m_groupBoxes[g]);
                       }
                       m_groupAreas[chunk] = areas;
@@ -138,10 +139,10 @@ void Octree::fitDops(int directions) {
   // Children come after their parents.
   for (std::size_t block = m_nodes.pool.used(); block-- > 0;)
     for (unsigned slot = 0; slot < 8; ++slot) {
-      const auto node = static_cast<OctreeNode>(block * 8 + slot);
+      const auto node = nodeOf(static_cast<std::uint32_t>(block), slot);
       const bool isUsed = (block > 0 || slot == 0) && !isEmpty(node);
       const auto [begin, end] = isUsed ? ownRange(node) : std::pair(0u, 0u);
-      const std::size_t child = isUsed ? firstChild(node) >> 3 : 0;
+      const std::size_t child = isUsed ? blockOf(firstChild(node)) : 0;
       const bool isLeaf = isUsed && child == 0;
       leaves += isLeaf;
       for (int k = 0; k < 3 && isLeaf; ++k) {

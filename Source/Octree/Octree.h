@@ -9,6 +9,7 @@
 #include "Core/Arena.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -17,6 +18,10 @@
 #include <utility>
 
 namespace palpate {
+
+/// Children of a node, and levels of an octree at most.
+inline constexpr unsigned kChildren = 8;
+inline constexpr std::size_t kMaxLevels = 61;
 
 /// Eight siblings with their fitted boxes side by side, so that one SIMD comparison tests all
 /// eight.
@@ -28,19 +33,21 @@ namespace palpate {
 struct alignas(64) OctreeBlock {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
-  float lower[3][8];
-  float upper[3][8];
-  std::uint32_t begin[8];
-  std::uint32_t child[8];  ///< a block, or kLeaf | number of elements
+  float lower[3][kChildren];
+  float upper[3][kChildren];
+  std::uint32_t begin[kChildren];
+  std::uint32_t child[kChildren];  ///< a block, or kLeaf | number of elements
 
   bool isLeaf(unsigned slot) const { return child[slot] & kLeaf; }
   std::uint32_t count(unsigned slot) const { return child[slot] & ~kLeaf; }
   bool isEmpty(unsigned slot) const { return child[slot] == kLeaf; }
   FloatBox box(unsigned slot) const {
+    PALPATE_ASSERT(slot < kChildren);
     return {{lower[0][slot], lower[1][slot], lower[2][slot], 0},
             {upper[0][slot], upper[1][slot], upper[2][slot], 0}};
   }
   void setBox(unsigned slot, const FloatBox& box) {
+    PALPATE_ASSERT(slot < kChildren);
     for (int k = 0; k < 3; ++k) {
       lower[k][slot] = box.lower[k];
       upper[k][slot] = box.upper[k];
@@ -90,8 +97,11 @@ class BlockPool {
   std::span<OctreeBlock> m_blocks;
 };
 
-/// A node: block * 8 + slot. The root is node 0, alone in block 0.
+/// A node, by its block and its slot there. The root is node 0, alone in block 0.
 using OctreeNode = std::uint32_t;
+constexpr std::uint32_t blockOf(OctreeNode node) { return node / kChildren; }
+constexpr unsigned slotOf(OctreeNode node) { return node % kChildren; }
+constexpr OctreeNode nodeOf(std::uint32_t block, unsigned slot) { return block * kChildren + slot; }
 
 /// The result of a build: the nodes over an order of elements.
 struct OctreeNodes {
@@ -181,20 +191,21 @@ class Octree {
   const BlockPool& pool() const { return m_nodes.pool; }
   const Cube& rootCube() const { return m_nodes.rootCube; }
   std::size_t bytes() const;
-  FloatBox box(OctreeNode node) const { return blocks()[node >> 3].box(node & 7); }
-  bool isEmpty(OctreeNode node) const { return blocks()[node >> 3].isEmpty(node & 7); }
+  FloatBox box(OctreeNode node) const { return blocks()[blockOf(node)].box(slotOf(node)); }
+  bool isEmpty(OctreeNode node) const { return blocks()[blockOf(node)].isEmpty(slotOf(node)); }
   /// The first of eight consecutive children. 0 for a leaf, as the root is nobody's child.
   OctreeNode firstChild(OctreeNode node) const {
-    const OctreeBlock& block = blocks()[node >> 3];
-    return block.isLeaf(node & 7) ? 0 : block.child[node & 7] * 8;
+    const OctreeBlock& block = blocks()[blockOf(node)];
+    const unsigned slot = slotOf(node);
+    return block.isLeaf(slot) ? 0 : nodeOf(block.child[slot], 0);
   }
   /// The node whose children are in block `block`. For block 0, the root itself.
   OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
 
   /// The range of elements that a node holds itself.
   std::pair<std::uint32_t, std::uint32_t> ownRange(OctreeNode node) const {
-    const OctreeBlock& block = m_nodes.pool[node >> 3];
-    const unsigned slot = node & 7;
+    const OctreeBlock& block = m_nodes.pool[blockOf(node)];
+    const unsigned slot = slotOf(node);
     const std::uint32_t begin = block.begin[slot];
     return {begin, block.isLeaf(slot) ? begin + block.count(slot)
                                       : m_nodes.pool[block.child[slot]].begin[0]};

@@ -111,7 +111,7 @@ void OctreeBuilder::assemble(std::uint32_t size, OctreeNodes& nodes, const Threa
   for (std::size_t task = 0; task + 1 < parts; ++task) {
     const OctreeNode node = top().tasks[task].node;
     const std::uint32_t child = m_layouts[task + 1].rootChild;
-    nodes.pool[node >> 3].child[node & 7] =
+    nodes.pool[blockOf(node)].child[slotOf(node)] =
         child & OctreeBlock::kLeaf ? child : child + nodes.partBlocks[task + 1];
   }
 }

@@ -1,7 +1,6 @@
 #include "Octree/PointQueries.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 
 #undef HWY_TARGET_INCLUDE
@@ -34,24 +33,15 @@ HWY_ATTR void findOverlappingKernel(const Octree& octree, const BoxMap& map, con
                                HWY_ATTR { return boxes.overlapping(box); };
   stack.found.clear();
   if (!selectBoxes(BoxTag(), octree.blocks()[0], 0, 1, map, overlapping)) return;
-  std::array<OctreeNode, 512> nodes;  // seven siblings remain on each of at most 61 levels
-  std::size_t count = 0;
-  nodes[count++] = 0;
-  while (count > 0) {
-    const OctreeNode node = nodes[--count];
-    const auto [begin, end] = octree.ownRange(node);
-    for (std::uint32_t i = begin; i < end; i += kTestedTogether) {
-      const std::size_t size = std::min<std::size_t>(kTestedTogether, end - i);
+  for (Walk walk(octree); walk.next();) {
+    for (std::uint32_t i = walk.begin(); i < walk.end(); i += kTestedTogether) {
+      const std::size_t size = std::min<std::size_t>(kTestedTogether, walk.end() - i);
       std::uint32_t bits = selectBoxes(LeafTag(), octree.boxes(), i, size, map, overlapping);
       for (; bits; bits &= bits - 1)
         stack.found.push_back(i + static_cast<std::uint32_t>(std::countr_zero(bits)));
     }
-    const OctreeNode child = octree.firstChild(node);
-    if (child == 0) continue;
-    std::uint32_t bits =
-        selectBoxes(NodeTag(), octree.blocks()[child >> 3], 0, 8, map, overlapping);
-    for (; bits; bits &= bits - 1)
-      nodes[count++] = child + static_cast<std::uint32_t>(std::countr_zero(bits));
+    if (walk.hasChildren())
+      walk.enter(selectBoxes(NodeTag(), walk.children(), 0, kChildren, map, overlapping));
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
+#include "Octree/Walk.h"
 #include "Core/Buffer.h"
 
 #include <cstddef>
@@ -12,7 +13,6 @@ namespace palpate {
 /// Scratch of point queries, which keeps its peak capacity. Each query clears it first, so that a
 /// query that ended with an exception does not affect the next one.
 struct PointQueryStack {
-  Buffer<OctreeNode> nodes;
   Buffer<std::uint32_t> found;     ///< of findOverlapping()
   std::size_t exactDecisions = 0;  ///< of all queries, until the caller clears it
 };
@@ -22,27 +22,25 @@ struct PointQueryStack {
 /// octree's order that each accepted node holds itself. This and all queries below throw if the
 /// octree is not built.
 template <class Enter, class F>
-void forEachEntered(const Octree& octree, Enter&& enter, PointQueryStack& stack, F&& f) {
+void forEachEntered(const Octree& octree, Enter&& enter, F&& f) {
   octree.requireBuilt();
-  stack.nodes.clear();
-  if (enter(OctreeNode{0})) stack.nodes.push_back(0);
-  while (!stack.nodes.empty()) {
-    const OctreeNode node = stack.nodes.back();
-    stack.nodes.pop_back();
-    const auto [begin, end] = octree.ownRange(node);
-    if (begin < end) f(begin, end);
-    const OctreeNode first = octree.firstChild(node);
-    for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
-      if (!octree.isEmpty(first + slot) && enter(first + slot)) stack.nodes.push_back(first + slot);
+  if (!enter(OctreeNode{0})) return;
+  for (Walk walk(octree); walk.next();) {
+    if (walk.begin() < walk.end()) f(walk.begin(), walk.end());
+    if (!walk.hasChildren()) continue;
+    std::uint32_t bits = 0;
+    for (unsigned slot = 0; slot < kChildren; ++slot)
+      if (!walk.children().isEmpty(slot) && enter(walk.child(slot))) bits |= 1u << slot;
+    walk.enter(bits);
   }
 }
 
 /// Calls f(begin, end) for ranges of the octree's order that together hold every element whose box
 /// `overlaps` accepts. A box around an accepted box must be accepted, too.
 template <class Overlaps, class F>
-void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, PointQueryStack& stack, F&& f) {
+void forEachOverlapping(const Octree& octree, Overlaps&& overlaps, F&& f) {
   forEachEntered(
-      octree, [&](OctreeNode node) { return overlaps(octree.box(node)); }, stack, f);
+      octree, [&](OctreeNode node) { return overlaps(octree.box(node)); }, f);
 }
 
 /// Finds the elements whose boxes, as the map places them, overlap `box`. Their places in the

@@ -116,7 +116,7 @@ class Walk {
 
  private:
   static bool isLeaf(const OctreeBlock* blocks, OctreeNode node) {
-    return node & NodePair::kOwn || blocks[node >> 3].isLeaf(node & 7);
+    return node & NodePair::kOwn || blocks[blockOf(node)].isLeaf(slotOf(node));
   }
   static LeafRange range(const Octree& tree, OctreeNode node) {
     const auto [begin, end] = tree.ownRange(node & ~NodePair::kOwn);
@@ -146,10 +146,12 @@ class Walk {
 
   /// The bounds of one node of a, in the frame in which they are compared.
   HWY_ATTR HWY_INLINE Bounds boundsOfA(OctreeNode node) const {
-    return placedA(BoxLanes<BoxTag, K>::load(m_boundsA.siblings(node >> 3), node & 7)).first();
+    return placedA(BoxLanes<BoxTag, K>::load(m_boundsA.siblings(blockOf(node)), slotOf(node)))
+        .first();
   }
   HWY_ATTR HWY_INLINE Bounds boundsOfB(OctreeNode node) const {
-    return placedB(BoxLanes<BoxTag, K>::load(m_boundsB.siblings(node >> 3), node & 7)).first();
+    return placedB(BoxLanes<BoxTag, K>::load(m_boundsB.siblings(blockOf(node)), slotOf(node)))
+        .first();
   }
 
   /// Bit i: child i of b's block overlaps the bounds.
@@ -208,20 +210,20 @@ class Walk {
   }
 
   static bool hasOwn(const OctreeBlock* blocks, OctreeNode node) {
-    const OctreeBlock& block = blocks[node >> 3];
-    return block.begin[node & 7] != blocks[block.child[node & 7]].begin[0];
+    const OctreeBlock& block = blocks[blockOf(node)];
+    return block.begin[slotOf(node)] != blocks[block.child[slotOf(node)]].begin[0];
   }
 
   void push(OctreeNode a, OctreeNode b) { m_stack.push_back({a, b}); }
 
   void pushChildrenOfB(OctreeNode a, OctreeNode blockB, std::uint32_t bits) {
     for (; bits; bits &= bits - 1)
-      push(a, blockB * 8 + static_cast<unsigned>(std::countr_zero(bits)));
+      push(a, nodeOf(blockB, static_cast<unsigned>(std::countr_zero(bits))));
   }
 
   static float extent(const OctreeBlock* blocks, OctreeNode node) {
-    const OctreeBlock& block = blocks[node >> 3];
-    const unsigned slot = node & 7;
+    const OctreeBlock& block = blocks[blockOf(node)];
+    const unsigned slot = slotOf(node);
     float longest = 0;
     for (int k = 0; k < 3; ++k)
       longest = std::max(longest, block.upper[k][slot] - block.lower[k][slot]);
@@ -242,45 +244,45 @@ class Walk {
 
   HWY_ATTR void descendB(NodePair pair) {
     const OctreeNode nodeA = pair.a & ~NodePair::kOwn;
-    const OctreeNode child = m_b[pair.b >> 3].child[pair.b & 7];
+    const OctreeNode child = m_b[blockOf(pair.b)].child[slotOf(pair.b)];
     if (hasOwn(m_b, pair.b)) push(pair.a, pair.b | NodePair::kOwn);
     pushChildrenOfB(pair.a, child, overlaps(child, boundsOfA(nodeA)));
   }
 
   HWY_ATTR void descendA(NodePair pair) {
     const OctreeNode nodeB = pair.b & ~NodePair::kOwn;
-    const OctreeNode child = m_a[pair.a >> 3].child[pair.a & 7];
+    const OctreeNode child = m_a[blockOf(pair.a)].child[slotOf(pair.a)];
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
     PlacedBlock block;
     std::uint32_t bits = placeBlock(child, nodeB, block);
     for (; bits; bits &= bits - 1)
-      push(child * 8 + static_cast<unsigned>(std::countr_zero(bits)), pair.b);
+      push(nodeOf(child, static_cast<unsigned>(std::countr_zero(bits))), pair.b);
   }
 
   HWY_ATTR void descendBoth(NodePair pair) {
-    const OctreeNode childA = m_a[pair.a >> 3].child[pair.a & 7],
-                     childB = m_b[pair.b >> 3].child[pair.b & 7];
+    const OctreeNode childA = m_a[blockOf(pair.a)].child[slotOf(pair.a)],
+                     childB = m_b[blockOf(pair.b)].child[slotOf(pair.b)];
     const bool ownB = hasOwn(m_b, pair.b);
     if (hasOwn(m_a, pair.a)) push(pair.a | NodePair::kOwn, pair.b);
     PlacedBlock block;
     std::uint32_t bits = placeBlock(childA, pair.b, block);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
-      const OctreeNode a = childA * 8 + slot;
+      const OctreeNode a = nodeOf(childA, slot);
       if (ownB) push(a, pair.b | NodePair::kOwn);
       pushChildrenOfB(a, childB, overlaps(childB, block.bounds(slot)));
     }
   }
 
   HWY_ATTR void descendWithinNode(OctreeNode node) {
-    const OctreeNode child = m_a[node >> 3].child[node & 7];
+    const OctreeNode child = m_a[blockOf(node)].child[slotOf(node)];
     const bool own = hasOwn(m_a, node);
     if (own) push(node | NodePair::kOwn, node | NodePair::kOwn);
     PlacedBlock block;
     std::uint32_t bits = placeBlock(child, node, block);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
-      const OctreeNode a = child * 8 + slot;
+      const OctreeNode a = nodeOf(child, slot);
       if (own) push(node | NodePair::kOwn, a);
       push(a, a);
       pushChildrenOfB(a, child, overlaps(child, block.bounds(slot)) & ~((2u << slot) - 1));

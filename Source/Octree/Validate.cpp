@@ -37,7 +37,7 @@ class Validation {
     }
     for (std::size_t block = 0; block < m_blockVisited.size(); ++block)
       if (!m_blockVisited[block])
-        fail(static_cast<OctreeNode>(block * 8), "a block in use has no parent");
+        fail(nodeOf(static_cast<std::uint32_t>(block), 0), "a block in use has no parent");
     return std::move(m_failures);
   }
 
@@ -48,8 +48,8 @@ class Validation {
 
   /// Returns the box that the node's fitted box must equal.
   FloatBox visit(OctreeNode node, const Cube& cube) {
-    const OctreeBlock& block = m_octree.blocks()[node >> 3];
-    const unsigned slot = node & 7;
+    const OctreeBlock& block = m_octree.blocks()[blockOf(node)];
+    const unsigned slot = slotOf(node);
     const std::uint32_t child = block.child[slot];
     FloatBox box;
     if (!block.isLeaf(slot) && (child >= m_blockVisited.size() || m_blockVisited[child])) {
@@ -72,9 +72,9 @@ class Validation {
       for (unsigned octant = 0; octant < 8; ++octant) {
         if (m_octree.blocks()[child].isEmpty(octant)) {
           if (!m_octree.blocks()[child].box(octant).empty())
-            fail(child * 8 + octant, "an empty slot has a box");
+            fail(nodeOf(child, octant), "an empty slot has a box");
         } else {
-          box.add(visit(child * 8 + octant, cube.child(octant)));
+          box.add(visit(nodeOf(child, octant), cube.child(octant)));
         }
       }
     }
@@ -88,7 +88,7 @@ class Validation {
   void checkDops(OctreeNode node) {
     const OctreeDops& dops = m_octree.dops();
     const auto [begin, end] = m_octree.ownRange(node);
-    const OctreeNode child = m_octree.firstChild(node) >> 3;
+    const OctreeNode child = blockOf(m_octree.firstChild(node));
     for (int k = 3; k < dops.directions; ++k) {
       float lower = FloatBox::kEmptyLower, upper = -lower;
       const auto add = [&](float from, float to) {
@@ -98,8 +98,8 @@ class Validation {
       for (std::uint32_t i = begin; i < end; ++i) add(dops.lower[k][i], dops.upper[k][i]);
       for (unsigned slot = 0; child != 0 && slot < 8; ++slot)
         add(dops.block(child)[k - 3].lower[slot], dops.block(child)[k - 3].upper[slot]);
-      const OctreeDops::Siblings& fitted = dops.block(node >> 3)[k - 3];
-      if (fitted.lower[node & 7] != lower || fitted.upper[node & 7] != upper)
+      const OctreeDops::Siblings& fitted = dops.block(blockOf(node))[k - 3];
+      if (fitted.lower[slotOf(node)] != lower || fitted.upper[slotOf(node)] != upper)
         fail(node, "its k-DOP differs from the bounds of its elements and children");
     }
   }

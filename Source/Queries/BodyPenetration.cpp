@@ -6,6 +6,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/TranslationExit.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -331,6 +332,7 @@ class Search {
 
 Penetration penetrationOf(const Body& a, const Body& b, Engine engine, PenetrationScratch& scratch,
                           const PenetrationEffort& effort) {
+  PALPATE_ASSERT(!a.shape && !b.shape);
   const auto none = [](const Body& geometry) {
     return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
   };

@@ -9,6 +9,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Text.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <bit>
@@ -134,8 +135,8 @@ class InsideQuery {
 
   WindingNumbers::Result evaluate(const Eigen::Vector3d& p) {
     if (m_settings.rule == InsideRule::WindingNumber) {
-      const WindingNumbers::Result found = m_body.prepared->windingNumbers.evaluate(
-          m_body, p, m_settings.margin, m_bruteForce, m_stack);
+      const WindingNumbers::Result found =
+          m_body.prepared->windingNumbers.evaluate(m_body, p, m_settings.margin, m_bruteForce);
       // That of a closed surface is an integer, which is exact where rounding leaves the sum open.
       if (found.decided || !m_body.isKnownClosed()) return found;
       return {m_surface.windingNumber(p).value_or(0) != 0, true};
@@ -173,6 +174,7 @@ int windingNumber(const Body& body, const Eigen::Vector3d& point, Engine engine,
 void findInside(const Body& vertices, const Body& body, const InsideSettings& settings,
                 Engine engine, const Threads& threads, VertexSearch<InsideVertex>& scratch,
                 std::vector<InsideVertex>& out) {
+  PALPATE_ASSERT(body.tree.isValid());
   if (body.tree.octree().size() == 0) return out.clear();
   const OuterSurface outer(body, engine == Engine::BruteForce);
   searchVertices(vertices.mesh.topology, threads, scratch, out, [&](PointQueryStack& stack) {

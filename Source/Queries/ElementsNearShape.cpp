@@ -8,7 +8,7 @@
 namespace palpate {
 
 void findElementsNear(const Body& geometry, const Shape& before, const Shape& now,
-                      double maxDistance, PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+                      double maxDistance, Buffer<std::uint32_t>& out) {
   using Eigen::Vector3d;
   const bool wholeStep = &before != &now;
   const Vector3d origin = worldOrigin(geometry);
@@ -40,7 +40,7 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
              maxDistance + error + kShapeBoundError * size);  // NaN: it may
   };
   out.clear();
-  forEachOverlapping(geometry.tree.octree(), mayBeNear, stack,
+  forEachOverlapping(geometry.tree.octree(), mayBeNear,
                      [&](std::uint32_t begin, std::uint32_t end) {
                        for (std::uint32_t i = begin; i < end; ++i)
                          if (mayBeNear(geometry.tree.octree().boxes()[i]))
@@ -49,7 +49,7 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
 }
 
 void findElementsNear(const Body& geometry, const Eigen::AlignedBox3d& box, bool wholeStep,
-                      PointQueryStack& stack, Buffer<std::uint32_t>& out) {
+                      Buffer<std::uint32_t>& out) {
   const Eigen::Vector3d origin = worldOrigin(geometry);
   const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
   const double unit = 1.0 / geometry.tree.frame().scale,
@@ -69,7 +69,7 @@ void findElementsNear(const Body& geometry, const Eigen::AlignedBox3d& box, bool
   };
   out.clear();
   if (geometry.tree.octree().size() == 0) return;
-  forEachOverlapping(geometry.tree.octree(), mayBeNear, stack,
+  forEachOverlapping(geometry.tree.octree(), mayBeNear,
                      [&](std::uint32_t begin, std::uint32_t end) {
                        for (std::uint32_t i = begin; i < end; ++i)
                          if (mayBeNear(geometry.tree.octree().boxes()[i]))

@@ -12,9 +12,9 @@ namespace palpate {
 /// Source   The distance to a convex shape is convex. Over a box it is therefore at least the
 ///          distance at the centre minus what the gradient there takes away up to a corner.
 void findElementsNear(const Body&, const Shape& before, const Shape& now, double maxDistance,
-                      PointQueryStack&, Buffer<std::uint32_t>& out);
+                      Buffer<std::uint32_t>& out);
 /// The same for a box in the world, which encloses the whole step or the step's end.
-void findElementsNear(const Body&, const Eigen::AlignedBox3d& box, bool wholeStep, PointQueryStack&,
+void findElementsNear(const Body&, const Eigen::AlignedBox3d& box, bool wholeStep,
                       Buffer<std::uint32_t>& out);
 
 }  // namespace palpate

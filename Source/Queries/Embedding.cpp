@@ -1,6 +1,7 @@
 #include "Queries/Embedding.h"
 
 #include "Math/TetrahedronWeights.h"
+#include "Core/Assert.h"
 
 namespace palpate {
 
@@ -20,6 +21,7 @@ void updateTetrahedra(const Body& solid, const OctreeSettings& settings, const T
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
+  PALPATE_ASSERT(m_solid.prepared->tetrahedraVersion.isValid());
   const CountedVector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
   const Positions& now = m_solid.mesh.now;
   std::optional<TetrahedronPoint> best;

@@ -354,30 +354,13 @@ void descend(const Body& geometry, bool bruteForce, double best, Bound&& bound, 
     return bound(centre, half) - kNearestError * (half.sum() + middle.cwiseAbs().sum()) -
            kShapeBoundError * (centre.cwiseAbs().sum() + origin.cwiseAbs().sum());
   };
-  struct Entry {
-    double bound;
-    OctreeNode node;
-  };
-  std::array<Entry, 512> entries;  // seven siblings remain on each of at most 61 levels
-  std::size_t count = 0;
-  entries[count++] = {-kInfinity, 0};
-  while (count > 0) {
-    const Entry entry = entries[--count];
-    if (entry.bound > best) continue;
-    const auto [begin, end] = octree.ownRange(entry.node);
-    for (std::uint32_t i = begin; i < end; ++i)
+  for (NearestWalk<double> walk(octree, -kInfinity); walk.next(best);) {
+    for (std::uint32_t i = walk.begin(); i < walk.end(); ++i)
       if (!(boundOf(octree.boxes()[i]) > best)) best = test(octree.order()[i]);
-    const OctreeNode child = octree.firstChild(entry.node);
-    const std::size_t first = count;
-    for (unsigned slot = 0; child != 0 && slot < 8; ++slot) {
-      if (octree.isEmpty(child + slot)) continue;
-      const double least = boundOf(octree.box(child + slot));
-      if (least > best) continue;
-      std::size_t place = count++;
-      for (; place > first && entries[place - 1].bound < least; --place)
-        entries[place] = entries[place - 1];
-      entries[place] = {least, child + slot};
-    }
+    walk.forEachChild([&](OctreeNode child) {
+      const double least = boundOf(octree.box(child));
+      if (!(least > best)) walk.enter(child, least);
+    });
   }
 }
 

@@ -91,8 +91,7 @@ class Search {
 
   HWY_ATTR void run() {
     const OctreeBlock* const blocks = m_search.octree.blocks();
-    // One block on each of at most 61 levels.
-    std::array<Siblings, 64> path;
+    std::array<Siblings, kMaxLevels> path;
     std::size_t depth = 0;
     const OctreeBlock* block = blocks;
     std::uint32_t slot = 0;

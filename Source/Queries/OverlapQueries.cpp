@@ -39,7 +39,7 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   found.clear();
   if (!geometry.tree.ordered().empty())
     findOverlapping(geometry, shape, pose, source->engine() == Engine::BruteForce, scratch->shapes,
-                    scratch->stack, scratch->nearShape, found);
+                    scratch->nearShape, found);
   scratch->sort(found);
   elements.reserve(found.size());  // nothing below throws
   elements.assign(found.begin(), found.end());
@@ -63,8 +63,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
     if (source->engine() == Engine::BruteForce)
       for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
     else
-      findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius,
-                       scratch->stack, near);
+      findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius, near);
     const PairSettings settings{Method::Proximity, thickness};
     findShapeContacts(geometry.mesh, tool, settings, near, scratch->shapeContacts);
     std::sort(found.begin(), found.end(), [](const ShapeContact& a, const ShapeContact& b) {

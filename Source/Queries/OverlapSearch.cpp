@@ -1,5 +1,7 @@
 #include "Queries/OverlapSearch.h"
 
+#include "Octree/Walk.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -228,33 +230,26 @@ class OverlapDescent {
       : m_search(search), m_elements(elements), m_undecided(undecided) {}
 
   HWY_ATTR void run() {
-    const Octree& octree = m_search.octree;
-    // Eight siblings on each of at most 61 levels.
-    std::array<std::uint32_t, 512> nodes;
-    constexpr std::uint32_t kInside = 0x80000000u;  // the bit of a node that lies inside
-    std::size_t count = 0;
-    nodes[count++] = 0;
-    while (count > 0) {
-      const std::uint32_t entry = nodes[--count];
-      const OctreeNode node = entry & ~kInside;
-      const auto [begin, end] = octree.ownRange(node);
-      addRange(begin, end, entry & kInside);
-      const OctreeNode child = octree.firstChild(node);
-      if (child == 0) continue;
-      const OctreeBlock& block = octree.blocks()[child >> 3];
+    // Marked nodes lie inside.
+    for (Walk walk(m_search.octree); walk.next();) {
+      addRange(walk.begin(), walk.end(), walk.isMarked());
+      if (!walk.hasChildren()) continue;
+      const OctreeBlock& block = walk.children();
       Verdict verdict;
-      if (entry & kInside)
-        verdict.meeting = 0xff;
+      if (walk.isMarked())
+        verdict.meeting = kAllChildren;
       else
-        verdict = test(NodeTag(), block, 0, 8);
-      for (std::uint32_t bits = ~verdict.outside & 0xff; bits; bits &= bits - 1) {
+        verdict = test(NodeTag(), block, 0, kChildren);
+      std::uint32_t entered = 0;
+      for (std::uint32_t bits = ~verdict.outside & kAllChildren; bits; bits &= bits - 1) {
         const auto slot = static_cast<unsigned>(std::countr_zero(bits));
-        const bool isInside = verdict.meeting >> slot & 1;
-        if (block.isLeaf(slot))
-          addRange(block.begin[slot], block.begin[slot] + block.count(slot), isInside);
+        if (block.isLeaf(slot))  // need not wait
+          addRange(block.begin[slot], block.begin[slot] + block.count(slot),
+                   verdict.meeting >> slot & 1);
         else
-          nodes[count++] = (child + slot) | (isInside ? kInside : 0);
+          entered |= 1u << slot;
       }
+      walk.enter(entered, verdict.meeting);
     }
     testPending();
     decide(m_open);

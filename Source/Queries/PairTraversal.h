@@ -54,7 +54,8 @@ struct PairScratch {
   };
 
   Heights a, b;
-  std::array<Entry, 1024> entries;  ///< eight remain on each of at most 61 levels of each octree
+  /// All siblings remain on each level of each octree.
+  std::array<Entry, 2 * kChildren * kMaxLevels + 48> entries;
 };
 
 /// Tests elements. Returns the bound for those that follow.

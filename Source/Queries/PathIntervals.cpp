@@ -7,6 +7,7 @@
 #include "Math/StableLength.h"
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -93,6 +94,7 @@ void findPathParts(const Body& body, const PathLine& path, double radius, bool b
 
 void addInvertedFaces(const Body& solid, const PathLine& path, bool bruteForce,
                       PointQueryStack& stack, PathScratch& scratch) {
+  PALPATE_ASSERT(solid.prepared->tetrahedraVersion.isValid());
   const Positions& now = solid.mesh.now;
   const TetrahedralTopology& topology = solid.solid->topology;
   const TetrahedronTree& tree = *solid.prepared->tetrahedra;

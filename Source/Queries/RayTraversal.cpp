@@ -1,5 +1,7 @@
 #include "Queries/RayTraversal.h"
 
+#include "Octree/Walk.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -221,8 +223,7 @@ class RaySearch {
   std::size_t m_lastOctant;                  ///< the octant that the ray passes last
   float m_tMax;
   std::uint32_t m_first, m_met;  ///< bit i: element m_first + i is to be tested
-  // Seven siblings remain on each of at most 61 levels, and whole vectors are stored.
-  static constexpr std::size_t kStack = 7 * 61 + 8;
+  static constexpr std::size_t kStack = kMostWaiting;  // whole vectors are stored
   float m_enters[kStack];
   std::uint32_t m_begins[kStack], m_links[kStack];  ///< as in OctreeBlock
 };

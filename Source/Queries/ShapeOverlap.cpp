@@ -257,8 +257,7 @@ void findWithin(const Body& geometry, const Vector3d& point, double distance, bo
 
 void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
                      const RigidTransform& pose, bool bruteForce, KeptShapes& kept,
-                     PointQueryStack& stack, Buffer<std::uint32_t>& near,
-                     std::vector<std::uint32_t>& out) {
+                     Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
   const TriangleMesh& mesh = geometry.mesh;
   const Shape* shape = nullptr;  // placed where needed, because a hull is costly
   const auto build = [&] {
@@ -300,7 +299,7 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
       for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
       return;
     }
-    findElementsNear(geometry, *shape, *shape, mesh.largestRadius, stack, near);
+    findElementsNear(geometry, *shape, *shape, mesh.largestRadius, near);
     for (const std::uint32_t element : near) test(element);
     return;
   }

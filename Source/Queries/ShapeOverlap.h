@@ -26,7 +26,7 @@ void findWithin(const Body&, const Eigen::Vector3d& point, double distance, bool
 ///          clipped in double decide most others.
 /// kept: memory of shapes.
 void findOverlapping(const Body&, const AnalyticalGeometry&, const RigidTransform&, bool bruteForce,
-                     KeptShapes& kept, PointQueryStack&, Buffer<std::uint32_t>& near,
+                     KeptShapes& kept, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out);
 
 }  // namespace palpate

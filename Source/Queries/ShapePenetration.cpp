@@ -5,6 +5,7 @@
 #include "Queries/HullSeparation.h"
 #include "Queries/ShapeBody.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -154,6 +155,8 @@ Penetration ofMesh(const Body& mesh, const Body& geometry, const Body& around, E
 Penetration shapePenetration(const Body& a, const Body& b, Engine engine,
                              const OctreeSettings& settings, PenetrationScratch& scratch,
                              ShapePairScratch& pairScratch) {
+  PALPATE_ASSERT(a.shape || b.shape);
+  PALPATE_ASSERT(!(a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane()));
   if (a.shape && b.shape) return ofShapes(a, b, pairScratch);
   if (a.shape) return exchanged(shapePenetration(b, a, engine, settings, scratch, pairScratch));
   if (a.mesh.topology.triangles.empty()) return apart(a.id, b.id);

@@ -4,6 +4,7 @@
 
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <atomic>
@@ -27,6 +28,8 @@ int GeometryCopy::kept(const Body& original) const {
 }
 
 void GeometryCopy::update(const Body& original) {
+  PALPATE_ASSERT(original.tree.isValid());
+  PALPATE_ASSERT(original.id == geometry.id);
   m_version.invalidate();
   TriangleMesh& mesh = geometry.mesh;
   if (const ElementsState& elements = original.revisions.elements;
@@ -205,6 +208,7 @@ GeometryCopy& SnapshotPool::copyOf(const Body& original) {
 }
 
 std::shared_ptr<const Snapshot> SnapshotPool::take(SpatialQueries::Source& frame, double time) {
+  PALPATE_ASSERT(frame.state() != 0);
   reclaim();
   forgetRemoved(frame);
   Slot& slot = freeSlot();

@@ -4,6 +4,7 @@
 #include "Math/Foot.h"
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -109,6 +110,7 @@ Polytope::Polytope(std::span<const Vector3d> points) {
 }
 
 void Polytope::start(std::span<const Vector3d> four) {
+  PALPATE_ASSERT(four.size() == 4 && volumeSign(four[0], four[1], four[2], four[3]) != 0);
   m_points.assign(four.begin(), four.end());
   m_faces.clear();
   m_planes.clear();

@@ -9,6 +9,7 @@
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
 #include "Core/Text.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -71,6 +72,7 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
 }
 
 void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+  PALPATE_ASSERT(deviationFromRotation(transform.rotation) <= kRoughRotation);
   const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
     m_type = Type::Capsule;
     m_p0 = transform(p0);

@@ -6,6 +6,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactQuery.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -375,6 +376,7 @@ class ShapeContactFinder {
 void findShapeContacts(const TriangleMesh& mesh, const PlacedShape& shape,
                        const PairSettings& settings, std::span<const std::uint32_t> elements,
                        ShapeContactBuffers& out) {
+  PALPATE_ASSERT(settings.method == Method::Proximity || settings.method == Method::Continuous);
   ShapeContactFinder finder(mesh, shape, settings, out);
   for (const std::uint32_t element : elements) finder.test(element);
 }
@@ -430,6 +432,7 @@ void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
 
 void findShapePair(const PlacedShape& a, const PlacedShape& b, const PairSettings& settings,
                    ShapeContactBuffers& out) {
+  PALPATE_ASSERT(settings.method == Method::Proximity || settings.method == Method::Continuous);
   const std::size_t before = out.shapePair.polytope.exactDecisions();
   ++out.featurePairs;
   if (settings.method == Method::Continuous) {

@@ -50,9 +50,9 @@ constexpr std::uint32_t kNone = 0xffffffff;
 
 }  // namespace
 
-Simplifier::Simplifier(CollapseEdges collapse, const Body& body, const SimplifySettings& settings,
-                       double largest, const Threads& threads)
-    : m_collapse(collapse),
+Simplifier::Simplifier(CollapseEdges collapseEdges, const Body& body,
+                       const SimplifySettings& settings, double largest, const Threads& threads)
+    : m_collapse(collapseEdges),
       m_body(body),
       m_settings(settings),
       m_threads(threads),

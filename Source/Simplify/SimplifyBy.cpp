@@ -10,6 +10,7 @@
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
 #include "Core/Threads.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <string>
@@ -53,6 +54,7 @@ double checkSize(const TriangleMeshView& mesh, double maxDistance) {
 
 SimplifiedMesh simplifyBy(CollapseEdges collapse, const TriangleMeshView& mesh,
                           const SimplifySettings& settings) {
+  PALPATE_ASSERT(collapse != nullptr);
   const StandardFloatingPoint standard;
   checkPositive(settings.maxDistance, "maxDistance");
   checkThreads(settings.threads);

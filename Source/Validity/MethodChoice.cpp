@@ -1,6 +1,7 @@
 #include "Validity/MethodChoice.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 
@@ -60,6 +61,7 @@ static void examineProximity(double thickness, PairPlan& plan) {
 
 PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
                 bool moves) {
+  PALPATE_ASSERT(supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh));
   PairPlan plan;
   plan.kind = supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh)->kind;
   plan.method = settings.method;
@@ -147,6 +149,7 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
 }
 
 PairPlan planByLeaves(const PairSettings& settings, PairPlan exact) {
+  PALPATE_ASSERT(exact.kind == PairKind::Meshes);
   exact.kind = PairKind::ParticlesByLeaves;
   exact.motionTolerance = motionToleranceOf(settings);
   exact.proxyThickness = settings.thickness +

@@ -3,6 +3,7 @@
 #include "Validity/IntersectionAtEnd.h"
 #include "NarrowPhase/Meeting.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -174,6 +175,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                    const PairPlan& plan, const StepFacts& facts, bool nearby,
                    const MeshPair& meshes, CollisionData::Contents& contents,
                    ContactBuffers& counts) {
+  PALPATE_ASSERT(m_topologies.isValid());
   Validity& validity = contents.validity;
   const bool byLeaves = plan.kind == PairKind::ParticlesByLeaves;
   validity.method = byLeaves ? Method::Proxy : plan.method;

@@ -123,7 +123,7 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
     for (int repeat = 0; repeat < 8; ++repeat) {
       const double most =
           std::max(0.0, distanceOf(static_cast<std::uint32_t>(random() % searched.elementCount())));
-      findElementsNear(searched.geometry, before, now, most, stack, found);
+      findElementsNear(searched.geometry, before, now, most, found);
       touching += expectFound(searched, found,
                               [&](std::uint32_t element) { return distanceOf(element) <= most; });
       ASSERT_FALSE(HasFailure()) << round;
@@ -152,7 +152,7 @@ TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
                             on + 0.1 * size * randomPoint(random, 0, 1));
     const auto axis = static_cast<int>(random() % 3);
     (random() % 2 ? box.min() : box.max())[axis] = on[axis];
-    findElementsNear(searched.geometry, box, wholeStep, stack, found);
+    findElementsNear(searched.geometry, box, wholeStep, found);
     touching += expectFound(searched, found, [&](std::uint32_t element) {
       const Triangle& of = searched.corners(element);
       return std::any_of(of.begin(), of.end(), [&](std::uint32_t v) {

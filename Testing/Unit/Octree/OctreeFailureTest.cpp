@@ -45,7 +45,7 @@ void expectUnusable(const Octree& octree) {
   EXPECT_TRUE(throwsNotAvailable([&] { findOverlapping(octree, {}, box, stack); }));
   EXPECT_TRUE(throwsNotAvailable([&] {
     forEachOverlapping(
-        octree, [](const FloatBox&) { return true; }, stack, [](std::uint32_t, std::uint32_t) {});
+        octree, [](const FloatBox&) { return true; }, [](std::uint32_t, std::uint32_t) {});
   }));
   EXPECT_TRUE(throwsNotAvailable([&] { startPairs(trees, 1, pairs); }));
   EXPECT_TRUE(throwsNotAvailable([&] { traverse(trees, roots, pairs, sink); }));
@@ -263,7 +263,7 @@ TEST(OctreeFailure, FailedQueryDoesNotAffectTheNext) {
   const auto query = [&](PointQueryStack& stack, std::size_t& overlapping) {
     overlapping = 0;
     forEachOverlapping(
-        octree, [&](const FloatBox& each) { return each.overlaps(box); }, stack,
+        octree, [&](const FloatBox& each) { return each.overlaps(box); },
         [&](std::uint32_t begin, std::uint32_t end) { overlapping += end - begin; });
     findOverlapping(octree, {}, box, stack);
   };

@@ -97,7 +97,7 @@ TEST(PointQueries, FindEveryOverlappingElement) {
       // Without their own boxes, elements come with those of their node.
       found.clear();
       forEachOverlapping(
-          *c.octree, [&](const FloatBox& stored) { return map(stored).overlaps(box); }, stack,
+          *c.octree, [&](const FloatBox& stored) { return map(stored).overlaps(box); },
           [&](std::uint32_t begin, std::uint32_t end) {
             for (std::uint32_t i = begin; i < end; ++i) found.push_back(i);
           });
