@@ -1,9 +1,9 @@
 #include "Bodies/GeometryOctree.h"
 
 #include "Mesh/TriangleBoxes.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>

@@ -4,9 +4,9 @@
 #include "CollisionDetection/PairResults.h"
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldContacts.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 namespace palpate {
 

@@ -1,10 +1,10 @@
 #include "CollisionDetection/Frame.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Spin.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>

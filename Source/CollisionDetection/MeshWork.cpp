@@ -7,8 +7,8 @@
 #include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/Tolerances.h"
-#include "Core/Stopwatch.h"
 #include "Core/Assert.h"
+#include "Core/Stopwatch.h"
 
 #include <algorithm>
 #include <limits>

@@ -8,9 +8,9 @@
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/SurfaceProxy.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <atomic>

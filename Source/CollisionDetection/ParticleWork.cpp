@@ -4,9 +4,9 @@
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/ProxyWork.h"
 #include "Queries/ElementsNearShape.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>

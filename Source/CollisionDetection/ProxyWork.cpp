@@ -1,9 +1,9 @@
 #include "CollisionDetection/ProxyWork.h"
 
 #include "CollisionDetection/PairResults.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 

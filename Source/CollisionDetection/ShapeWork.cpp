@@ -5,9 +5,9 @@
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeContacts.h"
 #include "Shapes/ShapeNearings.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
-#include "Core/Assert.h"
 
 namespace palpate {
 

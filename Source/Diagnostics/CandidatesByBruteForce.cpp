@@ -1,5 +1,6 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "NarrowPhase/ElementBoxes.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <vector>
@@ -13,6 +14,7 @@ static std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool s
 }
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out) {
+  PALPATE_ASSERT(!meshes.hasShape());
   const double thickness =
       meshes.settings.method == Method::Intersection ? 0.0 : meshes.maxFeatureDistance();
   const bool swept =

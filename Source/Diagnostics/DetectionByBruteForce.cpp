@@ -2,6 +2,7 @@
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 
@@ -34,6 +35,7 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
 
 void detectVerticesByBruteForce(const PairRecord& record, std::span<const std::uint32_t> vertices,
                                 ContactBuffers& contacts) {
+  PALPATE_ASSERT(std::is_sorted(vertices.begin(), vertices.end()));
   FeatureLists features;
   features.verticesOfA.assign(vertices.begin(), vertices.end());
   findContactsByBruteForce(record.meshes(), features, contacts);

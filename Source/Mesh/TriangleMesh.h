@@ -3,8 +3,8 @@
 #include <palpate/Types.h>
 
 #include "Mesh/Positions.h"
-#include "Core/Buffer.h"
 #include "Core/Assert.h"
+#include "Core/Buffer.h"
 
 #include <cstdint>
 #include <span>

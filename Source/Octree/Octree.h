@@ -7,9 +7,9 @@
 #include "Octree/Keys.h"
 #include "Math/Box.h"
 #include "Core/Arena.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cstdint>

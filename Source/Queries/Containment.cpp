@@ -8,8 +8,8 @@
 #include "Math/RayCrossing.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Core/Text.h"
 #include "Core/Assert.h"
+#include "Core/Text.h"
 
 #include <algorithm>
 #include <bit>

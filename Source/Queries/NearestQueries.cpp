@@ -5,8 +5,8 @@
 #include "Queries/ElementsNearShape.h"
 #include "Queries/PointDistances.h"
 #include "Queries/QuerySource.h"
-#include "Queries/ShapeRays.h"
 #include "Queries/ShapeOverlap.h"
+#include "Queries/ShapeRays.h"
 
 #include <optional>
 #include <string>

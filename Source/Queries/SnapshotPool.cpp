@@ -2,9 +2,9 @@
 
 #include <palpate/Error.h>
 
+#include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <atomic>

@@ -8,8 +8,8 @@
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
-#include "Core/Text.h"
 #include "Core/Assert.h"
+#include "Core/Text.h"
 
 #include <Eigen/Geometry>
 

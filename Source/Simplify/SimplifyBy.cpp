@@ -7,10 +7,10 @@
 #include "Queries/ClosedBody.h"
 #include "Bodies/Body.h"
 #include "Bodies/InputChecks.h"
+#include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
 #include "Core/Threads.h"
-#include "Core/Assert.h"
 
 #include <algorithm>
 #include <string>

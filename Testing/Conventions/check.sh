@@ -100,7 +100,7 @@ checkPublicHeaders() {
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
     while read -r include; do fault "$header reaches $include"; done < <(
-      comm -13 <(echo "$allowed") <(echo "$files") | grep -vE '^(Source/(Adapters/(Vtk|Fcl)/)?Public/palpate/|/dev/null)')
+      comm -13 <(echo "$allowed") <(echo "$files") | grep -vE '^(Source/((Adapters/(Vtk|Fcl)|Simplify)/)?Public/palpate/|/dev/null)')
   done
 }
 
@@ -200,6 +200,19 @@ checkEnumerations() {
       /^    case [A-Za-z0-9:]+:$/ { name = $2; sub(/:$/, "", name); sub(/.*:/, "", name); next }
       name != "" && /^      return "/ && $0 != "      return \"" name "\";" { print FILENAME ": " name }
       { name = "" }')
+}
+
+# Assertions, counted for each module: a module with code has some.
+checkAssertions() {
+  local module count
+  for module in Source/*/; do
+    module=$(basename "$module")
+    [[ $module == Public || $module == Adapters || $module == Core ]] && continue
+    [[ -n $(find "Source/$module" -name '*.h' -o -name '*.cpp') ]] || continue
+    count=$(grep -rhoE '\bPALPATE_ASSERT\(' "Source/$module" | wc -l)
+    echo "$module: $count assertions"
+    ((count > 0)) || faults=1
+  done
 }
 
 # Nothing prints and nothing exits, but an assertion that fails.

@@ -56,6 +56,7 @@ plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n'
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
+plant Assertions Source/Math/A.cpp 'int a;\n'
 printf '#pragma once\ninline int one() { return 1; }\n' >"$tree/Source/Math/One.h"
 plant Headers Source/Shapes/A.h '#pragma once\ninline int one() { return 2; }\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
