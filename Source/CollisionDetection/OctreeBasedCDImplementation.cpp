@@ -1,0 +1,238 @@
+#include "CollisionDetection/OctreeBasedCDImplementation.h"
+
+#include "CollisionDetection/SettingsCheck.h"
+#include "Core/Assert.h"
+#include "Core/Stopwatch.h"
+
+#include <algorithm>
+
+namespace palpate {
+
+void throwMovedFrom() {
+  throw Error(ErrorCode::InvalidCall, "this OctreeBasedCD was moved from: it has no geometries");
+}
+
+void throwBusy() {
+  throw Error(ErrorCode::InvalidCall,
+              "a predicate or callback must not call the OctreeBasedCD that calls it");
+}
+
+OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
+    : settings(checked(newSettings)),
+      budget(MemoryBudget::make(settings.memoryLimit)),
+      threads(newSettings.threads, newSettings.executor),
+      querySource(std::make_shared<QuerySource>(*this)),
+      latestSnapshot(budget) {
+  updateOctreeView();
+}
+
+OctreeBasedCD::Implementation::~Implementation() {
+  querySource->close();
+  if (guardSource) guardSource->close();
+}
+
+void OctreeBasedCD::Implementation::releaseMemory() {
+  frame = Frame();
+  sortingScratch = {};
+  for (const auto& geometry : geometries.all()) {
+    geometry->body.tree.releaseMemory();
+    geometry->step.releaseMemory();
+  }
+  for (const auto& record : pairs.records()) record->releaseMemory();
+  querySource->releaseScratch();
+  latestSnapshot.releaseMemory();
+  holdsSpare = false;
+}
+
+void OctreeBasedCD::Implementation::publish(FrameStatistics next) {
+  next.geometries = next.triangles = next.segments = next.points = next.untestedVertices = 0;
+  for (const auto& geometry : geometries.all()) {
+    ++next.geometries;
+    const MeshTopology& topology = geometry->body.mesh.topology;
+    (topology.hasFaces()                    ? next.triangles
+     : topology.type == GeometryType::Lines ? next.segments
+                                            : next.points) += topology.triangles.size();
+    next.untestedVertices += topology.untestedVertices;
+  }
+  next.memory = budget->now();
+  next.peakMemory = budget->peak();
+  statistics = next;
+}
+
+void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairRecord>> records,
+                                           bool explicitly, bool detecting, bool skips) {
+  const MemoryScope memory(MemoryStage::Octrees);
+  using Update = LooseOctree::Update;
+  octreesState = 0;
+  state->trees.clear();  // they are invalid until the update is complete
+  if (!hasUpdates) updates = {};
+  const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
+  for (const auto& geometry : geometries.all()) {
+    if (isFirst) geometry->body.tree.lastUpdate = Update::Unchanged;
+    geometry->body.tree.setSwept(false);
+    geometry->body.tree.boxMilliseconds = geometry->body.tree.octreeMilliseconds = 0;
+  }
+  Stopwatch watch;
+  for (const auto& record : records) {
+    planStep(*record, detecting, !settings.keepCandidates);
+    if (record->plan.swept())
+      for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
+  }
+  updates.milliseconds.boxes += watch.lap();
+  geometries.updateOctrees(settings.octree, threads);
+  const double wall = watch.lap();
+  double boxes = 0, octrees = 0;
+  updates.rebuiltOctrees = updates.refittedOctrees = updates.unchangedOctrees = 0;
+  for (const auto& geometry : geometries.all()) {
+    const GeometryOctree& tree = geometry->body.tree;
+    ++(tree.lastUpdate == Update::Rebuilt    ? updates.rebuiltOctrees
+       : tree.lastUpdate == Update::Refitted ? updates.refittedOctrees
+                                             : updates.unchangedOctrees);
+    boxes += tree.boxMilliseconds;
+    octrees += tree.octreeMilliseconds;
+  }
+  // Geometries are updated in parallel. The wall-clock time is therefore divided in proportion to
+  // the work on boxes and on octrees.
+  const double share = boxes + octrees > 0 ? boxes / (boxes + octrees) : 0;
+  updates.milliseconds.boxes += wall * share;
+  updates.milliseconds.octree += wall * (1 - share);
+  updateOctreeView();
+  if (!skips) octreesState = geometries.state();
+#ifdef PALPATE_VALIDATE
+  PALPATE_ASSERT(octree->validate().empty());
+#endif
+  if (explicitly) publish(updates);
+}
+
+bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
+  for (const auto& geometry : geometries.all()) geometry->skipsOctree = false;
+  if (!maySkip) return false;
+  for (const auto& record : pairs.records())
+    if (needsNoOctree(*record)) record->a->skipsOctree = true;
+  for (const auto& record : pairs.records()) {
+    if (!needsNoOctree(*record)) record->a->skipsOctree = false;
+    if (record->kind() != PairKind::Proxy) record->b->skipsOctree = false;
+  }
+  return std::any_of(geometries.all().begin(), geometries.all().end(),
+                     [](const auto& geometry) { return geometry->skipsOctree; });
+}
+
+void OctreeBasedCD::Implementation::updateOctreeView() {
+  if (!state) {
+    state = std::make_shared<LooseOctree::State>();
+    octree.emplace(state);
+  }
+  state->trees.clear();
+  std::uint32_t firstNode = 0;
+  for (const auto& geometry : geometries.all()) {
+    const GeometryOctree& tree = geometry->body.tree;
+    if (geometry->skipsOctree || !tree.isValid() || tree.octree().size() == 0) continue;
+    state->trees.push_back({geometry->body.id, &tree.octree(), tree.frame().origin,
+                            tree.frame().scale, tree.lastUpdate, tree.bytesBesidesOctree(),
+                            firstNode});
+    firstNode += static_cast<std::uint32_t>(tree.octree().pool().used() * 8);
+  }
+}
+
+std::span<PairRecord* const> OctreeBasedCD::Implementation::outdatedPairs(
+    PairRecord::Derived PairRecord::*version) {
+  selectedPairs.clear();
+  for (const auto& record : pairs.records())
+    if (record->collides() && !((*record).*version).isCurrent(record->state()))
+      selectedPairs.push_back(record.get());
+  for (PairRecord* record : selectedPairs) record->candidatesVersion.invalidate();
+  return selectedPairs;
+}
+
+const Threads& OctreeBasedCD::Implementation::threadsFor(
+    std::span<PairRecord* const> records) const {
+  constexpr std::size_t kFew = 16384;
+  std::size_t found = 0;
+  for (const PairRecord* record : records) found += record->candidateCount;
+  return geometries.wasUpdatedByOneThread() && found < kFew ? singleThread : threads;
+}
+
+void OctreeBasedCD::Implementation::collect() {
+  const MemoryScope memory(MemoryStage::Pairs);
+  update();
+  FrameStatistics next = updates;
+  const auto records = outdatedPairs(&PairRecord::candidatesVersion);
+  if (settings.engine == Engine::Octree) {
+    frame.collect(records, threadsFor(records), next);
+  } else {
+    for (PairRecord* record : records) {
+      if (record->hasCandidates())
+        findCandidatesByBruteForce(record->meshes(), record->candidates);
+      else
+        record->candidates.clear();
+      record->candidatesSorted = true;
+      record->candidatesVersion.commit(record->state());
+    }
+  }
+  for (const auto& record : pairs.records()) {
+    if (!record->collides()) record->commitNoCandidates();
+    next.candidatePairs += record->candidates.size();
+  }
+  publish(next);
+  hasUpdates = false;
+}
+
+bool OctreeBasedCD::Implementation::updateProxies(std::span<PairRecord* const> records) {
+  const MemoryScope memory(MemoryStage::Octrees);
+  bool built = false;
+  for (PairRecord* record : records)
+    if (record->kind() == PairKind::Proxy) built |= record->updateProxy(pairs.records(), threads);
+  return built;
+}
+
+void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
+  const MemoryScope memory(MemoryStage::Pairs);
+  update(guarded, false, true, markSkippedOctrees(false));
+  FrameStatistics unused;
+  selectedPairs.clear();
+  for (const auto& record : guarded)
+    if (record->collides() && !record->dataVersion.isCurrent(record->state()))
+      selectedPairs.push_back(record.get());
+  Settings withoutCandidates = settings;
+  withoutCandidates.keepCandidates = false;
+  if (settings.engine == Engine::Octree)
+    frame.detect(selectedPairs, withoutCandidates, threads, unused);
+  else
+    frame.detectByBruteForce(selectedPairs, withoutCandidates, unused);
+  for (PairRecord* record : selectedPairs) record->commit();
+}
+
+void OctreeBasedCD::Implementation::detect() {
+  const MemoryScope memory(MemoryStage::Pairs);
+  update(false, true);
+  for (const auto& record : pairs.records())
+    if (!settings.keepCandidates) planByFieldIfProven(*record, settings.engine);
+  FrameStatistics next = updates;
+  const auto records = outdatedPairs(&PairRecord::dataVersion);
+  for (const auto& record : pairs.records()) record->statistics = {};
+  for (PairRecord* record : records)
+    record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
+                        record->plan);
+  Stopwatch watch;
+  const bool built = updateProxies(records);
+  if (built) next.milliseconds.octree += watch.lap();
+  if (settings.engine == Engine::Octree)
+    frame.detect(records, settings, threads, next);
+  else
+    frame.detectByBruteForce(records, settings, next);
+  for (PairRecord* record : records) record->commit();
+  for (const auto& record : pairs.records()) {
+    if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
+      record->commitEmpty(settings.keepCandidates);
+    const CollisionData& data = record->data;
+    record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
+    next.contacts += record->statistics.contacts;
+    next.intersectingTriangles += data.intersectingTriangles().size();
+  }
+  for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->body.mesh);
+  publish(next);
+  hasUpdates = false;
+  auditFrame(settings, geometries, pairs, audit);
+}
+
+}  // namespace palpate

@@ -1,0 +1,211 @@
+#pragma once
+
+#include <palpate/OctreeBasedCD.h>
+
+#include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/Frame.h"
+#include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/Planning.h"
+#include "CollisionDetection/StepSource.h"
+#include "Queries/QuerySource.h"
+#include "Queries/SnapshotPool.h"
+#include "NarrowPhase/Order.h"
+#include "Octree/Forest.h"
+#include "Core/FloatingPoint.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Threads.h"
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace palpate {
+
+/// What an OctreeBasedCD holds, and its calls that run more than one part of it.
+struct OctreeBasedCD::Implementation {
+  class ChangeGuard;
+  class QuerySource;
+  class GuardSource;
+
+  explicit Implementation(const Settings& newSettings);
+  ~Implementation();
+
+  Settings settings;
+  const std::shared_ptr<MemoryBudget> budget;
+  Threads threads, singleThread{1};
+  GeometryTable geometries;
+  PairTable pairs;
+  Frame frame;
+  FrameStatistics statistics;  ///< of the last frame or explicit update
+  FrameStatistics updates;     ///< of the updates since the last frame
+  bool hasUpdates = false;
+  std::optional<LooseOctree> octree;
+  std::vector<PairRecord*> selectedPairs;
+  AuditRecord audit;
+  std::shared_ptr<QuerySource> querySource;
+  std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
+  LatestSnapshot latestSnapshot;
+  /// geometries.state() for which all octrees hold; 0: for none.
+  std::atomic<std::uint64_t> octreesState = 0;
+  std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
+  PairOrderScratch sortingScratch;
+  bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
+  std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
+
+  /// Adds the counts of geometries to the statistics, and makes them visible.
+  void publish(FrameStatistics next);
+
+  void releaseMemory();
+
+  /// Calls a function that changes nothing if it throws. If it exceeds Settings::memoryLimit while
+  /// memory is held that only earlier calls needed, that is given back, and it is called again.
+  template <class F>
+  auto withinLimit(F&& call) {
+    for (;;) {
+      const bool heldSpare = std::exchange(holdsSpare, true);
+      try {
+        return call();
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::MemoryLimit) throw;
+        releaseMemory();
+        if (!heldSpare) throw;
+      }
+    }
+  }
+
+  /// Updates the octrees. The next frame's statistics include updates for queries.
+  /// records: pairs that are planned. explicitly: the user called update(). The statistics are
+  /// published at once, and count as rebuilt or refitted only the trees that this call changed.
+  /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
+  /// which candidates depend.
+  void update(bool explicitly = false, bool detecting = false) {
+    update(pairs.records(), explicitly, detecting,
+           markSkippedOctrees(detecting && octreesState != geometries.state()));
+  }
+  void update(std::span<const std::unique_ptr<PairRecord>> records, bool explicitly, bool detecting,
+              bool skips);
+
+  bool needsNoOctree(const PairRecord& record) const {
+    return record.kind() == PairKind::Proxy || (!settings.keepCandidates && mayUseLeaves(record));
+  }
+
+  /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
+  /// update them later. Returns whether there are any.
+  bool markSkippedOctrees(bool maySkip);
+
+  void updateOctreeView();
+
+  /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
+  /// empty.
+  std::span<PairRecord* const> outdatedPairs(PairRecord::Derived PairRecord::*version);
+
+  /// Returns `singleThread` if one thread has refitted the octrees and few candidates are expected:
+  /// other threads would wait for the data longer than they could help.
+  const Threads& threadsFor(std::span<PairRecord* const> records) const;
+
+  void collect();
+
+  bool updateProxies(std::span<PairRecord* const> records);
+
+  /// For a StepGuard. Results and statistics of the table's pairs stay as they are.
+  void detect(const GuardedPairs& guarded);
+
+  void detect();
+
+  std::shared_ptr<LooseOctree::State> state;
+};
+
+[[noreturn]] void throwMovedFrom();
+[[noreturn]] void throwBusy();
+
+/// Exists while a call that changes the object runs. Other calls are refused meanwhile, so that
+/// callbacks cannot change data in use. It also sets the floating-point mode that the library
+/// needs.
+class OctreeBasedCD::Implementation::ChangeGuard {
+ public:
+  explicit ChangeGuard(const std::unique_ptr<Implementation>& all) : ChangeGuard(all.get()) {}
+  explicit ChangeGuard(Implementation* all)
+      : m_all(all), m_memory(m_all ? m_all->budget : nullptr, MemoryStage::Geometries) {
+    if (!m_all) throwMovedFrom();
+    if (m_all->isBusy.exchange(true, std::memory_order_relaxed)) throwBusy();
+  }
+  ~ChangeGuard() { m_all->isBusy.store(false, std::memory_order_relaxed); }
+  ChangeGuard(const ChangeGuard&) = delete;
+  ChangeGuard& operator=(const ChangeGuard&) = delete;
+  Implementation* operator->() const { return m_all; }
+  Implementation& operator*() const { return *m_all; }
+
+ private:
+  StandardFloatingPoint m_standard;
+  Implementation* m_all;
+  MemoryScope m_memory;
+};
+
+/// The geometries of an OctreeBasedCD, for queries that may outlive it.
+class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source {
+ public:
+  explicit QuerySource(Implementation& all)
+      : Source(std::make_shared<Pool>(all.budget)), m_all(&all) {}
+
+  void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
+  /// Updates the octrees unless they are up to date with the positions now.
+  void updateOctrees() {
+    const auto lock = lockOctrees();
+    const MemoryScope memory(budget(), MemoryStage::Octrees);
+    if (m_all->octreesState != m_all->geometries.state()) m_all->update();
+  }
+  std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_octreesMutex); }
+
+  std::uint64_t state() const override {
+    if (!m_all) return 0;
+    if (m_all->isBusy.load(std::memory_order_relaxed)) throwBusy();
+    const std::uint64_t now = m_all->geometries.state();
+    return m_all->octreesState == now ? now : 0;
+  }
+  const Body& at(GeometryId id) const override { return searchable(m_all->geometries.at(id).body); }
+  std::size_t geometryCount() const override { return m_all->geometries.all().size(); }
+  const Body& geometry(std::size_t index) const override {
+    return m_all->geometries.all()[index]->body;
+  }
+  std::uint64_t step() const override { return m_all->geometries.stepNumber(); }
+  Engine engine() const override { return m_all->settings.engine; }
+  const OctreeSettings& octreeSettings() const override { return m_all->settings.octree; }
+  const Threads& threads() const override { return m_all->threads; }
+
+ private:
+  Implementation* m_all;
+  std::mutex m_octreesMutex;  ///< locked while octrees are updated
+};
+
+/// The step of an OctreeBasedCD, for guards that may outlive it.
+class OctreeBasedCD::Implementation::GuardSource : public StepSource {
+ public:
+  explicit GuardSource(Implementation& all) : m_all(&all) {}
+  void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
+
+  void change(const std::function<void()>& call) override {
+    read();
+    const ChangeGuard all(m_all);
+    all->withinLimit(call);
+  }
+  GeometryTable& geometries() const override { return read().geometries; }
+  const PairTable& pairs() const override { return read().pairs; }
+  const Threads& threads() const override { return read().threads; }
+  void detect(const GuardedPairs& guarded) override { read().detect(guarded); }
+
+ private:
+  Implementation& read() const {
+    if (!m_all)
+      throw Error(ErrorCode::InvalidCall, "the OctreeBasedCD of this StepGuard was destroyed");
+    return *m_all;
+  }
+  Implementation* m_all;
+};
+
+}  // namespace palpate
