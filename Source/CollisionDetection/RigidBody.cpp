@@ -26,7 +26,6 @@ class RigidSearch::Step {
  public:
   Step(const Geometry& geometry, RigidSearch& search)
       : m_geometry(geometry),
-        m_search(search),
         m_before(geometry.body.mesh.before.transform()),
         m_now(geometry.body.mesh.now.transform()),
         m_matrix(m_now.rotation - m_before.rotation),
@@ -86,7 +85,6 @@ class RigidSearch::Step {
 
  private:
   const Geometry& m_geometry;
-  RigidSearch& m_search;
   const RigidTransform &m_before, &m_now;
   Matrix3d m_matrix;  ///< a position x in the body's frame is displaced by m_matrix x + m_vector
   Vector3d m_vector;

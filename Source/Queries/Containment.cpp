@@ -128,7 +128,6 @@ class InsideQuery {
       : m_body(body),
         m_settings(settings),
         m_bruteForce(engine == Engine::BruteForce),
-        m_stack(stack),
         m_surface(body, engine, stack) {
     if (body.solid) m_solid.emplace(body, engine, stack);
   }
@@ -152,7 +151,6 @@ class InsideQuery {
   const Body& m_body;
   const InsideSettings& m_settings;
   const bool m_bruteForce;
-  PointQueryStack& m_stack;
   BodyQuery m_surface;
   std::optional<SolidQuery> m_solid;
 };

@@ -763,7 +763,7 @@ TEST(Rigid, InsideVerticesMatchSetPositions) {
 TEST(Rigid, DeepBodiesMatchSetPositions) {
   Random random(21);
   const Mesh box = boxMesh(Vector3d::Constant(-1.0), Vector3d::Constant(1.0));
-  const TestGeometry body{GeometryType::Triangles, box.positions, box.triangles};
+  const TestGeometry body{GeometryType::Triangles, box.positions, box.triangles, {}};
   std::size_t deep = 0;
   for (int i = 0; i < casesOf(200); ++i) {
     const Place place =
