@@ -208,7 +208,6 @@ GeometryCopy& SnapshotPool::copyOf(const Body& original) {
 }
 
 std::shared_ptr<const Snapshot> SnapshotPool::take(SpatialQueries::Source& frame, double time) {
-  PALPATE_ASSERT(frame.state() != 0);
   reclaim();
   forgetRemoved(frame);
   Slot& slot = freeSlot();
