@@ -87,6 +87,7 @@ std::vector<InsideVertex> insideOf(const std::vector<Vector3d>& points, const Me
 
 void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
   constexpr double kSpacing = 0.02;
+  Random beside(7);
   const Mesh mesh = boxes.mesh();
   const std::vector<InsideVertex> inside = insideOf(points, mesh, Engine::Octree);
   EXPECT_EQ(inside, insideOf(points, mesh, Engine::BruteForce));
@@ -102,9 +103,12 @@ void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
       point += each.barycentric[i] * mesh.positions[each.corners[i]];
     }
     ASSERT_LT((point - end).norm(), 1e-12);
-    const double depth = boxes.depth(p, kSpacing);
-    ASSERT_LE(each.depth, depth + 1e-12);
-    ASSERT_GE(each.depth, depth - kSpacing);
+    ASSERT_LE(each.depth, boxes.depth(p, kSpacing) + 1e-12);
+    // The point is on the outer surface: so its distance is not too small.
+    bool isOutside = false;
+    for (int k = 0; k < 5000 && !isOutside; ++k)
+      isOutside = !boxes.contains(end + 1e-7 * randomPoint(beside, -1, 1));
+    ASSERT_TRUE(isOutside);
   }
 }
 
