@@ -42,7 +42,7 @@ void Octree::reset(std::size_t size) {
 }
 
 void Octree::copy(const Octree& other) {
-  PALPATE_ASSERT(other.isBuilt());
+  PALPATE_ASSERT(other.isBuilt() || other.size() == 0);
   const bool isSameLayout = isBuilt() && m_layout == other.m_layout;
   m_stage = Stage::Empty;
   const auto copyBuffer = [](auto& to, const auto& from) {
