@@ -143,8 +143,9 @@ class Octree {
 
   /// Forgets the tree; `order()` is then 0, 1, ..., size - 1.
   void reset(std::size_t size);
-  /// Becomes a copy of a built octree, or of one without elements, for searches only. All copies in one object must be of one
-  /// octree. If that was only fitted since the last copy, its layout is not copied again.
+  /// Becomes a copy of a built octree, or of one without elements, for searches only. All copies in
+  /// one object must be of one octree. If that was only fitted since the last copy, its layout is
+  /// not copied again.
   void copy(const Octree& other);
 
   std::size_t size() const { return m_order.size(); }
