@@ -1,7 +1,5 @@
 #include "CollisionDetection/Planning.h"
 
-#include "Core/Assert.h"
-
 #include <optional>
 #include <utility>
 
@@ -33,7 +31,6 @@ void planStep(PairRecord& record, bool detecting, bool leavesAllowed) {
 }
 
 void planByFieldIfProven(PairRecord& record, Engine engine) {
-  PALPATE_ASSERT(record.a && record.b);
   if (record.predicate || record.plan.kind != PairKind::Meshes || !record.collides()) return;
   const std::optional<PairPlan> byField =
       planByField(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan);
