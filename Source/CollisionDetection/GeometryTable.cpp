@@ -256,7 +256,13 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
 }
 
-void GeometryTable::setName(GeometryId id, std::string name) { at(id).body.name = std::move(name); }
+void GeometryTable::setName(GeometryId id, std::string name) {
+  Body& body = at(id).body;
+  if (name.find('\0') != std::string::npos)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body) + ": the name has a null character, which would end messages", id);
+  body.name = std::move(name);
+}
 
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);

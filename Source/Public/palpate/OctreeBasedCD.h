@@ -233,6 +233,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   Pose transform(GeometryId) const;
   /// Names a geometry, for messages: "geometry 3" becomes `geometry 3 "liver"`. Any text, also one
   /// that another geometry has; none by default. A capture file does not hold it.
+  ///
+  /// Errors   InvalidSettings for a name with a null character.
   void setName(GeometryId, std::string name);
   const std::string& name(GeometryId) const;
   /// Sets which geometries this one collides with, and from which sides. Two geometries collide

@@ -272,6 +272,8 @@ class PALPATE_EXPORT SpatialQueries {
   /// Accuracy whether triangles, lines and points without radii have a common point is decided
   ///          exactly. Distances have the accuracy of edgeEdgeDistance().
   /// Errors   InvalidSettings if both geometries are the same; UnsupportedMethod for two planes.
+  /// Cost     follows the pairs of elements that are almost as near as the nearest pair: about 2 us
+  ///          for each. Elements that coincide count once.
   GeometryDistance distance(GeometryId a, GeometryId b) const;
   /// Finds a translation of a that separates two bodies: it leaves no common point of their
   /// insides. Bodies are closed triangle meshes, tetrahedral meshes and shapes. A mesh's inside is

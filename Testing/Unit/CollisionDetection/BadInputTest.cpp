@@ -236,6 +236,10 @@ TEST(BadInput, IsReportedWithTheNameOfTheGeometry) {
   expectRefused(ErrorCode::InvalidTransform, name, [&] {
     detection.setTransform(liver, 2.0 * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
   });
+  Eigen::Matrix3d withNan = Eigen::Matrix3d::Identity();
+  withNan(1, 2) = bad[3][1];
+  expectRefused(ErrorCode::InvalidTransform, "rotation has an entry that is not finite",
+                [&] { detection.setTransform(liver, withNan, Eigen::Vector3d::Zero()); });
   expectRefused(ErrorCode::UnknownPair, pair, [&] { detection.collisionData(liver, tool); });
   detection.addCollisionPair(liver, tool);
   expectRefused(ErrorCode::NotAvailable, pair, [&] { detection.collisionData(liver, tool); });
@@ -252,6 +256,10 @@ TEST(BadInput, IsReportedWithTheNameOfTheGeometry) {
                 [&] { detection.setPositions(liver, bad); });
   expectRefused(ErrorCode::UnknownGeometry, "geometry 7",
                 [&] { detection.setName(GeometryId{7}, "x"); });
+  // what() would end at the null character.
+  expectRefused(ErrorCode::InvalidSettings, "geometry 1: the name has a null character",
+                [&] { detection.setName(tool, std::string("a\0b", 3)); });
+  EXPECT_EQ(detection.name(tool), "");
 }
 
 TEST(BadInput, SettingsOutOfRange) {

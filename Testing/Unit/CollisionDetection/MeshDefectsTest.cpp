@@ -163,5 +163,20 @@ TEST(MeshDefects, FindPartsThatOverlap) {
   expectRefused(ErrorCode::NonFinitePosition, "geometry 0, vertex 7", [&] { defectsOf(soup); });
 }
 
+/// All boxes of a wheel's triangles overlap, and no two of its triangles intersect.
+TEST(MeshDefects, OfAWheelAreFoundWithoutTestingEachPair) {
+  Mesh wheel;
+  const std::uint32_t count = 20000;
+  wheel.positions = {{0, 0, -1}, {0, 0, 1}};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const double angle = 6.0 * i / count;
+    wheel.positions.emplace_back(std::cos(angle), std::sin(angle), 0);
+    wheel.triangles.push_back({0, 1, i + 2});
+  }
+  const MeshDefects defects = defectsOf(wheel);
+  EXPECT_FALSE(defects.closed());
+  EXPECT_TRUE(defects.overlapping.empty());
+}
+
 }  // namespace
 }  // namespace palpate::testing

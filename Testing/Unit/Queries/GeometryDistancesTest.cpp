@@ -494,6 +494,33 @@ TEST(GeometryDistances, FansAnswerAsBruteForce) {
   }
 }
 
+/// Triangles around one edge, each with vertices of its own, are all equally near to a point above
+/// it. The cost does not follow the number of pairs.
+TEST(GeometryDistances, ManyUnweldedTrianglesAroundAnEdge) {
+  std::array<Mesh, 2> wheels;
+  for (int side = 0; side < 2; ++side) {
+    Mesh& wheel = wheels[static_cast<std::size_t>(side)];
+    const double up = side == 0 ? 1.0 : -1.0, height = side == 0 ? 0.0 : 0.5;
+    for (std::uint32_t i = 0; i < 10000; ++i) {
+      const double angle = 6.0 * i / 10000;
+      wheel.positions.insert(wheel.positions.end(),
+                             {{0, 0, height},
+                              {0, 0, height - up},
+                              {std::cos(angle), std::sin(angle), height - 0.5 * up}});
+      wheel.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+  }
+  OctreeBasedCD collisions;
+  const GeometryId a = testGeometry(wheels[0]).addTo(collisions),
+                   b = testGeometry(wheels[1]).addTo(collisions);
+  const GeometryDistance found = collisions.queries().distance(a, b);
+  EXPECT_EQ(found.distance, 0.5);
+  EXPECT_EQ(found.a.element, 0u);
+  EXPECT_EQ(found.b.element, 0u);
+  EXPECT_EQ(found.a.position, Vector3d(0, 0, 0));
+  EXPECT_EQ(found.b.position, Vector3d(0, 0, 0.5));
+}
+
 TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
   Random random(209);
   std::size_t apart = 0, touching = 0;
