@@ -18,6 +18,8 @@ using Corner = std::array<std::uint32_t, 3>;
 /// The corners of all cells, numbered in the order in which they are added.
 class CornerTable {
  public:
+  static constexpr std::uint32_t kNone = 0xffffffff;  ///< no corner, and no cell
+
   std::size_t size() const { return m_keys.size(); }
   Corner operator[](std::size_t i) const {
     const std::uint64_t key = m_keys[i];
@@ -32,7 +34,7 @@ class CornerTable {
     const std::uint64_t key =
         corner[0] | std::uint64_t{corner[1]} << kBits | std::uint64_t{corner[2]} << 2 * kBits;
     std::uint32_t& slot = slotOf(key);
-    if (slot == kEmpty) {
+    if (slot == kNone) {
       slot = static_cast<std::uint32_t>(m_keys.size());
       m_keys.push_back(key);
     }
@@ -44,7 +46,7 @@ class CornerTable {
   std::size_t bytesToGrow() const { return grownSize() * (sizeof(std::uint64_t) + 2 * kSlotBytes); }
   void grow() {
     m_keys.reserve(grownSize());
-    m_slots = std::vector<std::uint32_t>(2 * m_keys.capacity(), kEmpty);
+    m_slots = std::vector<std::uint32_t>(2 * m_keys.capacity(), kNone);
     for (std::uint32_t i = 0; i < m_keys.size(); ++i) slotOf(m_keys[i]) = i;
   }
   std::size_t capacity() const { return m_keys.capacity(); }
@@ -53,7 +55,6 @@ class CornerTable {
   }
 
  private:
-  static constexpr std::uint32_t kEmpty = 0xffffffff;
   static constexpr int kBits = 21;  ///< of a coordinate
   static constexpr std::size_t kSlotBytes = sizeof(std::uint32_t);
   static_assert((std::uint64_t{kMostRoots} << kMostLevels) < 1u << kBits);
@@ -62,7 +63,7 @@ class CornerTable {
   std::uint32_t& slotOf(std::uint64_t key) {
     const std::size_t mask = m_slots.size() - 1;
     std::size_t i = key * 0x9e3779b97f4a7c15u >> (64 - std::bit_width(mask));
-    while (m_slots[i] != kEmpty && m_keys[m_slots[i]] != key) i = (i + 1) & mask;
+    while (m_slots[i] != kNone && m_keys[m_slots[i]] != key) i = (i + 1) & mask;
     return m_slots[i];
   }
 
