@@ -5,10 +5,13 @@
 #include "DistanceField/CellJoining.h"
 #include "DistanceField/CellRefinement.h"
 #include "DistanceField/CellTree.h"
+#include "DistanceField/CoincidentTriangles.h"
 #include "DistanceField/SurfaceSign.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 namespace palpate {
 
@@ -60,7 +63,12 @@ FieldCells buildField(const Body& body, bool isClosed, const DistanceFieldSettin
                       const Threads& threads) {
   const SurfaceSign sign(body, isClosed);
   const FieldDomain domain(body.mesh, sign, settings);
-  const FieldSurface surface{sign, {body, domain.tolerance}, {body, sign, domain.tolerance}};
+  Body distinct(body.id);
+  const std::vector<Triangle> kept = withoutCopies(body);
+  if (!kept.empty()) makeBody(body.mesh.now.body(), kept, threads, distinct);
+  const Body& distances = kept.empty() ? body : distinct;
+  const FieldSurface surface{
+      sign, {distances, domain.tolerance}, {distances, sign, domain.tolerance}};
   BuildProgress build{threads, settings.progress};
   CellTree tree(domain, settings.memoryLimit);
   for (std::size_t first = 0; first < tree.cells.size();) {
