@@ -2,6 +2,7 @@
 
 #include "Octree/Walk.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <bit>
@@ -315,6 +316,7 @@ namespace palpate {
 HWY_EXPORT(proveClaimKernel);
 
 bool AffineClaim::holds(const Body& geometry) const {
+  PALPATE_ASSERT(halfSide > 0.0 && level > 0.0 && error >= 0.0 && reach >= 0.0);
   const Octree& octree = geometry.tree.octree();
   octree.requireBuilt();
   const ClaimSearch search{octree, geometry.tree.ordered().data(), geometry.mesh.now.body().data(),

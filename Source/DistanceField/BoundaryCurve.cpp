@@ -1,6 +1,7 @@
 #include "DistanceField/BoundaryCurve.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -77,6 +78,7 @@ BoundaryCurve::BoundaryCurve(const TriangleMesh& mesh) {
 
 /// Adds the tree of some edges. Each node halves its edges along the longest side of their box.
 void BoundaryCurve::addNode(std::uint32_t begin, std::uint32_t end) {
+  PALPATE_ASSERT(begin < end && end <= m_edges.size());
   Eigen::AlignedBox3d box;
   double length = 0.0;
   for (std::uint32_t i = begin; i < end; ++i) {
@@ -99,6 +101,7 @@ void BoundaryCurve::addNode(std::uint32_t begin, std::uint32_t end) {
 }
 
 double BoundaryCurve::steepness(const Vector3d& centre, double radius, double most) const {
+  PALPATE_ASSERT(radius >= 0.0 && most >= 0.0);
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   const double magnitude = m_largest + centre.cwiseAbs().maxCoeff() + radius,
                reach = radius + kFieldError * magnitude;
@@ -116,6 +119,7 @@ double BoundaryCurve::steepness(const Vector3d& centre, double radius, double mo
     if (gap > kFarRadii * node.radius) {
       sum += node.length / gap / gap;
     } else if (node.second != 0) {
+      PALPATE_ASSERT(depth + 2 <= stack.size() && node.second > index + 1);
       stack[depth++] = node.second;
       stack[depth++] = index + 1;
     } else {

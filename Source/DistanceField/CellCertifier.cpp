@@ -47,6 +47,7 @@ bool CellCertifier::isBeyond(const InterpolatedCell& cell, double distance) cons
 
 /// Whether the triangle's distance at all corners is at most `bound` larger than their value.
 bool CellCertifier::isNearTriangle(const InterpolatedCell& cell, double bound) const {
+  PALPATE_ASSERT(cell.nearTriangle < m_geometry.tree.ordered().size());
   const Triangle& corners = m_geometry.tree.ordered()[cell.nearTriangle];
   const Positions& now = m_geometry.mesh.now;
   const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
@@ -76,6 +77,8 @@ bool CellCertifier::isPositiveInPlane(const InterpolatedCell& cell, const Vector
 
 bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
                              PointQueryStack& stack) const {
+  PALPATE_ASSERT(bound > 0.0 && cell.halfSide > 0.0);
+  PALPATE_ASSERT(cell.isSigned || *std::min_element(cell.values.begin(), cell.values.end()) >= 0.0);
   const double radius = cell.halfDiagonal() * (1.0 + kFieldError);
   if (radius <= bound) return true;
   const auto [least, most] = magnitudesOf(cell);

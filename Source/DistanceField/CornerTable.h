@@ -31,6 +31,7 @@ class CornerTable {
   /// The number of a corner, which is added if it is new. There must be room for it.
   std::uint32_t find(const Corner& corner) {
     PALPATE_ASSERT(hasRoom(1));
+    PALPATE_ASSERT(std::max({corner[0], corner[1], corner[2]}) <= kMostRoots << kMostLevels);
     const std::uint64_t key =
         corner[0] | std::uint64_t{corner[1]} << kBits | std::uint64_t{corner[2]} << 2 * kBits;
     std::uint32_t& slot = slotOf(key);
@@ -47,6 +48,7 @@ class CornerTable {
   void grow() {
     m_keys.reserve(grownSize());
     m_slots = std::vector<std::uint32_t>(2 * m_keys.capacity(), kNone);
+    PALPATE_ASSERT(std::has_single_bit(m_slots.size()));
     for (std::uint32_t i = 0; i < m_keys.size(); ++i) slotOf(m_keys[i]) = i;
   }
   std::size_t capacity() const { return m_keys.capacity(); }

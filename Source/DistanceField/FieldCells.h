@@ -30,6 +30,8 @@ struct CellEntry {
   std::uint32_t bits = 0;
 
   static CellEntry of(CellKind kind, bool isReliable = true, std::uint32_t index = 0) {
+    PALPATE_ASSERT(index < kMostIndices);
+    PALPATE_ASSERT(isReliable || kind == CellKind::Leaf || kind == CellKind::Outside);
     return {static_cast<std::uint32_t>(kind) << kKindShift | (isReliable ? 0 : kUnreliable) |
             index};
   }
@@ -66,6 +68,15 @@ struct FieldCells {
   std::vector<Block> blocks;      ///< the children of a block come after it
   std::vector<Leaf> leaves;
 
+  static double mix(double a, double b, double t) { return a + t * (b - a); }
+  /// Units: trilinear, between the values at the corners.
+  static double interpolate(const Leaf& v, double x, double y, double z) {
+    return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
+               mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
+  }
+  CellEntry root(const std::array<std::uint32_t, 3>& at) const {
+    return roots[(at[2] * size[1] + at[1]) * size[0] + at[0]];
+  }
   std::size_t bytes() const {
     return roots.capacity() * sizeof(CellEntry) + blocks.capacity() * sizeof(Block) +
            leaves.capacity() * sizeof(Leaf);
@@ -94,7 +105,10 @@ struct FieldFrame {
 /// Finds cells of a field and interpolates in them.
 class FieldLookup {
  public:
-  explicit FieldLookup(const FieldCells& cells) : m_cells(cells), m_frame(cells) {}
+  explicit FieldLookup(const FieldCells& cells) : m_cells(cells), m_frame(cells) {
+    PALPATE_ASSERT(cells.roots.size() ==
+                   std::size_t{cells.size[0]} * cells.size[1] * cells.size[2]);
+  }
 
   /// value() of many points, with the same bits. All must be finite.
   void values(std::span<const Eigen::Vector3d> points, double* out) const;
@@ -125,6 +139,7 @@ class FieldLookup {
                            : place.entry.isReliable();
   }
   Eigen::Vector3d gradient(const Eigen::Vector3d& point) const {
+    PALPATE_ASSERT(point.allFinite());
     const Place place = at(point);
     if (place.isOutside) return outsideOf(point).stableNormalized();
     if (place.entry.kind() != CellKind::Leaf) return Eigen::Vector3d::Zero();
@@ -138,8 +153,9 @@ class FieldLookup {
         return double{v[corner + step]} - double{v[corner]};
       };
       const double s = place.t[(k + 1) % 3], t = place.t[(k + 2) % 3];
-      gradient[k] = place.perSide * mix(mix(difference(0), difference(i), s),
-                                        mix(difference(j), difference(i + j), s), t);
+      gradient[k] =
+          place.perSide * FieldCells::mix(FieldCells::mix(difference(0), difference(i), s),
+                                          FieldCells::mix(difference(j), difference(i + j), s), t);
     }
     return gradient;
   }
@@ -162,7 +178,7 @@ class FieldLookup {
       root[k] = std::min(static_cast<std::uint32_t>(in), m_cells.size[k] - 1);
       place.t[k] = in - root[k];
     }
-    place.entry = m_cells.roots[(root[2] * m_cells.size[1] + root[1]) * m_cells.size[0] + root[0]];
+    place.entry = m_cells.root(root);
     while (place.entry.kind() == CellKind::Block) {
       std::uint32_t octant = 0;
       for (int k = 0; k < 3; ++k) {
@@ -172,18 +188,17 @@ class FieldLookup {
         place.t[k] = doubled - (upper ? 1.0 : 0.0);
       }
       place.perSide *= 2.0;
+      PALPATE_ASSERT(place.entry.index() < m_cells.blocks.size());
       place.entry = m_cells.blocks[place.entry.index()][octant];
     }
     return place;
   }
-  static double mix(double a, double b, double t) { return a + t * (b - a); }
   double interpolate(const Place& place) const {  // units
     if (place.entry.kind() != CellKind::Leaf)
       return place.entry.kind() == CellKind::Inside ? -m_frame.band : m_frame.band;
-    const FieldCells::Leaf& v = m_cells.leaves[place.entry.index()];
-    const auto [x, y, z] = place.t;
-    return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
-               mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
+    PALPATE_ASSERT(place.entry.index() < m_cells.leaves.size());
+    return FieldCells::interpolate(m_cells.leaves[place.entry.index()], place.t[0], place.t[1],
+                                   place.t[2]);
   }
   /// By comparisons: the sign of the minimum or maximum of 0 and -0 is not defined, and a band that
   /// is far smaller than a unit is 0.

@@ -163,6 +163,7 @@ class FeaturesNearField {
       const auto onEdge = findDeepPoint(
           m_field.lookup(), std::array{inField(edge[0]), inField(edge[1])}, std::array{0.0, 0.0},
           targetBelow(std::min(values[i], values[(i + 1) % 3])), m_tolerance);
+      PALPATE_ASSERT(onEdge.has_value());
       Vector3d weights = Vector3d::Zero();
       weights[turned ? (i + 1) % 3 : i] = onEdge->weights[0];
       weights[turned ? i : (i + 1) % 3] = onEdge->weights[1];
@@ -334,6 +335,7 @@ void FieldContacts::startValues() {
 }
 
 bool FieldContacts::isFurther(const Body& geometry, double distance) {
+  PALPATE_ASSERT(distance >= 0.0);
   const MeshTopology& topology = m_mesh.topology;
   const double target = valueBeyond(m_field, distance);
   if (!(target + m_mesh.largestRadius < reachOf(m_field.field()))) return false;
@@ -365,32 +367,35 @@ bool FieldContacts::isFurtherByBruteForce(double distance) const {
   ShapeContactBuffers none;
   const FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, false, none);
   const auto size = static_cast<std::uint32_t>(m_mesh.topology.triangles.size());
-  for (std::uint32_t t = 0; t < size; ++t)
-    if (m_mesh.topology.isEnabled(t) &&
-        !features.isAbove(t, target, [&](std::uint32_t v) { return features.valueAt(v); }))
+  for (std::uint32_t element = 0; element < size; ++element)
+    if (m_mesh.topology.isEnabled(element) &&
+        !features.isAbove(element, target, [&](std::uint32_t v) { return features.valueAt(v); }))
       return false;
   return true;
 }
 
 void FieldContacts::start(const Body& geometry) {
+  PALPATE_ASSERT(m_thickness + m_mesh.largestRadius < reachOf(m_field.field()));
+  PALPATE_ASSERT(geometry.tree.encloses(m_mesh, geometry.revisions.elements.topology));
   const MeshTopology& topology = m_mesh.topology;
   FieldScratch& scratch = m_scratch;
   scratch.elements.clear();
-  forEachElementNear(geometry, m_field, m_thickness + m_mesh.largestRadius, [&](std::uint32_t t) {
-    if (topology.isEnabled(t)) scratch.elements.push_back(t);
-    return true;
-  });
+  forEachElementNear(geometry, m_field, m_thickness + m_mesh.largestRadius,
+                     [&](std::uint32_t element) {
+                       if (topology.isEnabled(element)) scratch.elements.push_back(element);
+                       return true;
+                     });
   startValues();
   if (scratch.least.size() < topology.edges.size()) scratch.least.resize(topology.edges.size());
   scratch.vertices.clear();
-  for (const std::uint32_t t : scratch.elements) {
-    for (const std::uint32_t v : topology.triangles[t]) {
+  for (const std::uint32_t element : scratch.elements) {
+    for (const std::uint32_t v : topology.triangles[element]) {
       if (scratch.stamps[v] == scratch.stamp) continue;
       scratch.stamps[v] = scratch.stamp;
       scratch.vertices.push_back(v);
     }
     // An edge whose owner is not among the elements has no point within the thickness.
-    for (const std::uint32_t edge : topology.triangleEdges[t])
+    for (const std::uint32_t edge : topology.triangleEdges[element])
       if (edge != kNoEdge) scratch.least[edge] = kNone;
   }
 }
@@ -414,11 +419,12 @@ void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBu
   const Buffer<double>& values = m_scratch.values;
   FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);
   for (std::size_t n = begin; n < end; ++n) {
-    const std::uint32_t t = m_scratch.elements[n];
+    const std::uint32_t element = m_scratch.elements[n];
     for (int i = 0; i < 3; ++i) {
-      const std::uint32_t v = topology.triangles[t][i], edge = topology.triangleEdges[t][i];
-      if (topology.ownsCorner(t, i)) features.findVertex(v, values[v]);
-      if (!topology.ownsEdge(t, i)) continue;
+      const std::uint32_t v = topology.triangles[element][i],
+                          edge = topology.triangleEdges[element][i];
+      if (topology.ownsCorner(element, i)) features.findVertex(v, values[v]);
+      if (!topology.ownsEdge(element, i)) continue;
       const auto& [p, q] = topology.edges[edge];
       m_scratch.least[edge] = features.findEdge({p, q}, {values[p], values[q]}, true);
     }
@@ -431,14 +437,14 @@ void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBu
   if (!topology.hasFaces()) return;
   FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, true, out);
   for (std::size_t n = begin; n < end; ++n) {
-    const std::uint32_t t = m_scratch.elements[n];
+    const std::uint32_t element = m_scratch.elements[n];
     std::array<double, 3> values, least;
     for (int i = 0; i < 3; ++i) {
-      const std::uint32_t edge = topology.triangleEdges[t][i];
-      values[i] = m_scratch.values[topology.triangles[t][i]];
+      const std::uint32_t edge = topology.triangleEdges[element][i];
+      values[i] = m_scratch.values[topology.triangles[element][i]];
       least[i] = edge == kNoEdge ? kNone : m_scratch.least[edge];
     }
-    features.findFace(t, values, least);
+    features.findFace(element, values, least);
   }
 }
 
@@ -448,19 +454,20 @@ void FieldContacts::findByBruteForce(const TriangleMesh& mesh, const PlacedField
                                      ShapeContactBuffers& out) {
   const MeshTopology& topology = mesh.topology;
   FeaturesNearField features(mesh, field, contacts, thickness, false, out);
-  for (const std::uint32_t t : elements) {
-    if (!topology.isEnabled(t)) continue;
+  for (const std::uint32_t element : elements) {
+    if (!topology.isEnabled(element)) continue;
     std::array<double, 3> values, least;
-    for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.triangles[t][i]);
+    for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.triangles[element][i]);
     for (int i = 0; i < 3; ++i) {
       least[i] = kNone;
-      if (topology.ownsCorner(t, i)) features.findVertex(topology.triangles[t][i], values[i]);
-      if (topology.triangleEdges[t][i] == kNoEdge) continue;
-      const Segment& edge = topology.edges[topology.triangleEdges[t][i]];
+      if (topology.ownsCorner(element, i))
+        features.findVertex(topology.triangles[element][i], values[i]);
+      if (topology.triangleEdges[element][i] == kNoEdge) continue;
+      const Segment& edge = topology.edges[topology.triangleEdges[element][i]];
       least[i] = features.findEdge(edge, {features.valueAt(edge[0]), features.valueAt(edge[1])},
-                                   topology.ownsEdge(t, i));
+                                   topology.ownsEdge(element, i));
     }
-    if (topology.hasFaces()) features.findFace(t, values, least);
+    if (topology.hasFaces()) features.findFace(element, values, least);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <palpate/AnalyticalGeometry.h>
 #include <palpate/Error.h>
 
+#include "Core/Assert.h"
 #include "Core/WholeFile.h"
 
 #include <algorithm>
@@ -126,6 +127,7 @@ CellEntry entryOf(Reader& file, bool isClosed, std::size_t blocks, std::size_t l
 }  // namespace
 
 void writeField(const FieldCells& cells, const std::filesystem::path& path) {
+  PALPATE_ASSERT(cells.roots.size() == std::size_t{cells.size[0]} * cells.size[1] * cells.size[2]);
   Writer file(kHeader + cells.bytes() + kChecksum);
   file.title();
   file.integer(kVersion);

@@ -1,4 +1,5 @@
 #include "DistanceField/FieldMinimum.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -102,8 +103,7 @@ class DeepPointSearch {
   void searchRoots(const Part& part, int axis, std::array<std::uint32_t, 3> root) {
     if (part.size == 0) return;
     if (axis == 3) {
-      const CellEntry entry =
-          m_cells.roots[(root[2] * m_cells.size[1] + root[1]) * m_cells.size[0] + root[0]];
+      const CellEntry entry = m_cells.root(root);
       if (entry.kind() == CellKind::Outside) return;
       Part inCell;
       inCell.size = part.size;
@@ -188,17 +188,12 @@ class DeepPointSearch {
       searchTriangle(leaf, part.corners[0], part.corners[i - 1], part.corners[i]);
   }
 
-  static double interpolate(const FieldCells::Leaf& v, double x, double y, double z) {
-    const auto mix = [](double a, double b, double t) { return a + t * (b - a); };
-    return mix(mix(mix(v[0], v[1], x), mix(v[2], v[3], x), y),
-               mix(mix(v[4], v[5], x), mix(v[6], v[7], x), y), z);
-  }
   /// The mean over all ways to take one coordinate from each of three corners, less the radius: the
   /// Bezier ordinate of these corners.
   static double ordinate(const FieldCells::Leaf& leaf, const Corner& a, const Corner& b,
                          const Corner& c) {
     const auto at = [&](const Corner& x, const Corner& y, const Corner& z) {
-      return interpolate(leaf, x.at[0], y.at[1], z.at[2]);
+      return FieldCells::interpolate(leaf, x.at[0], y.at[1], z.at[2]);
     };
     return ((at(a, b, c) + at(b, c, a) + at(c, a, b)) + (at(a, c, b) + at(b, a, c) + at(c, b, a))) /
                6.0 -
@@ -206,9 +201,9 @@ class DeepPointSearch {
   }
   /// The same if two of the three corners are `a`.
   static double ordinate(const FieldCells::Leaf& leaf, const Corner& a, const Corner& b) {
-    return (interpolate(leaf, b.at[0], a.at[1], a.at[2]) +
-            interpolate(leaf, a.at[0], b.at[1], a.at[2]) +
-            interpolate(leaf, a.at[0], a.at[1], b.at[2])) /
+    return (FieldCells::interpolate(leaf, b.at[0], a.at[1], a.at[2]) +
+            FieldCells::interpolate(leaf, a.at[0], b.at[1], a.at[2]) +
+            FieldCells::interpolate(leaf, a.at[0], a.at[1], b.at[2])) /
                3.0 -
            (2.0 * a.radius + b.radius) / 3.0;
   }
@@ -217,7 +212,7 @@ class DeepPointSearch {
   double bounded(double lower, double radius) const { return std::max(lower, -m_band - radius); }
   /// The ordinate of a corner: the interpolated value, less the radius.
   static double ordinate(const FieldCells::Leaf& leaf, const Corner& c) {
-    return interpolate(leaf, c.at[0], c.at[1], c.at[2]) - c.radius;
+    return FieldCells::interpolate(leaf, c.at[0], c.at[1], c.at[2]) - c.radius;
   }
   /// The field's value, less the radius, where the ordinate is that of the corner.
   double valueOf(double ordinate, const Corner& c) const {
@@ -285,6 +280,10 @@ std::optional<DeepPoint> findDeepPoint(const FieldLookup& lookup,
                                        std::span<const Eigen::Vector3d> corners,
                                        std::span<const double> radii, double target,
                                        double tolerance) {
+  PALPATE_ASSERT(corners.size() == 2 || corners.size() == 3);
+  PALPATE_ASSERT(radii.size() == corners.size() && tolerance > 0.0);
+  PALPATE_ASSERT(target + *std::max_element(radii.begin(), radii.end()) <
+                 lookup.cells().band - lookup.cells().errorBound);
   return DeepPointSearch(lookup, corners, radii, target, tolerance).found();
 }
 

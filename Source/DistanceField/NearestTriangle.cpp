@@ -3,6 +3,7 @@
 #include "Math/Tolerances.h"
 #include "Queries/NearestElements.h"
 #include "Queries/PointDistances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -51,12 +52,15 @@ HWY_EXPORT(distanceBoundsKernel);
 
 DistanceBounds::DistanceBounds(const Vector3d& p, const TriangleBatch& triangles,
                                std::size_t count) {
+  PALPATE_ASSERT(count <= TriangleBatch::kSize);
   const double coordinates[] = {p[0], p[1], p[2]};
   HWY_DYNAMIC_DISPATCH(distanceBoundsKernel)(coordinates, triangles, count, *this);
 }
 
 NearestTriangle::NearestTriangle(const Body& geometry, double tolerance)
     : m_geometry(geometry), m_tolerance(tolerance), m_largest(0) {
+  PALPATE_ASSERT(geometry.tree.octree().isBuilt() && !geometry.isPlaced());
+  PALPATE_ASSERT(geometry.mesh.largestRadius == 0.0 && tolerance >= 0.0);
   const FloatBox root = geometry.tree.octree().box(0);
   for (int k = 0; k < 3; ++k)
     m_largest = std::max({m_largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
@@ -67,6 +71,7 @@ NearestTriangle::Near NearestTriangle::at(const Vector3d& point,
   const Positions& now = m_geometry.mesh.now;
   const FloatFrame& frame = m_geometry.tree.frame();
   Near best{kInfinity, 0};
+  PALPATE_ASSERT(likely.size() <= TriangleBatch::kSize);
   double lower = kInfinity, upper = kInfinity;
   const auto test = [&](const TriangleBatch& batch, std::span<const std::uint32_t> places) {
     const DistanceBounds bounds(point, batch, places.size());
@@ -111,6 +116,7 @@ NearestTriangle::Near NearestTriangle::at(const Vector3d& point,
   });
   if (best.distance - lower <= m_tolerance) return best;
   const auto exact = PointDistances(m_geometry, point, false).nearest(kInfinity, best.place);
+  PALPATE_ASSERT(exact.has_value());
   return {exact->distance, exact->place};
 }
 

@@ -33,6 +33,7 @@ bool SurfaceSign::isInside(const Vector3d& point, PointQueryStack& stack) const 
 }
 
 SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius) const {
+  PALPATE_ASSERT(radius >= 0.0);
   if (m_isClosed || m_boundary->isEmpty()) return Reliability::Reliable;
   const double way = (1.0 + kAside.norm()) * radius,
                change = way * m_boundary->steepness(centre, radius, kMostDefect / way);
@@ -46,6 +47,7 @@ SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius) 
 }
 
 double SurfaceSign::reach() const {
+  PALPATE_ASSERT(m_isClosed || m_boundary.has_value());
   // Along a way that leads straight away from the set, the distance D from the boundary grows. The
   // winding number falls to 0, and its change is at most the integral of length / 4 pi D².
   return m_isClosed

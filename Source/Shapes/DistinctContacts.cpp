@@ -3,6 +3,7 @@
 #include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
 #include "Math/NormalCone.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -132,6 +133,7 @@ class DistinctContacts::Step {
       if (count == 2) return {};
       feature[count++] = c.vertices[static_cast<std::size_t>(i)];
     }
+    PALPATE_ASSERT(count > 0);
     if (count == 1) feature[1] = feature[0];
     return feature;
   }
@@ -233,6 +235,7 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
   std::size_t kept = 0;
   for (std::size_t i = 0; i < contacts.size(); ++i)
     if (m_states[i] != State::Dropped) contacts[kept++] = contacts[i];
+  PALPATE_ASSERT(kept > 0 || contacts.empty());  // the first law
   return kept;
 }
 

@@ -67,6 +67,7 @@ std::vector<std::uint32_t> shuffled(std::uint32_t count) {
 }  // namespace
 
 std::vector<Vector3d> spanOf(std::span<const Vector3d> points) {
+  PALPATE_ASSERT(!points.empty());
   const auto before = [](const Vector3d& p, const Vector3d& q) {
     return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
   };
@@ -90,6 +91,7 @@ std::vector<Vector3d> spanOf(std::span<const Vector3d> points) {
 
 Polytope::Polytope(std::span<const Vector3d> points) {
   std::vector<Vector3d> four = spanOf(points);
+  PALPATE_ASSERT(four.size() >= 3);
   const bool flat = four.size() == 3;
   if (flat) {  // adds a point beside the plane, which is removed at the end
     const Vector3d across = (four[1] - four[0]).cross(four[2] - four[0]).cwiseAbs();
@@ -107,6 +109,7 @@ Polytope::Polytope(std::span<const Vector3d> points) {
     reduceToPlate(3);
   else
     compact();
+  PALPATE_ASSERT(flat || m_faces.size() + 4 == 2 * m_points.size());  // no hole: Euler's formula
 }
 
 void Polytope::start(std::span<const Vector3d> four) {
@@ -126,6 +129,7 @@ void Polytope::start(std::span<const Vector3d> four) {
 }
 
 std::uint32_t Polytope::newFace(const Triangle& corners, const Triangle& neighbours) {
+  PALPATE_ASSERT(corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0]);
   auto face = static_cast<std::uint32_t>(m_faces.size());
   if (m_free.empty()) {
     m_faces.emplace_back();
@@ -162,6 +166,7 @@ void Polytope::addVisible(const Vector3d& p) {
   m_newFaces.clear();
   std::uint32_t last = kNone;
   for (const std::uint32_t f : m_visible) last = addHorizonFaces(f, last);
+  PALPATE_ASSERT(m_newFaces.size() >= 3);
   // Links the new faces around the horizon. m_next: the new face that starts at a corner of the
   // horizon.
   for (std::uint32_t f = last, next = kNone; next != last; f = next) {

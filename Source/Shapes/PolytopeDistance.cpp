@@ -1,6 +1,7 @@
 #include "Shapes/Polytope.h"
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -79,6 +80,7 @@ std::uint32_t Polytope::highestPlane(const Vector3d& x, double tie) const {
     const double value = m_planes[i].height(x);
     if (value > height + tie) best = i, height = value;
   }
+  PALPATE_ASSERT(m_planes[best].face < m_faces.size());
   return best;
 }
 
@@ -99,6 +101,7 @@ void Polytope::forEachAround(const OnFace& on, F&& f) const {
     const Face& face = m_faces[at];
     std::size_t i = 0;
     while (face.corners[i] != vertex) ++i;
+    PALPATE_ASSERT(face.neighbours[i] < m_faces.size());
     at = face.neighbours[i];
   }
 }
@@ -150,9 +153,10 @@ Polytope::OnFace Polytope::nearestFaceWithin(const Vector3d& x, double slack) co
 }
 
 const Vector3d& Polytope::normal(std::uint32_t face) const {
-  return std::find_if(m_planes.begin(), m_planes.end(),
-                      [&](const Plane& plane) { return plane.face == face; })
-      ->normal;
+  const auto found = std::find_if(m_planes.begin(), m_planes.end(),
+                                  [&](const Plane& plane) { return plane.face == face; });
+  PALPATE_ASSERT(found != m_planes.end());
+  return found->normal;
 }
 
 PointShapeDistance Polytope::signedDistance(const Vector3d& x, double tie) const {
@@ -184,6 +188,7 @@ PointShapeDistance Polytope::leastDistance(const Vector3d& x, std::span<const Ve
 }
 
 Vector3d Polytope::support(const Vector3d& direction, double tie) const {
+  PALPATE_ASSERT(!m_points.empty() && tie >= 0.0);
   double most = -kInfinity;
   for (const Vector3d& p : m_points) most = std::max(most, dot(direction, p));
   Vector3d sum = Vector3d::Zero();

@@ -73,6 +73,8 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
 
 void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
   PALPATE_ASSERT(deviationFromRotation(transform.rotation) <= kRoughRotation);
+  PALPATE_ASSERT(!m_span.empty() ==
+                 (std::get_if<Box>(&geometry) || std::get_if<ConvexHull>(&geometry)));
   const auto capsule = [&](const Vector3d& p0, const Vector3d& p1, double radius) {
     m_type = Type::Capsule;
     m_p0 = transform(p0);
@@ -137,6 +139,8 @@ void Shape::translate(const Vector3d& shift) {
 }
 
 void Shape::placeBetween(const Shape& before, const Shape& now, double time) {
+  PALPATE_ASSERT(before.isCylinder() && now.isCylinder());
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   const auto at = [&](std::size_t end) -> Vector3d {
     return (1.0 - time) * before.m_corners[end] + time * now.m_corners[end];
   };
@@ -164,6 +168,7 @@ void Shape::placeCorners() {
 Vector3d Shape::inBody(const Vector3d& x) const { return m_axes.transpose() * (x - m_p0); }
 
 Shape::Components Shape::componentsOf(const Vector3d& v, double tie) const {
+  PALPATE_ASSERT(tie >= 0.0);
   const auto& [radius, across] = polar({v[0], v[1], 0});
   const Vector3d outward = radius > 0 ? across : Vector3d(1, 0, 0);
   return {{radius, std::abs(v[2])}, {outward, Vector3d(0, 0, v[2] < -tie ? -1 : 1)}};
@@ -207,6 +212,7 @@ PointShapeDistance Shape::leastAtBody(const Vector3d& u, std::span<const Vector3
 
 PointShapeDistance Shape::distanceFromCylinder(const Vector3d& fromCentre,
                                                const Vector3d& axis) const {
+  PALPATE_ASSERT(isCylinder());
   const Eigen::Matrix3d axes = axis == Vector3d::Zero() ? m_axes : axesAlong(axis);
   const PointShapeDistance inBodyFrame = atBody(
       axes.transpose() * fromCentre, kOnSurface * m_magnitude, {m_sizes[0], 0.5 * lengthOf(axis)});
@@ -233,6 +239,7 @@ PointShapeDistance Shape::signedDistance(const Vector3d& x) const {
 }
 
 Vector3d Shape::directionFromAxis(const Vector3d& normal) const {
+  PALPATE_ASSERT(m_type == Type::Capsule);
   const Vector3d along = directionOf(m_p1 - m_p0);
   const Vector3d across = normal - along.dot(normal) * along;
   return across.squaredNorm() > kAcrossSquare ? across.normalized() : along.unitOrthogonal();
@@ -319,6 +326,7 @@ NearestToShape Shape::nearestOfEdge(const Vector3d& p, const Vector3d& q) const 
 /// on all sides, { u: distance <= -m }, has the components' sizes less m. m is the largest value
 /// for which it still reaches the plane. supportHeight: of the plane that touches the shape.
 Vector3d Shape::nearestOfPlane(const Vector3d& normal, double height, double& supportHeight) const {
+  PALPATE_ASSERT(isCylinder() && height >= 0.0);
   const Components components = componentsOf(normal, 0);
   const auto& [lengths, directions] = components;
   supportHeight = lengths[0] * m_sizes[0] + lengths[1] * m_sizes[1];

@@ -4,6 +4,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -24,10 +25,13 @@ ShapeApproach::ShapeApproach(const MovingBody& a, const MovingBody& b)
     : m_a(a), m_b(b), m_reference{b.corners[0][0], b.corners[1][0]} {
   m_size = (a.radius + b.radius) + (a.cylinderRadius + b.cylinderRadius);
   double furthest = 0;
-  for (const MovingBody* body : {&m_a, &m_b})
+  for (const MovingBody* body : {&m_a, &m_b}) {
+    PALPATE_ASSERT(body->corners[0].size() == body->corners[1].size());
+    PALPATE_ASSERT(body->cylinderRadius == 0.0 || body->corners[0].size() == 2);
     for (const std::size_t end : {0, 1})
       for (const Vector3d& p : body->corners[end])
         furthest = std::max(furthest, largest(p - m_reference[end]));
+  }
   m_size += furthest;
   m_direction = directionOf(corner(m_a, 0, 0.5) - corner(m_b, 0, 0.5));
   if (m_direction == Vector3d::Zero()) m_direction = Vector3d::UnitX();
@@ -119,6 +123,7 @@ struct ShapeApproach::Simplex {
   /// that point is on a face with the last point, because the other three points were the nearest
   /// ones before it was added.
   VertexTriangleDistance reduce() {
+    PALPATE_ASSERT(size >= 1 && size <= 4);
     const Vector3d origin = Vector3d::Zero();
     const auto of = [&](int i, int j, int k) {
       return finiteVertexTriangleDistance(origin, points[i].difference, points[j].difference,
@@ -195,6 +200,7 @@ std::optional<double> ShapeApproach::firstTimeWithin(double distance, double tol
 }
 
 ShapePairDistance ShapeApproach::nearestAt(double time) {
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   const Nearest at = nearest(time, [](const Vector3d&, double, double) { return false; });
   const Vector3d reference = (1.0 - time) * m_reference[0] + time * m_reference[1];
   return {at.ofA - m_a.radius * at.normal + reference, at.ofB + m_b.radius * at.normal + reference,

@@ -50,6 +50,7 @@ class ShapeImpacts {
         m_distance(settings.thickness + m_mesh.largestRadius),
         m_isStill(m_mesh.before.hasSameBody(m_mesh.now) && !m_mesh.now.isPlaced()),
         m_out(out) {
+    PALPATE_ASSERT(m_before.corners().size() == m_now.corners().size());
     m_settings.minimumDistance = m_distance + m_before.radius();
     m_settings.timeTolerance = settings.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
@@ -345,10 +346,11 @@ class ShapeContactFinder {
 
   void add(ShapeElement element, std::uint32_t id, const Triangle& vertices,
            const NearestToShape& nearest, double time) {
+    if (m_distinct && !nearest.inInterior) return;
     const Vector3d& weights = nearest.weights;
+    PALPATE_ASSERT(weights.minCoeff() >= 0.0 && time >= 0.0 && time <= 1.0);
     const double radius = m_mesh.radius(vertices, weights);
     if (!m_continuous && !(nearest.distance - radius <= m_thickness)) return;
-    if (m_distinct && !nearest.inInterior) return;
     const auto at = [&](int i) -> Vector3d {
       if (time == 0.0 || !m_continuous) return m_positions[vertices[i]];
       return (1.0 - time) * m_mesh.before[vertices[i]] + time * m_mesh.now[vertices[i]];

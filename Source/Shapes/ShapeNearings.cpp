@@ -6,6 +6,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/Nearing.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -178,6 +179,7 @@ void findShapePairNearing(const PlacedShape& first, const PlacedShape& second, d
   const bool exchanged = a->before.isPlane() || b->before.precedes(a->before) ||
                          (!a->before.precedes(b->before) && b->now.precedes(a->now));
   if (exchanged && !b->before.isPlane()) std::swap(a, b);  // a plane is the second
+  PALPATE_ASSERT(!a->before.isPlane());
   const MovingBody body = movingBody(a->before, a->now);
   BodyAndShape pair(body, *b, timeTolerance);
   ++out.featurePairs;

@@ -4,6 +4,7 @@
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -82,6 +83,7 @@ constexpr std::size_t kMaxDifferencePoints = 256;
 }  // namespace
 
 Vector3d Shape::support(const Vector3d& direction, double tie) const {
+  PALPATE_ASSERT(!isPlane() && tie >= 0.0);
   if (m_type == Type::Capsule) {
     const Vector3d along = m_p1 - m_p0;
     const double higher = dot(direction, along);
@@ -110,6 +112,7 @@ bool Shape::precedes(const Shape& other) const {
 
 /// The distance of this plane from a body.
 ShapePairDistance Shape::planeDistance(const Shape& body) const {
+  PALPATE_ASSERT(isPlane());
   const double tie = kOnSurface * (m_magnitude + body.m_magnitude);
   ShapePairDistance best{};
   best.distance = -std::numeric_limits<double>::infinity();
@@ -190,6 +193,7 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
     }
     pointsOfA.push_back(point);
   }
+  PALPATE_ASSERT(pointsOfA.size() == polytope.points().size());
   Polytope::OnFace on = polytope.nearest(origin, tie);
   if (isRound && out.distance < 0) {
     on = polytope.nearestFaceWithin(origin, tie);
@@ -207,6 +211,7 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
 
 /// The distance of this capsule from another one, or of this sphere from a body.
 ShapePairDistance Shape::axisDistance(const Shape& body) const {
+  PALPATE_ASSERT(m_type == Type::Capsule && (m_p0 == m_p1 || body.m_type == Type::Capsule));
   NearestToShape nearest{Vector3d::UnitX(), {}, 0, false};
   if (body.m_type == Type::Capsule) {
     nearest = body.nearestOfEdge(m_p0, m_p1);
@@ -236,6 +241,7 @@ double Shape::size() const {
 }
 
 ShapePairDistance Shape::distanceFrom(const Shape& b, ShapePairScratch& scratch) const {
+  PALPATE_ASSERT(!isPlane() || !b.isPlane());
   if (b.precedes(*this)) return b.distanceFrom(*this, scratch).exchanged();
   if (isPlane()) return planeDistance(b);
   if (m_type == Type::Capsule && b.m_type == Type::Capsule && b.m_p0 == b.m_p1)

@@ -3,6 +3,7 @@
 #include "Shapes/ShapeLengths.h"
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -38,12 +39,14 @@ bool areBeyond(const std::array<double, size>& heights, double bound, bool eithe
 }  // namespace
 
 MovingBody movingBody(const Shape& before, const Shape& now) {
+  PALPATE_ASSERT(!before.isPlane() && before.corners().size() == now.corners().size());
   MovingBody body{{before.corners(), now.corners()}};
   (before.isCylinder() ? body.cylinderRadius : body.radius) = before.radius();
   return body;
 }
 
 ShapeStep::Moment ShapeStep::at(const Shape& shape, const Vector3d& point) {
+  PALPATE_ASSERT(!shape.hasCorners());
   const Vector3d from = point - shape.origin();
   if (shape.isPlane()) return {from, shape.axes().col(0), shape.axes().col(1)};
   return {from, shape.corners()[1] - shape.corners()[0], Vector3d::Zero()};
@@ -151,6 +154,7 @@ double ShapeStep::sideOf(const MovingBody& body) const {
 
 std::optional<double> ShapeStep::firstTimeWithin(const MovingBody& body, double distance,
                                                  double tolerance) const {
+  PALPATE_ASSERT(m_before.isPlane() && !body.corners[0].empty());
   double size = 0;
   for (const auto& corners : body.corners)
     for (const Vector3d& p : corners) size = std::max(size, largest(p));
@@ -190,6 +194,7 @@ std::optional<double> ShapeStep::firstTimeWithin(const MovingBody& body, double 
 }
 
 ShapePairDistance ShapeStep::nearestAt(const MovingBody& body, double time) const {
+  PALPATE_ASSERT(m_before.isPlane() && time >= 0.0 && time <= 1.0);
   const auto momentOf = [&](std::size_t i) {
     return between(before(body.corners[0][i]), now(body.corners[1][i]), time);
   };
@@ -230,6 +235,7 @@ PointShapeDistance ShapeStep::signedDistanceAt(const Point& point, double time) 
 }
 
 bool ShapeStep::mayComeNear(const Eigen::AlignedBox3d& box, double distance) const {
+  PALPATE_ASSERT(m_before.isPlane() && !box.isEmpty());
   const Vector3d centre = box.center();
   const Moment start = before(centre), end = now(centre);
   const std::array<Vector3d, 3> n = normalsOf(start, end);

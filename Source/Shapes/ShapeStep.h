@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Shapes/Shape.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -30,6 +31,7 @@ inline constexpr double kShareOfTolerance = 0.25;
 /// isExcluded(from, to): whether nothing happens in that part.
 template <class IsExcluded>
 std::optional<double> firstTimeNotExcluded(double tolerance, IsExcluded&& isExcluded) {
+  PALPATE_ASSERT(tolerance > 0.0);
   double time = 0, part = 1;  // time is a multiple of part, and both are exact
   while (time < 1) {
     if (isExcluded(time, time + part)) {
@@ -51,7 +53,9 @@ std::optional<double> firstTimeNotExcluded(double tolerance, IsExcluded&& isExcl
 /// and its radius stays. At each time it is the right cylinder between them.
 class ShapeStep {
  public:
-  ShapeStep(const Shape& before, const Shape& now) : m_before(before), m_now(now) {}
+  ShapeStep(const Shape& before, const Shape& now) : m_before(before), m_now(now) {
+    PALPATE_ASSERT(before.isPlane() == now.isPlane());
+  }
 
   using Point = std::array<Eigen::Vector3d, 2>;  ///< L: before and now; it moves linearly
 
