@@ -3,7 +3,7 @@
 #include <palpate/Error.h>
 #include <palpate/SpatialQueries.h>
 
-#include "Simplify/Simplifier.h"
+#include "Simplify/SimplifyRounds.h"
 #include "Queries/ClosedBody.h"
 #include "Bodies/Body.h"
 #include "Bodies/InputChecks.h"
@@ -62,7 +62,7 @@ SimplifiedMesh simplifyBy(CollapseEdges collapse, const TriangleMeshView& mesh,
   Body body(GeometryId{0});
   makeClosedBody(mesh, threads, body);
   const double largest = checkSize(mesh, settings.maxDistance);
-  return Simplifier(collapse, body, settings, largest, threads).run();
+  return simplifyInRounds(collapse, body, settings, largest, threads);
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Queries/PointDistances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -33,7 +34,9 @@ SimplifyCertificate::SimplifyCertificate(const Body& geometry, double maxDistanc
     : m_geometry(geometry),
       m_frame(geometry),
       m_maxDistance(maxDistance),
-      m_slack(kPartError * (largest + maxDistance)) {}
+      m_slack(kPartError * (largest + maxDistance)) {
+  PALPATE_ASSERT(geometry.tree.isValid() && maxDistance > 0.0 && largest >= 0.0);
+}
 
 /// Calls f with the place of each triangle that has a point in common with this one, until f
 /// returns false.
@@ -83,9 +86,12 @@ SimplifyCertificate::Foot SimplifyCertificate::footOf(const Vector3d& point,
 
 std::optional<double> SimplifyCertificate::distanceBound(const Corners& triangle,
                                                          PointQueryStack& stack) const {
+  PALPATE_ASSERT(!touches(triangle, stack));
   const Foot a = footOf(triangle[0], 0), b = footOf(triangle[1], a.place),
              c = footOf(triangle[2], b.place);
-  return bound(triangle, {a, b, c}, 0, stack);
+  const auto found = bound(triangle, {a, b, c}, 0, stack);
+  PALPATE_ASSERT(!found || *found <= m_maxDistance);
+  return found;
 }
 
 /// The bound by a triangle that has corresponding points on the other side of the surface.

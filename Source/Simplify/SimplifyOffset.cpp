@@ -1,6 +1,7 @@
 #include "Simplify/SimplifyOffset.h"
 
 #include "Mesh/TriangleMesh.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -61,6 +62,7 @@ std::vector<OutwardWay> outwardWays(std::span<const Vector3d> positions,
     for (std::uint32_t t = 0; t < triangles.size(); ++t)
       for (const std::uint32_t v : triangles[t]) add(v, t);
   });
+  PALPATE_ASSERT(sides.size() == triangles.size());
   std::vector<Vector3d> normalOf(triangles.size());
   for (std::size_t t = 0; t < triangles.size(); ++t)
     normalOf[t] = sides[t] * unitNormal(positions, triangles[t]);
