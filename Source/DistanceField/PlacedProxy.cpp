@@ -139,11 +139,13 @@ PlacedProxy::PlacedProxy(const SurfaceProxy& proxy, const TriangleMesh& body, do
 }
 
 double PlacedProxy::totalError(double error) const {
+  PALPATE_ASSERT(error >= 0.0);
   const double lengths = 2.0 * m_proxy->depth() + error;
   return error + m_stretch * lengths + kProxyRounding * (m_proxy->magnitude() + m_translation);
 }
 
 void PlacedProxy::locate(const Vector3d* points, std::size_t size, Block& block) const {
+  PALPATE_ASSERT(size <= kBlockSize);
   std::array<Vector3d, kBlockSize> padded;
   if (size < kBlockSize) {
     std::copy(points, points + size, padded.begin());
@@ -187,6 +189,7 @@ void PlacedProxy::findLeaves(std::size_t size, bool byBruteForce, Block& block) 
 
 void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_t end,
                        bool byBruteForce, const ParticleStep* step, ProxyHits& out) const {
+  PALPATE_ASSERT(begin <= end && end <= points.now.size());
   out.normals.clear();
   out.others.clear();
   out.error = 0;
@@ -264,6 +267,7 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
     const Triangle& corners = topology.triangles[t];
     int i = 0;
     while (i < 2 && corners[i] != corner) ++i;
+    PALPATE_ASSERT(corners[i] == corner);
     const Vector3d &a = positions[corners[i]], u = positions[corners[(i + 1) % 3]] - a,
                    v = positions[corners[(i + 2) % 3]] - a, normal = u.cross(v);
     const double area = normal.norm();
@@ -292,6 +296,7 @@ PlacedProxy::Nearest PlacedProxy::nearestAmong(const SurfaceProxy::Leaf& leaf,
                                                const Vector3d& p) const {
   const auto positions = m_body->now.body();
   const auto triangles = m_proxy->trianglesOf(leaf);
+  PALPATE_ASSERT(!triangles.empty());
   const auto squareFrom = [&](const SurfaceProxy::Listed& t) {
     const double dx = p[0] - t.x, dy = p[1] - t.y, dz = p[2] - t.z;
     return dx * dx + dy * dy + dz * dz;
@@ -328,6 +333,7 @@ void PlacedProxy::write(const TriangleMesh& points, const ProxyHits& found,
   const bool isSigned = m_proxy->isClosed();
   for (std::size_t i = 0; i < found.count; ++i) {
     const auto& [point, source, hitDistance] = found.hits[i];
+    PALPATE_ASSERT(i == 0 || found.hits[i - 1].point < point);
     double distance = hitDistance;
     Vector3d normal;
     if (source & ProxyHits::kListed) {

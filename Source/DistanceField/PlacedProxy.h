@@ -66,6 +66,7 @@ class PlacedProxy {
 
   /// L: CollisionData::errorBound(), where `error` is that of the leaves that answered.
   double totalError(double error) const;
+  double depth() const { return m_proxy->depth(); }  ///< L: Validity::proxyDepth
 
  private:
   struct Block;

@@ -5,6 +5,7 @@
 #include "DistanceField/ProxyPlane.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 
 #include <Eigen/Geometry>
@@ -14,8 +15,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <string>
+#include <utility>
 
 namespace palpate {
 
@@ -50,6 +51,9 @@ struct Node {
     return {{lower[0] + (i & 1) * half, lower[1] + (i >> 1 & 1) * half, lower[2] + (i >> 2) * half},
             half};
   }
+  std::array<std::uint32_t, 3> brick() const {
+    return {lower[0] / kBrick, lower[1] / kBrick, lower[2] / kBrick};
+  }
 };
 
 /// What one task makes. Indices are those of the part.
@@ -60,72 +64,80 @@ struct Part {
     std::uint32_t value;
     bool isBlock;
   };
-  CountedVector<SurfaceProxy::Leaf> leaves;
-  CountedVector<SurfaceProxy::Listed> triangles;
-  CountedVector<std::array<std::uint32_t, 64>> blocks;
-  CountedVector<Entry> entries;
   /// A cell without a plane, and the triangles that may be nearest to its points.
   struct Open {
     Node node;
     std::size_t block;  ///< of the cell's brick
     CountedVector<std::uint32_t> triangles;
   };
-  CountedVector<Open> open;
+  std::uint32_t step = kCell;  ///< units of an entry of the blocks
+  SurfaceProxy::Lists lists{};
+  CountedVector<Entry> entries{};
+  CountedVector<Open> open{};
 };
 
-}  // namespace
-
-class SurfaceProxyBuilder {
+/// Counts on all threads, up to a limit.
+class Limit {
  public:
-  SurfaceProxyBuilder(const TriangleMesh& body, const ProxySettings& settings, SurfaceProxy& out)
-      : m_topology(body.topology),
-        m_positions(body.now.body()),
-        m_settings(settings),
-        m_mostListed(std::min(settings.mostListed,
-                              std::max(std::uint64_t{1} << 23,
-                                       settings.mostListedEach * body.topology.triangles.size()))),
-        m_out(out) {}
+  Limit(std::uint64_t most, const char* what) : m_most(most), m_what(what) {}
 
-  void build(const Threads& threads) {
-    placeCells();
-    if (m_out.m_units == 0) return;
-    m_planes.emplace(m_topology, m_positions, m_settings.allowedError, m_settings.normalCone,
-                     m_rounding);
-    m_items = m_planes->itemsOfAll();
-    struct Visited {
-      Node node;
-      ProxyItems items;
-    };
-    CountedVector<Visited> level;
-    level.push_back({{{0, 0, 0}, m_out.m_units}, m_items});
-    CountedVector<Part> parts(1);
-    for (int depth = 1; depth <= kSharedLevels; ++depth) {
-      CountedVector<Visited> next(8 * level.size());
-      CountedVector<Part> found(next.size());
-      std::atomic<std::uint64_t> kept = 0;
-      threads.forEach(next.size(), [&](std::size_t i) {
-        const Visited& parent = level[i / 8];
-        next[i].node = parent.node.child(i % 8);
-        ProxyPlanes::Scratch scratch;
-        if (!isDivided(next[i].node, parent.items, next[i].items, scratch, found[i]))
-          next[i].items = {};
-        count(next[i].items.size, kept, m_mostListed / kListedPerItem, kInLists);
-      });
-      for (Part& part : found) parts.push_back(std::move(part));
-      std::erase_if(next, [](const Visited& visited) { return visited.items.size == 0; });
-      level = std::move(next);
-    }
-    const std::size_t first = parts.size();
-    parts.resize(first + level.size());
-    threads.forEach(level.size(), [&](std::size_t i) {
-      Scratch scratch;
-      divide(level[i].node, level[i].items, parts[first + i], scratch);
-    });
-    assemble(parts);
-    divideCells(parts, threads);
+  void add(std::size_t size) {
+    if (m_count.fetch_add(size, std::memory_order_relaxed) + size > m_most)
+      throw Error(ErrorCode::TooLarge,
+                  "the leaves of a surface proxy need more than " + std::to_string(m_most) + " " +
+                      m_what +
+                      ": the thickness and the radii are too large for the body, or it has too "
+                      "many triangles apart from each other");
   }
+  std::uint64_t most() const { return m_most; }
 
  private:
+  const std::uint64_t m_most;
+  const char* const m_what;
+  std::atomic<std::uint64_t> m_count = 0;
+};
+
+ProxyGrid gridOf(const TriangleMesh& body, double reach) {
+  ProxyGrid grid;
+  grid.reach = reach;
+  Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  double lengths = 0;
+  std::size_t count = 0;
+  const auto positions = body.now.body();
+  for (std::uint32_t t = 0; t < body.topology.triangles.size(); ++t) {
+    if (!body.topology.isEnabled(t)) continue;
+    const Triangle& corners = body.topology.triangles[t];
+    for (int i = 0; i < 3; ++i) {
+      const Vector3d &p = positions[corners[i]], &q = positions[corners[(i + 1) % 3]];
+      lower = lower.cwiseMin(p);
+      upper = upper.cwiseMax(p);
+      lengths += (q - p).norm();
+    }
+    grid.isClosed &= hasClosedStars(body.topology, t);
+    ++count;
+  }
+  if (count == 0) return grid;
+  const double edge = lengths / (3.0 * static_cast<double>(count));
+  double extent = (upper - lower).maxCoeff() + 2.0 * reach;
+  if (!(extent <= kLargestExtent && extent >= kSmallestExtent))
+    throw Error(ErrorCode::TooLarge,
+                "the extent of a body with a surface proxy must be from 2^-400 to 2^400");
+  int levels = kFewestLevels;
+  while (levels < kMostLevels && std::ldexp(extent, -levels) > kLargestCell * edge) ++levels;
+  grid.reach = std::max(reach, std::ldexp(extent, -levels));
+  extent = (upper - lower).maxCoeff() + 2.0 * grid.reach;
+  extent += kProxySlack * extent;
+  grid.units = kCell << levels;
+  grid.unit = std::ldexp(extent, -levels) / kCell;
+  grid.lower = 0.5 * (lower + upper) - Vector3d::Constant(0.5 * extent);
+  grid.magnitude =
+      std::max(grid.lower.cwiseAbs().maxCoeff(), (grid.lower.array() + extent).abs().maxCoeff());
+  return grid;
+}
+
+/// Divides nodes, on all threads, into leaves and cells without a plane.
+class Division {
+ public:
   /// Of one task.
   struct Scratch {
     std::array<ProxyItems, kMostLevels + 3> kept;  ///< by the size of the parent
@@ -133,61 +145,24 @@ class SurfaceProxyBuilder {
     CountedVector<double> distances;
   };
 
-  void placeCells() {
-    Vector3d lower = Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
-    double lengths = 0;
-    std::size_t count = 0;
-    m_out.m_isClosed = true;
-    for (std::uint32_t t = 0; t < m_topology.triangles.size(); ++t) {
-      if (!m_topology.isEnabled(t)) continue;
-      const Triangle& corners = m_topology.triangles[t];
-      for (int i = 0; i < 3; ++i) {
-        const Vector3d &p = m_positions[corners[i]], &q = m_positions[corners[(i + 1) % 3]];
-        lower = lower.cwiseMin(p);
-        upper = upper.cwiseMax(p);
-        lengths += (q - p).norm();
-        m_out.m_isClosed &= m_topology.hasClosedStar[corners[i]] != 0;
-      }
-      ++count;
-    }
-    if (count == 0) return;
-    const double edge = lengths / (3.0 * static_cast<double>(count));
-    double extent = (upper - lower).maxCoeff() + 2.0 * m_settings.reach;
-    if (!(extent <= kLargestExtent && extent >= kSmallestExtent))
-      throw Error(ErrorCode::TooLarge,
-                  "the extent of a body with a surface proxy must be from 2^-400 to 2^400");
-    int levels = kFewestLevels;
-    while (levels < kMostLevels && std::ldexp(extent, -levels) > kLargestCell * edge) ++levels;
-    m_out.m_reach = std::max(m_settings.reach, std::ldexp(extent, -levels));
-    extent = (upper - lower).maxCoeff() + 2.0 * m_out.m_reach;
-    extent += kProxySlack * extent;
-    m_out.m_units = kCell << levels;
-    m_out.m_unit = std::ldexp(extent, -levels) / kCell;
-    m_out.m_lower = 0.5 * (lower + upper) - Vector3d::Constant(0.5 * extent);
-    m_out.m_magnitude = std::max(m_out.m_lower.cwiseAbs().maxCoeff(),
-                                 (m_out.m_lower.array() + extent).abs().maxCoeff());
-    m_rounding = kProxyRounding * m_out.m_magnitude;
-  }
+  Division(const TriangleMesh& body, const ProxySettings& settings, const ProxyGrid& grid)
+      : m_topology(body.topology),
+        m_positions(body.now.body()),
+        m_grid(grid),
+        m_rounding(kProxyRounding * grid.magnitude),
+        m_planes(m_topology, m_positions, settings.allowedError, settings.normalCone, m_rounding),
+        m_all(itemsOf(m_topology, m_positions, m_rounding)),
+        m_work(settings.mostWork, "comparisons of triangles with cells"),
+        m_listed(settings.mostListedOf(m_topology.triangles.size()), kInLists) {}
 
-  Vector3d centreOf(const Node& node) const {
-    const double half = 0.5 * node.size;
-    return m_out.m_lower + m_out.m_unit * Vector3d(node.lower[0] + half, node.lower[1] + half,
-                                                   node.lower[2] + half);
-  }
-  /// With what rounding adds when a point's cell is found.
-  ProxyCube cubeOf(const Node& node) const {
-    const double half = 0.5 * node.size * m_out.m_unit * (1.0 + kProxySlack);
-    return {centreOf(node), half + m_rounding, std::sqrt(3.0) * half + m_rounding};
-  }
-  double nearOf(const ProxyCube& cube) const {
-    return m_out.m_reach * (1.0 + kProxySlack) + m_rounding + cube.halfDiagonal;
-  }
+  const ProxyItems& all() const { return m_all; }
+  std::uint64_t mostListed() const { return m_listed.most(); }
 
   /// Visits a node. Keeps those items of the parent that may be nearest to a point of the node.
   /// Returns whether the node must be divided: it is near, and no plane stands for its surface.
   bool isDivided(const Node& node, const ProxyItems& items, ProxyItems& kept,
                  ProxyPlanes::Scratch& scratch, Part& out) {
-    count(items.size, m_work, m_settings.mostWork, "comparisons of triangles with cells");
+    m_work.add(items.size);
     const ProxyCube cube = cubeOf(node);
     const NearestItem found = nearestOf(items, cube.centre, nearOf(cube));
     kept.size = 0;
@@ -198,33 +173,22 @@ class SurfaceProxyBuilder {
     return !addPlane(node, {kept, cube, reach, kept.centre(nearest)}, scratch, out);
   }
 
-  /// Adds a leaf with a plane, if there is one.
-  bool addPlane(const Node& node, const ProxyPlanes::Surroundings& around,
-                ProxyPlanes::Scratch& scratch, Part& out) const {
-    ProxyPlanes::Plane plane;
-    if (!m_planes->find(around, plane, scratch)) return false;
-    SurfaceProxy::Leaf leaf{};
-    leaf.normal = {plane.normal[0], plane.normal[1], plane.normal[2]};
-    leaf.offset = plane.offset;
-    leaf.error = plane.error;
-    addLeaf(node, leaf, out);
-    return true;
-  }
-
+  /// Divides a node down to cells.
   void divide(const Node& node, const ProxyItems& items, Part& out, Scratch& scratch) {
     if (node.size == kCell) {
+      PALPATE_ASSERT(!out.lists.blocks.empty());
       Part::Open& open = out.open.emplace_back();
       open.node = node;
-      open.block = out.blocks.size() - 1;
-      countListed(items.size);
+      open.block = out.lists.blocks.size() - 1;
+      m_listed.add(items.size);
       open.triangles.reserve(items.size);
       for (std::size_t i = 0; i < items.size; ++i) open.triangles.push_back(items.triangleAt(i));
       return;
     }
     if (node.size == kBrick) {
       out.entries.push_back(
-          {brickOf(node), 1, static_cast<std::uint32_t>(out.blocks.size()), true});
-      out.blocks.emplace_back().fill(SurfaceProxy::kNoLeaf);
+          {node.brick(), 1, static_cast<std::uint32_t>(out.lists.blocks.size()), true});
+      out.lists.blocks.emplace_back().fill(SurfaceProxy::kNoLeaf);
     }
     ProxyItems& kept = scratch.kept[std::size_t(std::countr_zero(node.size))];
     for (std::uint32_t i = 0; i < 8; ++i)
@@ -232,47 +196,7 @@ class SurfaceProxyBuilder {
         divide(node.child(i), kept, out, scratch);
   }
 
-  /// Divides cells without a plane up to twice. What remains without a plane gets a list.
-  void divideCells(std::span<const Part> parts, const Threads& threads) {
-    CountedVector<const Part::Open*> cells;
-    CountedVector<std::uint32_t*> entries;
-    std::size_t firstBlock = 0;
-    for (const Part& part : parts) {
-      for (const Part::Open& open : part.open) {
-        cells.push_back(&open);
-        const auto& [x, y, z] = open.node.lower;
-        const std::uint32_t cell = (z / kCell % 4 * 4 + y / kCell % 4) * 4 + x / kCell % 4;
-        entries.push_back(&m_out.m_blocks[firstBlock + open.block][cell]);
-      }
-      firstBlock += part.blocks.size();
-    }
-    // About a quarter of the nodes that are divided once needs it again.
-    const std::size_t most = std::max(kMostSmall, kSmallPerTriangle * m_items.size);
-    const std::uint32_t smallest = 8 * cells.size() > most    ? kCell
-                                   : 16 * cells.size() > most ? kCell / 2
-                                                              : 1;
-    CountedVector<std::uint32_t> itemOf(m_topology.triangles.size());
-    for (std::uint32_t i = 0; i < m_items.size; ++i) itemOf[m_items.triangleAt(i)] = i;
-    CountedVector<Part> found((cells.size() + kCellsPerTask - 1) / kCellsPerTask);
-    threads.forChunks(cells.size(), kCellsPerTask,
-                      [&](std::size_t chunk, std::size_t begin, std::size_t end) {
-                        Scratch scratch;
-                        ProxyItems items;
-                        for (std::size_t i = begin; i < end; ++i) {
-                          items.size = 0;
-                          items.reserve(cells[i]->triangles.size());
-                          for (const std::uint32_t t : cells[i]->triangles)
-                            items.append(m_items, itemOf[t]);
-                          found[chunk].blocks.emplace_back().fill(SurfaceProxy::kNoLeaf);
-                          divideCell(cells[i]->node, items, smallest, found[chunk], scratch);
-                        }
-                      });
-    // join() moves the blocks, so that their entries are written first.
-    auto next = static_cast<std::uint32_t>(m_out.m_blocks.size());
-    for (std::uint32_t* entry : entries) *entry = SurfaceProxy::kBlock | next++;
-    for (Part& part : found) join(part);
-  }
-
+  /// Divides a cell down to nodes of the smallest size.
   void divideCell(const Node& node, const ProxyItems& items, std::uint32_t smallest, Part& out,
                   Scratch& scratch) {
     if (node.size == smallest) return addSmallest(node, items, out, scratch);
@@ -280,6 +204,32 @@ class SurfaceProxyBuilder {
     for (std::uint32_t i = 0; i < 8; ++i)
       if (isDivided(node.child(i), items, kept, scratch.planes, out))
         divideCell(node.child(i), kept, smallest, out, scratch);
+  }
+
+ private:
+  /// With what rounding adds when a point's cell is found.
+  ProxyCube cubeOf(const Node& node) const {
+    const double half = 0.5 * node.size * m_grid.unit * (1.0 + kProxySlack);
+    const Vector3d middle =
+        Vector3d(node.lower[0], node.lower[1], node.lower[2]).array() + 0.5 * node.size;
+    return {m_grid.lower + m_grid.unit * middle, half + m_rounding,
+            std::sqrt(3.0) * half + m_rounding};
+  }
+  double nearOf(const ProxyCube& cube) const {
+    return m_grid.reach * (1.0 + kProxySlack) + m_rounding + cube.halfDiagonal;
+  }
+
+  /// Adds a leaf with a plane, if there is one.
+  bool addPlane(const Node& node, const ProxyPlanes::Surroundings& around,
+                ProxyPlanes::Scratch& scratch, Part& out) const {
+    ProxyPlanes::Plane plane;
+    if (!m_planes.find(around, plane, scratch)) return false;
+    SurfaceProxy::Leaf leaf{};
+    leaf.normal = {plane.normal[0], plane.normal[1], plane.normal[2]};
+    leaf.offset = plane.offset;
+    leaf.error = plane.error;
+    addLeaf(node, leaf, out);
+    return true;
   }
 
   /// A leaf of the smallest size, after exact distances have been found: the plane of fewer
@@ -309,16 +259,14 @@ class SurfaceProxyBuilder {
     for (std::size_t i = 0; i < items.size; ++i)
       if (scratch.distances[i] <= reach) kept.append(items, i);
     if (addPlane(node, {kept, cube, reach, nearest}, scratch.planes, out)) return;
-    countListed(kept.size);
+    PALPATE_ASSERT(kept.size > 0);
+    m_listed.add(kept.size);
     SurfaceProxy::Leaf leaf{};
-    leaf.firstTriangle = static_cast<std::uint32_t>(out.triangles.size());
+    leaf.firstTriangle = static_cast<std::uint32_t>(out.lists.triangles.size());
     leaf.triangleCount = static_cast<std::uint32_t>(kept.size);
-    for (std::size_t i = 0; i < kept.size; ++i) out.triangles.push_back(listed(kept.triangleAt(i)));
+    for (std::size_t i = 0; i < kept.size; ++i)
+      out.lists.triangles.push_back(listed(kept.triangleAt(i)));
     addLeaf(node, leaf, out);
-  }
-
-  static std::array<std::uint32_t, 3> brickOf(const Node& node) {
-    return {node.lower[0] / kBrick, node.lower[1] / kBrick, node.lower[2] / kBrick};
   }
 
   /// Writes a leaf and its entries. Those of leaves below a brick are in the last block: of the
@@ -326,19 +274,20 @@ class SurfaceProxyBuilder {
   void addLeaf(const Node& node, SurfaceProxy::Leaf& leaf, Part& out) const {
     for (int k = 0; k < 3; ++k) leaf.lower[k] = static_cast<std::uint16_t>(node.lower[k]);
     leaf.size = static_cast<std::uint16_t>(node.size);
-    const auto index = static_cast<std::uint32_t>(out.leaves.size());
-    out.leaves.push_back(leaf);
+    const auto index = static_cast<std::uint32_t>(out.lists.leaves.size());
+    out.lists.leaves.push_back(leaf);
     if (node.size >= kBrick) {
-      out.entries.push_back({brickOf(node), node.size / kBrick, index, false});
+      out.entries.push_back({node.brick(), node.size / kBrick, index, false});
       return;
     }
-    const std::uint32_t step = m_dividesCells ? 1 : kCell, size = node.size / step;
+    PALPATE_ASSERT(node.size % out.step == 0 && !out.lists.blocks.empty());
+    const std::uint32_t step = out.step, size = node.size / step;
     const std::array<std::uint32_t, 3> at{node.lower[0] / step % 4, node.lower[1] / step % 4,
                                           node.lower[2] / step % 4};
     for (std::uint32_t z = at[2]; z < at[2] + size; ++z)
       for (std::uint32_t y = at[1]; y < at[1] + size; ++y)
         for (std::uint32_t x = at[0]; x < at[0] + size; ++x)
-          out.blocks.back()[(z * 4 + y) * 4 + x] = index;
+          out.lists.blocks.back()[(z * 4 + y) * 4 + x] = index;
   }
 
   SurfaceProxy::Listed listed(std::uint32_t triangle) const {
@@ -354,91 +303,171 @@ class SurfaceProxyBuilder {
             std::nextafter(outward, std::numeric_limits<float>::infinity()), triangle};
   }
 
-  static void count(std::size_t size, std::atomic<std::uint64_t>& total, std::uint64_t most,
-                    const char* what) {
-    if (total.fetch_add(size, std::memory_order_relaxed) + size > most)
-      throw Error(ErrorCode::TooLarge,
-                  "the leaves of a surface proxy need more than " + std::to_string(most) + " " +
-                      what +
-                      ": the thickness and the radii are too large for the body, or it has too "
-                      "many triangles apart from each other");
-  }
-  void countListed(std::size_t size) const { count(size, m_listed, m_mostListed, kInLists); }
-
-  /// Appends leaves, lists and blocks. Returns the indices of the part's first leaf and block.
-  std::array<std::uint32_t, 2> join(Part& part) {
-    const auto firstLeaf = static_cast<std::uint32_t>(m_out.m_leaves.size()),
-               firstTriangle = static_cast<std::uint32_t>(m_out.m_triangles.size()),
-               firstBlock = static_cast<std::uint32_t>(m_out.m_blocks.size());
-    for (SurfaceProxy::Leaf& leaf : part.leaves) {
-      leaf.firstTriangle += firstTriangle;
-      m_out.m_leaves.push_back(leaf);
-    }
-    m_out.m_triangles.insert(m_out.m_triangles.end(), part.triangles.begin(), part.triangles.end());
-    for (auto& block : part.blocks) {
-      for (std::uint32_t& leaf : block)
-        if (leaf != SurfaceProxy::kNoLeaf) leaf += firstLeaf;
-      m_out.m_blocks.push_back(block);
-    }
-    return {firstLeaf, firstBlock};
-  }
-
-  void assemble(std::span<Part> parts) {
-    const std::uint32_t bricks = m_out.m_units / kBrick;
-    m_out.m_bricks.assign(std::size_t{bricks} * bricks * bricks, SurfaceProxy::kNoLeaf);
-    for (Part& part : parts) {
-      const auto [firstLeaf, firstBlock] = join(part);
-      for (const Part::Entry& entry : part.entries) {
-        const std::uint32_t value = entry.isBlock
-                                        ? SurfaceProxy::kBlock | (entry.value + firstBlock)
-                                        : entry.value + firstLeaf;
-        const auto& [x0, y0, z0] = entry.lower;
-        for (std::uint32_t z = z0; z < z0 + entry.size; ++z)
-          for (std::uint32_t y = y0; y < y0 + entry.size; ++y)
-            for (std::uint32_t x = x0; x < x0 + entry.size; ++x)
-              m_out.m_bricks[(std::size_t{z} * bricks + y) * bricks + x] = value;
-      }
-    }
-    m_dividesCells = true;
-  }
-
   const MeshTopology& m_topology;
   const std::span<const Vector3d> m_positions;
-  const ProxySettings m_settings;
-  const std::uint64_t m_mostListed;
-  SurfaceProxy& m_out;
-  std::optional<ProxyPlanes> m_planes;
-  ProxyItems m_items;
-  bool m_dividesCells = false;
-  double m_rounding = 0;  ///< L
-  mutable std::atomic<std::uint64_t> m_work = 0, m_listed = 0;
+  const ProxyGrid& m_grid;
+  const double m_rounding;  ///< L
+  const ProxyPlanes m_planes;
+  const ProxyItems m_all;
+  Limit m_work, m_listed;
 };
+
+/// Visits the first levels one after another, and then the nodes below each node in one task.
+CountedVector<Part> divideToCells(Division& division, std::uint32_t units, const Threads& threads) {
+  struct Visited {
+    Node node;
+    ProxyItems items;
+  };
+  CountedVector<Visited> level;
+  level.push_back({{{0, 0, 0}, units}, division.all()});
+  CountedVector<Part> parts(1);
+  for (int depth = 1; depth <= kSharedLevels; ++depth) {
+    CountedVector<Visited> next(8 * level.size());
+    CountedVector<Part> found(next.size());
+    Limit kept(division.mostListed() / kListedPerItem, kInLists);
+    threads.forEach(next.size(), [&](std::size_t i) {
+      const Visited& parent = level[i / 8];
+      next[i].node = parent.node.child(i % 8);
+      ProxyPlanes::Scratch scratch;
+      if (!division.isDivided(next[i].node, parent.items, next[i].items, scratch, found[i]))
+        next[i].items = {};
+      kept.add(next[i].items.size);
+    });
+    for (Part& part : found) parts.push_back(std::move(part));
+    std::erase_if(next, [](const Visited& visited) { return visited.items.size == 0; });
+    level = std::move(next);
+  }
+  const std::size_t first = parts.size();
+  parts.resize(first + level.size());
+  threads.forEach(level.size(), [&](std::size_t i) {
+    Division::Scratch scratch;
+    division.divide(level[i].node, level[i].items, parts[first + i], scratch);
+  });
+  return parts;
+}
+
+/// Appends leaves, lists and blocks. Returns the indices of the first leaf and block.
+std::array<std::uint32_t, 2> join(SurfaceProxy::Lists& part, SurfaceProxy::Lists& out) {
+  const auto firstLeaf = static_cast<std::uint32_t>(out.leaves.size()),
+             firstTriangle = static_cast<std::uint32_t>(out.triangles.size()),
+             firstBlock = static_cast<std::uint32_t>(out.blocks.size());
+  for (SurfaceProxy::Leaf& leaf : part.leaves) {
+    leaf.firstTriangle += firstTriangle;
+    out.leaves.push_back(leaf);
+  }
+  out.triangles.insert(out.triangles.end(), part.triangles.begin(), part.triangles.end());
+  for (SurfaceProxy::Block& block : part.blocks) {
+    for (std::uint32_t& leaf : block)
+      if (leaf != SurfaceProxy::kNoLeaf) leaf += firstLeaf;
+    out.blocks.push_back(block);
+  }
+  PALPATE_ASSERT(out.leaves.size() < SurfaceProxy::kBlock);
+  return {firstLeaf, firstBlock};
+}
+
+/// Joins the lists of all parts. Returns the entries of bricks.
+CountedVector<std::uint32_t> assemble(std::span<Part> parts, std::uint32_t bricks,
+                                      SurfaceProxy::Lists& out) {
+  CountedVector<std::uint32_t> values(std::size_t{bricks} * bricks * bricks, SurfaceProxy::kNoLeaf);
+  for (Part& part : parts) {
+    const auto [firstLeaf, firstBlock] = join(part.lists, out);
+    for (const Part::Entry& entry : part.entries) {
+      const std::uint32_t value = entry.isBlock ? SurfaceProxy::kBlock | (entry.value + firstBlock)
+                                                : entry.value + firstLeaf;
+      const auto& [x0, y0, z0] = entry.lower;
+      for (std::uint32_t z = z0; z < z0 + entry.size; ++z)
+        for (std::uint32_t y = y0; y < y0 + entry.size; ++y)
+          for (std::uint32_t x = x0; x < x0 + entry.size; ++x) {
+            std::uint32_t& at = values[(std::size_t{z} * bricks + y) * bricks + x];
+            PALPATE_ASSERT(at == SurfaceProxy::kNoLeaf);
+            at = value;
+          }
+    }
+  }
+  return values;
+}
+
+/// Divides cells without a plane up to twice. What remains without a plane gets a list. The parts
+/// must be those that `out` was assembled from.
+void divideCells(Division& division, std::span<const Part> parts, const Threads& threads,
+                 SurfaceProxy::Lists& out) {
+  CountedVector<const Part::Open*> cells;
+  CountedVector<std::uint32_t*> entries;
+  std::size_t firstBlock = 0;
+  for (const Part& part : parts) {
+    for (const Part::Open& open : part.open) {
+      cells.push_back(&open);
+      const auto& [x, y, z] = open.node.lower;
+      const std::uint32_t cell = (z / kCell % 4 * 4 + y / kCell % 4) * 4 + x / kCell % 4;
+      entries.push_back(&out.blocks[firstBlock + open.block][cell]);
+    }
+    firstBlock += part.lists.blocks.size();
+  }
+  // About a quarter of the nodes that are divided once needs it again.
+  const std::size_t most = std::max(kMostSmall, kSmallPerTriangle * division.all().size);
+  const std::uint32_t smallest = 8 * cells.size() > most    ? kCell
+                                 : 16 * cells.size() > most ? kCell / 2
+                                                            : 1;
+  const ProxyItems& all = division.all();  // by ascending triangles
+  CountedVector<std::uint32_t> itemOf(all.triangleAt(all.size - 1) + std::size_t{1});
+  for (std::uint32_t i = 0; i < all.size; ++i) itemOf[all.triangleAt(i)] = i;
+  CountedVector<Part> found((cells.size() + kCellsPerTask - 1) / kCellsPerTask);
+  threads.forChunks(cells.size(), kCellsPerTask,
+                    [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+                      Division::Scratch scratch;
+                      ProxyItems items;
+                      found[chunk].step = 1;
+                      for (std::size_t i = begin; i < end; ++i) {
+                        items.size = 0;
+                        items.reserve(cells[i]->triangles.size());
+                        for (const std::uint32_t t : cells[i]->triangles)
+                          items.append(all, itemOf[t]);
+                        found[chunk].lists.blocks.emplace_back().fill(SurfaceProxy::kNoLeaf);
+                        division.divideCell(cells[i]->node, items, smallest, found[chunk], scratch);
+                      }
+                    });
+  // join() moves the blocks, so that their entries are written first.
+  auto next = static_cast<std::uint32_t>(out.blocks.size());
+  for (std::uint32_t* entry : entries) {
+    PALPATE_ASSERT(*entry == SurfaceProxy::kNoLeaf);
+    *entry = SurfaceProxy::kBlock | next++;
+  }
+  for (Part& part : found) join(part.lists, out);
+}
+
+}  // namespace
 
 SurfaceProxy::SurfaceProxy(const TriangleMesh& body, const ProxySettings& settings,
                            const Threads& threads)
-    : m_reach(settings.reach) {
-  SurfaceProxyBuilder(body, settings, *this).build(threads);
+    : m_grid(gridOf(body, settings.reach)) {
+  PALPATE_ASSERT(settings.reach > 0.0);
+  if (m_grid.units == 0) return;
+  Division division(body, settings, m_grid);
+  CountedVector<Part> parts = divideToCells(division, m_grid.units, threads);
+  m_bricks = assemble(parts, m_grid.units / kBrick, m_lists);
+  divideCells(division, parts, threads, m_lists);
 }
 
 std::uint32_t SurfaceProxy::leafAtByBruteForce(const ProxyPlace& place) const {
   if (place.brick == ProxyPlace::kOutside) return kNoLeaf;
-  const std::uint32_t bricks = m_units / kBrick;
+  const std::uint32_t bricks = m_grid.units / kBrick;
   std::array<std::uint32_t, 3> at{place.brick % bricks, place.brick / bricks % bricks,
                                   place.brick / (bricks * bricks)};
   for (std::uint32_t k = 0; k < 3; ++k)
     at[k] = at[k] * kBrick + (place.cell >> 2 * k & 3) * kCell + (place.cell >> (6 + 2 * k) & 3);
-  for (std::uint32_t i = 0; i < m_leaves.size(); ++i) {
+  for (std::uint32_t i = 0; i < m_lists.leaves.size(); ++i) {
     bool holds = true;
     for (int k = 0; k < 3; ++k)
-      holds &= at[k] >= m_leaves[i].lower[k] && at[k] - m_leaves[i].lower[k] < m_leaves[i].size;
+      holds &= at[k] >= m_lists.leaves[i].lower[k] &&
+               at[k] - m_lists.leaves[i].lower[k] < m_lists.leaves[i].size;
     if (holds) return i;
   }
   return kNoLeaf;
 }
 
 std::size_t SurfaceProxy::bytes() const {
-  return m_bricks.capacity() * sizeof(std::uint32_t) + m_blocks.capacity() * sizeof(Block) +
-         m_leaves.capacity() * sizeof(Leaf) + m_triangles.capacity() * sizeof(Listed);
+  return m_bricks.capacity() * sizeof(std::uint32_t) + m_lists.blocks.capacity() * sizeof(Block) +
+         m_lists.leaves.capacity() * sizeof(Leaf) + m_lists.triangles.capacity() * sizeof(Listed);
 }
 
 }  // namespace palpate

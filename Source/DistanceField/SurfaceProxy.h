@@ -1,10 +1,13 @@
 #pragma once
 
 #include "Mesh/TriangleMesh.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -16,9 +19,13 @@ struct ProxySettings {
   double allowedError = 0;  ///< L: largest proven error of a leaf's plane
   double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
   /// Most triangles that are compared with nodes while the leaves are built, and most in lists of
-  /// leaves and of nodes that are divided last. Of the latter also at most mostListedEach a
-  /// triangle, where that is more than 2^23.
-  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 26, mostListedEach = 512;
+  /// leaves and of nodes that are divided last.
+  std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 26;
+  /// Most in lists for each triangle of the body, where that is more than 2^23.
+  static constexpr std::uint64_t kMostListedEach = 512;
+  std::uint64_t mostListedOf(std::size_t triangles) const {
+    return std::min(mostListed, std::max(std::uint64_t{1} << 23, kMostListedEach * triangles));
+  }
   friend bool operator==(const ProxySettings&, const ProxySettings&) = default;
 };
 
@@ -28,6 +35,15 @@ struct ProxySettings {
 struct ProxyPlace {
   static constexpr std::uint32_t kOutside = 0xffffffffu;
   std::uint32_t brick, cell;
+};
+
+/// The cube around a surface in which nodes are.
+struct ProxyGrid {
+  Eigen::Vector3d lower = Eigen::Vector3d::Zero();  ///< L
+  double unit = 1, reach = 0;                       ///< L
+  double magnitude = 0;                             ///< L: largest coordinate of the cells
+  std::uint32_t units = 0;                          ///< along each axis; 0 without triangles
+  bool isClosed = true;  ///< the mesh, and consistently oriented: distances have a sign
 };
 
 /// An octree around a body's surface, in the body's frame. Its leaves have a plane or a list of
@@ -62,13 +78,21 @@ class SurfaceProxy {
     float x, y, z, radius;
     std::uint32_t triangle;
   };
+  using Block = std::array<std::uint32_t, 64>;  ///< entries of a brick's cells, or a cell's units
   static constexpr std::uint32_t kNoLeaf = 0xffffffffu;
+  static constexpr std::uint32_t kBlock = 0x80000000u;  ///< marks the index of a block
+  struct Lists {
+    CountedVector<Block> blocks;
+    CountedVector<Leaf> leaves;
+    CountedVector<Listed> triangles;
+  };
 
   SurfaceProxy(const TriangleMesh& body, const ProxySettings&, const Threads&);
 
   /// The leaf of a place; kNoLeaf if there is none.
   std::uint32_t leafAt(const ProxyPlace& place) const {
     if (place.brick == ProxyPlace::kOutside) return kNoLeaf;
+    PALPATE_ASSERT(place.brick < m_bricks.size());
     std::uint32_t entry = m_bricks[place.brick];
     if (const std::uint32_t* cell = within(entry, place.cell)) entry = *cell;
     if (const std::uint32_t* unit = within(entry, place.cell >> 6)) entry = *unit;
@@ -77,17 +101,16 @@ class SurfaceProxy {
   /// The same, found among all leaves.
   std::uint32_t leafAtByBruteForce(const ProxyPlace&) const;
 
-  std::span<const Leaf> leaves() const { return m_leaves; }
+  std::span<const Leaf> leaves() const { return m_lists.leaves; }
   std::span<const Listed> trianglesOf(const Leaf& leaf) const {
-    return std::span(m_triangles).subspan(leaf.firstTriangle, leaf.triangleCount);
+    return std::span(m_lists.triangles).subspan(leaf.firstTriangle, leaf.triangleCount);
   }
-  /// Whether the mesh is closed and consistently oriented, so that distances have a sign.
-  bool isClosed() const { return m_isClosed; }
-  double depth() const { return m_reach; }          ///< L: Validity::proxyDepth
-  double magnitude() const { return m_magnitude; }  ///< L: largest coordinate of the cells
-  const Eigen::Vector3d& lower() const { return m_lower; }
-  double unit() const { return m_unit; }               ///< L
-  std::uint32_t unitCount() const { return m_units; }  ///< along each axis; 0 without triangles
+  bool isClosed() const { return m_grid.isClosed; }
+  double depth() const { return m_grid.reach; }  ///< L: Validity::proxyDepth
+  double magnitude() const { return m_grid.magnitude; }
+  const Eigen::Vector3d& lower() const { return m_grid.lower; }
+  double unit() const { return m_grid.unit; }
+  std::uint32_t unitCount() const { return m_grid.units; }
   std::size_t bytes() const;
 
   // For a look-up in steps, so that memory is fetched ahead.
@@ -95,22 +118,14 @@ class SurfaceProxy {
   /// The entry of a cell in its brick, or of a unit in its cell. Null if `entry` holds for all.
   const std::uint32_t* within(std::uint32_t entry, std::uint32_t index) const {
     if (entry == kNoLeaf || !(entry & kBlock)) return nullptr;
-    return &m_blocks[entry & ~kBlock][index & 63];
+    PALPATE_ASSERT((entry & ~kBlock) < m_lists.blocks.size());
+    return &m_lists.blocks[entry & ~kBlock][index & 63];
   }
 
  private:
-  friend class SurfaceProxyBuilder;
-  using Block = std::array<std::uint32_t, 64>;
-  static constexpr std::uint32_t kBlock = 0x80000000u;  ///< marks the index of a block
-
+  ProxyGrid m_grid;
   CountedVector<std::uint32_t> m_bricks;
-  CountedVector<Block> m_blocks;
-  CountedVector<Leaf> m_leaves;
-  CountedVector<Listed> m_triangles;
-  Eigen::Vector3d m_lower = Eigen::Vector3d::Zero();
-  double m_unit = 1, m_reach = 0, m_magnitude = 0;
-  std::uint32_t m_units = 0;
-  bool m_isClosed = false;
+  Lists m_lists;
 };
 
 }  // namespace palpate

@@ -5,6 +5,7 @@
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "Common/FieldMeshes.h"
@@ -13,7 +14,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
+#include <string>
 
 namespace palpate::testing {
 
@@ -257,6 +260,41 @@ TEST(SurfaceProxy, RefusesWhatIsTooLarge) {
   EXPECT_EQ(codeOf(ball, settings), ErrorCode::TooLarge);
   settings = {0.1, 1e-9, 0.5, ProxySettings{}.mostWork, 1u << 10};
   EXPECT_EQ(codeOf(ball, settings), ErrorCode::TooLarge);
+}
+
+/// 512 entries for each triangle, but from 2^23 to 2^26.
+TEST(SurfaceProxy, ListsMayGrowWithTheTriangles) {
+  const ProxySettings settings;
+  const std::uint64_t floor = 1u << 23, most = 1u << 26;
+  EXPECT_EQ(settings.mostListedOf(0), floor);
+  EXPECT_EQ(settings.mostListedOf(floor / 512), floor);
+  EXPECT_EQ(settings.mostListedOf(floor / 512 + 1), floor + 512);
+  EXPECT_EQ(settings.mostListedOf(most / 512 - 1), most - 512);
+  EXPECT_EQ(settings.mostListedOf(most / 512), most);
+  EXPECT_EQ(settings.mostListedOf(std::size_t{1} << 40), most);
+}
+
+/// The refusal takes at most 2^28 comparisons, a part of a second. Without the limit on lists, the
+/// message would name the limit on comparisons.
+TEST(SurfaceProxy, RefusesLongListsSoon) {
+  struct Case {
+    std::uint32_t rings, segments;
+    double reach;
+    std::uint64_t triangles, most;
+  };
+  // In the third case, the nodes that are shared by all tasks have items in lists, which count
+  // threefold.
+  for (const auto& [rings, segments, reach, triangles, most] :
+       {Case{12, 18, 20.0, 396, 1u << 23}, Case{80, 110, 1.2, 17380, 512u * 17380},
+        Case{80, 110, 20.0, 17380, 512u * 17380 / 3}}) {
+    const Mesh ball = sphere(rings, segments, Vector3d::Zero(), 1.0);
+    ASSERT_EQ(ball.triangles.size(), triangles);
+    ProxySettings settings{reach, 1e-6, 0.5};
+    settings.mostWork = 1u << 28;
+    expectRefused(ErrorCode::TooLarge,
+                  "more than " + std::to_string(most) + " entries in lists of triangles",
+                  [&] { SurfaceProxy(meshOf(ball), settings, Threads(2)); });
+  }
 }
 
 }  // namespace
