@@ -2,7 +2,6 @@
 
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/PairResults.h"
-#include "CollisionDetection/ProxyWork.h"
 #include "Queries/ElementsNearShape.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
@@ -10,6 +9,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 namespace palpate {
 
@@ -20,6 +20,10 @@ namespace {
 void describeAsShape(const TriangleMesh& points, CollisionData::Contents& contents) {
   auto& exact = contents.vertexTriangle;
   auto& all = contents.shape;
+  PALPATE_ASSERT(std::is_sorted(exact.begin(), exact.end(),
+                                [](const auto& a, const auto& b) { return a.vertex < b.vertex; }));
+  PALPATE_ASSERT(std::is_sorted(all.begin(), all.end(),
+                                [](const auto& a, const auto& b) { return a.id < b.id; }));
   std::size_t byLeaves = all.size(), left = exact.size();
   all.resize(byLeaves + left);
   for (std::size_t place = all.size(); left > 0;) {
@@ -46,44 +50,35 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 
 }  // namespace
 
-void ParticleWork::place() {
-  PALPATE_ASSERT(m_record->b->proxy != nullptr);
-  m_proxy.emplace(*m_record->b->proxy, m_record->b->body.mesh, m_record->plan.proxyThickness);
+std::size_t ParticleWork::place() {
+  const PairPlan& plan = m_record->plan;
+  std::optional<ParticleStep> step;
+  if (plan.motion > 0.0)
+    step = {m_record->b->motion.range(), m_record->pair.settings.thickness, plan.motionTolerance};
+  return m_particles.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, step);
 }
 
-std::size_t ParticleWork::start(const FrameStart&) {
-  place();
-  return (m_record->a->body.mesh.now.size() + kParticlesPerJob - 1) / kParticlesPerJob;
-}
+std::size_t ParticleWork::start(const FrameStart&) { return place(); }
 
 void ParticleWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  const std::size_t begin = job * kParticlesPerJob;
-  findByLeaves(begin, std::min(m_record->a->body.mesh.now.size(), begin + kParticlesPerJob), false,
-               scratch);
+  m_particles.find(job, scratch);
+  writeHits(scratch);
   findOthers(scratch);
   scratch.narrowMilliseconds += watch.lap();
 }
 
 void ParticleWork::runByBruteForce(JobScratch& scratch) {
   place();
-  findByLeaves(0, m_record->a->body.mesh.now.size(), true, scratch);
+  m_particles.findByBruteForce(scratch);
+  writeHits(scratch);
   detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
 }
 
-void ParticleWork::findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce,
-                                JobScratch& scratch) const {
-  PALPATE_ASSERT(m_proxy && begin <= end);
-  const TriangleMesh& points = m_record->a->body.mesh;
-  const PairPlan& plan = m_record->plan;
-  const ParticleStep step{m_record->b->motion.range(), m_record->pair.settings.thickness,
-                          plan.motionTolerance};
-  ProxyHits& hits = scratch.hits;
-  m_proxy->find(points, begin, end, byBruteForce, plan.motion > 0.0 ? &step : nullptr, hits);
-  scratch.contacts.featurePairs += hits.answered;
-  scratch.contacts.shape.resize(hits.count);
-  m_proxy->write(points, hits, scratch.contacts.shape.data());
+void ParticleWork::writeHits(JobScratch& scratch) const {
+  scratch.contacts.shape.resize(scratch.hits.count);
+  m_particles.write(scratch, scratch.contacts.shape.data());
 }
 
 void ParticleWork::findOthers(JobScratch& scratch) const {
@@ -116,7 +111,7 @@ void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
   results.order(record);
   CollisionData::Contents& contents = record.next.contents();
   describeExact(contents);
-  describeProxy(*record.b->proxy, *m_proxy, jobs, contents);
+  m_particles.describe(jobs, contents);
   results.assess(record, false, join.statistics);
   if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
   countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);

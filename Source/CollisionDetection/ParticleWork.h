@@ -1,11 +1,8 @@
 #pragma once
 
-#include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/PairTable.h"
-#include "DistanceField/PlacedProxy.h"
+#include "CollisionDetection/ParticleJobs.h"
 
 #include <cstddef>
-#include <optional>
 
 namespace palpate {
 
@@ -22,12 +19,12 @@ class ParticleWork {
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  void place();
-  void findByLeaves(std::size_t begin, std::size_t end, bool byBruteForce, JobScratch&) const;
+  std::size_t place();
+  void writeHits(JobScratch&) const;
   void findOthers(JobScratch&) const;
 
   PairRecord* m_record;
-  std::optional<PlacedProxy> m_proxy;
+  ParticleJobs m_particles;
 };
 
 }  // namespace palpate

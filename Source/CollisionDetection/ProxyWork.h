@@ -1,16 +1,10 @@
 #pragma once
 
-#include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/PairTable.h"
-#include "DistanceField/PlacedProxy.h"
+#include "CollisionDetection/ParticleJobs.h"
 
 #include <cstddef>
-#include <optional>
 
 namespace palpate {
-
-/// Particles of a job.
-inline constexpr std::size_t kParticlesPerJob = 16384;
 
 /// Work on particles by Method::Proxy. Contacts are written in join(), by all threads, to their
 /// places in the results.
@@ -25,14 +19,10 @@ class ProxyWork {
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  void place();
-  void find(std::size_t begin, std::size_t end, bool byBruteForce, JobScratch&) const;
+  std::size_t place();
 
   PairRecord* m_record;
-  std::optional<PlacedProxy> m_proxy;
+  ParticleJobs m_particles;
 };
-
-/// Writes the depth and the error bound of an answer by leaves.
-void describeProxy(const SurfaceProxy&, const PlacedProxy&, Jobs, CollisionData::Contents&);
 
 }  // namespace palpate
