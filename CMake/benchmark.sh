@@ -11,7 +11,7 @@ csv=build/benchmark/race.csv
 build/benchmark/Testing/Benchmark/palpate_race --csv $csv \
   --commit "$(git describe --always --dirty 2>/dev/null || echo unknown)${*:+ ${*//,/ }}" "$@"
 if [[ ! " $* " =~ " --"(tables|scenes|engines|threads|frames|csv|cpu-clock)[\ =] ]]; then  # the whole table
-  cp $csv Docs/Performance.csv
-  python3 Testing/Benchmark/tables.py Docs/Performance.csv Docs/Performance.md
+  cp $csv Docs/Data/Performance.csv
+  python3 Testing/Benchmark/tables.py Docs/Data/Performance.csv Docs/Performance.md
 fi
 echo "figures: $csv"

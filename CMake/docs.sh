@@ -14,7 +14,7 @@ find README.md CHANGELOG.md CONTRIBUTING.md Docs Data Examples -name '*.md' 2>/d
   mkdir -p "$out/source/$(dirname "$page")"
   cp "$page" "$out/source/$page"
 done
-find Docs -maxdepth 1 -name '*.csv' | xargs cp --parents -t "$out/source"
+find Docs/Data -name '*.csv' | xargs cp --parents -t "$out/source"
 find Examples -name '*.cpp' -o -name '*.h' | xargs cp --parents -t "$out/source"  # pages link to them
 [[ ! -d Docs/Pictures ]] || cp -r --parents -t "$out/source" Docs/Pictures
 sed 's#](../#](Docs/#g' Docs/Site/index.md >"$out/source/index.md"
@@ -22,7 +22,7 @@ rm -r "$out/source/Docs/Site"
 
 # The page of the notes lists the notes.
 {
-  printf '# Laboratory notes\n\nThese notes are for developers: lists of tests, single measurements, and experiments without gain.\n\n'
+  printf '# Notes for developers\n\nOne page for each module: what to know before a change, and designs that failed.\n\n'
   printf '```{toctree}\n:maxdepth: 1\n'
   (cd Docs/Notes && ls *.md | sed 's/\.md$//')
   printf '```\n'

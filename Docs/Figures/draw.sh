@@ -1,15 +1,15 @@
 #!/bin/bash
-# Docs/Figures/draw.sh: draws all charts and diagrams of the documentation into Docs/Pictures, from the CSV files in Docs.
+# Docs/Figures/draw.sh: draws all charts and diagrams of the documentation into Docs/Pictures, from the CSV files in Docs/Data.
 # Needs the packages of `CMake/packages.sh figures`, and no network. The same CSV files give the same pictures.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
 python=/usr/bin/python3  # the interpreter of Debian's packages
 mkdir -p ../Pictures
-"$python" speedAccuracy.py ../SpeedAccuracy.csv ../Pictures/SpeedAccuracy
-"$python" distanceFields.py ../DistanceFields.csv ../Pictures/DistanceFields
-"$python" rigidBodies.py ../RigidBodies.csv ../Pictures/RigidBodies
-"$python" stability.py ../Stability.csv ../Pictures/Stability
+"$python" speedAccuracy.py ../Data/SpeedAccuracy.csv ../Pictures/SpeedAccuracy
+"$python" distanceFields.py ../Data/DistanceFields.csv ../Pictures/DistanceFields
+"$python" rigidBodies.py ../Data/RigidBodies.csv ../Pictures/RigidBodies
+"$python" stability.py ../Data/Stability.csv ../Pictures/Stability
 if [[ -f diagrams.py ]]; then
   "$python" diagrams.py
 fi

@@ -19,6 +19,10 @@ def figure(value):
     return f"{value:.{3 if abs(value) < 1 else 2 if abs(value) < 10 else 1}f}"
 
 
+# The scenes of a page's tables; the CSV has all.
+SHOWN = ("organs", "cloth", "sheets-64K", "sheets-1M", "twisted-rods", "rod-twist")
+
+
 class Figures:
     def __init__(self, path):
         with open(path, newline="") as file:
@@ -50,114 +54,54 @@ def joined(figures, table, scene, engine, metric, suffix=""):
 
 
 def race(figures):
-    scenes = figures.distinct("race", "scene")
-    engines = [engine for engine in figures.distinct("race", "engine") if engine != "scene"]
-    header = ["ms, 1 / 2 threads"] + scenes
-    rows = [["triangles"] + [figure(figures.value("race", s, 1, "scene", "triangles")) for s in scenes]]
-    rows.append(["pairs, median"] + [figure(figures.value("race", s, 1, "scene", "pairs")) for s in scenes])
-    rows += [[e] + [joined(figures, "race", s, e, "median ms") for s in scenes] for e in engines]
-    return markdown(header, rows)
+    engines = [e for e in figures.distinct("race", "engine") if e != "scene" and "sorted" not in e]
+    rows = [["triangles"] + [figure(figures.value("race", s, 1, "scene", "triangles")) for s in SHOWN]]
+    rows.append(["pairs, median"] + [figure(figures.value("race", s, 1, "scene", "pairs")) for s in SHOWN])
+    rows += [[e] + [joined(figures, "race", s, e, "median ms") for s in SHOWN] for e in engines]
+    return markdown(["ms, 1 / 2 threads", *SHOWN], rows)
 
 
-def sets(figures):
-    header = ["false negatives, false positives, in four frames"] + figures.distinct("race", "scene")
-    rows = []
-    for engine in figures.distinct("race", "engine"):
-        if engine == "scene":
-            continue
-        cells = []
-        for scene in header[1:]:
-            negatives, positives = (figures.value("race", scene, 1, engine, m) for m in ("false negatives", "false positives"))
-            cells.append("-" if negatives is None else f"{negatives:.0f}, {positives:.0f}")
-        rows.append([engine] + cells)
-    return markdown(header, rows)
-
-
-def comparison(figures):
-    scenes = figures.distinct("comparison", "scene")
-    rows = []
-    for what in figures.distinct("comparison", "engine"):
-        cells = []
-        for scene in scenes:
-            target = figures.value("comparison", scene, 1, what, "target")
-            ratios = joined(figures, "comparison", scene, what, "ratio")
-            cells.append("-" if target is None else f"{ratios} of {target:g}")
-        rows.append([what] + cells)
-    return markdown(["speed-up, 1 / 2 threads, of the target"] + scenes, rows)
-
-
-def metrics(table, first):
-    """One row for each scene and engine, one column for each metric."""
+def metrics(table, first, scenes=None, engines=None, columns=None):
+    """One row for each scene and engine, one column for each metric. Without lists: all of the table."""
     def write(figures):
-        columns = figures.distinct(table, "metric")
+        shown = columns or figures.distinct(table, "metric")
         rows = []
         for scene in figures.distinct(table, "scene"):
             for engine in dict.fromkeys(r["engine"] for r in figures.of(table) if r["scene"] == scene):
-                rows.append([f"{scene}, {engine}"] + [joined(figures, table, scene, engine, m) for m in columns])
-        return markdown([first] + columns, rows)
+                if (scenes is None or scenes(scene)) and (engines is None or engines(engine)):
+                    rows.append([f"{scene}, {engine}"] + [joined(figures, table, scene, engine, m) for m in shown])
+        return markdown([first] + shown, rows)
     return write
 
 
-def cell(value):
-    return "-" if value is None else figure(value)
-
-
-def verdict(value, limit):
-    return "-" if value is None or limit is None else "met" if value <= limit else "NOT MET"
+def types(figures):
+    """Frames of other geometry types, one row for each engine."""
+    rows = [[f"{scene}, {engine}", joined(figures, table, scene, engine, metric)]
+            for table, metric in (("lines", "frame ms"), ("points", "frame ms"), ("shapes", "pair ms"))
+            for scene in figures.distinct(table, "scene") for engine in figures.distinct(table, "engine")
+            if figures.value(table, scene, 1, engine, metric) is not None]
+    return markdown(["1 / 2 threads", "ms"], rows)
 
 
 def spatial(figures):
-    """One row for each query: Palpate beside the fastest library."""
-    rows = []
-    for scene in figures.distinct("spatial", "scene"):
+    """One row for each query: Palpate beside the fastest library at 100,000 elements, and the ratios of all sizes."""
+    def fastest(scene):
         times = {r["engine"]: float(r["value"]) for r in figures.of("spatial")
                  if r["scene"] == scene and r["metric"] == "us"}
         own = times.pop("Palpate", None)
-        if not times:
+        return own, min(times, key=times.get, default=None), min(times.values(), default=None)
+
+    rows = []
+    for scene in figures.distinct("spatial", "scene"):
+        own, engine, least = fastest(scene)
+        if not scene.startswith("100K") or engine is None:
             continue
-        fastest = min(times, key=times.get)
-        update = figures.value("spatial", scene, 1, fastest, "update ms")
-        if update is None:
-            update = figures.value("spatial", scene.split(":")[0] + ": update", 1, fastest, "ms")
-        row = [scene, cell(own), fastest, cell(times[fastest]), cell(update)]
-        ratio, allowed, target = (figures.value("spatial", scene, 1, "Palpate", metric) for metric in
-                                  ("ratio to the fastest library", "allowed ratio", "scaled target us"))
-        row += [cell(ratio), cell(allowed), verdict(ratio, allowed), cell(target), verdict(own, target)]
-        rows.append(row)
-    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "its update ms", "ratio", "allowed ratio",
-                     "verdict", "scaled target us", "verdict"], rows)
-
-
-def by_engine(table, cell):
-    """One row for each scene, one column for each engine."""
-    def write(figures):
-        engines = figures.distinct(table, "engine")
-        rows = [[scene] + [cell(figures, scene, engine) for engine in engines]
-                for scene in figures.distinct(table, "scene")]
-        return markdown(["1 thread"] + engines, rows)
-    return write
-
-
-def coarse(figures):
-    """One row for each scene: the frames with each mesh, and what the simplification decides."""
-    engines = figures.distinct("coarse", "engine")
-    counts = ["frames decided", "contacts", "contacts lost"]
-    rows = [[scene] + [joined(figures, "coarse", scene, engine, "frame ms") for engine in engines] +
-            [cell(figures.value("coarse", scene, 1, engines[-1], count)) for count in counts]
-            for scene in figures.distinct("coarse", "scene")]
-    return markdown(["1 thread"] + [engine + ", ms" for engine in engines] + counts, rows)
-
-
-def spatial_time(figures, scene, engine):
-    metric = "ms" if scene.endswith("update") else "us"
-    return joined(figures, "spatial", scene, engine, metric)
-
-
-def spatial_error(figures, scene, engine):
-    wrong, widest = (figures.value("spatial errors", scene, 1, engine, m) for m in ("wrong", "largest error / diagonal"))
-    if wrong is None:
-        return "-"
-    return f"{wrong:.0f}" + (f", {widest:.0e}" if widest else "")
+        ratios = []
+        for size in ("10K", "100K", "1M"):
+            mine, _, other = fastest(scene.replace("100K", size, 1))
+            ratios += [mine / other] if mine and other else []
+        rows.append([scene[5:], figure(own), engine, figure(least), f"{min(ratios):.2f} to {max(ratios):.2f}"])
+    return markdown(["1 thread", "Palpate us", "fastest library", "its us", "ratio"], rows)
 
 
 def provenance(figures):
@@ -168,35 +112,17 @@ def provenance(figures):
 TABLES = {
     "provenance": provenance,
     "race": race,
-    "sets": sets,
-    "comparison": comparison,
-    "stages": metrics("stages", "1 / 2 threads"),
+    "stages": metrics("stages", "1 / 2 threads", lambda s: s in SHOWN, lambda e: e == "as shipped",
+                      columns=["boxes ms", "octree ms", "pairs ms"]),
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
-    "far-triangle": metrics("far triangle", "1 thread"),
-    "at-rest": metrics("at rest", "1 thread"),
-    "small-tool": metrics("small tool", "1 thread"),
-    "scale": metrics("scale", "1 / 2 threads"),
-    "steady": metrics("steady frames", "1 / 2 threads"),
-    "features": metrics("features", "1 thread"),
-    "continuous": metrics("continuous", "1 / 2 threads"),
-    "validity": metrics("validity", "1 thread"),
-    "resting": metrics("resting", "1 thread"),
-    "aligned": metrics("aligned", "1 thread"),
-    "queries": metrics("queries", "1 thread"),
-    "fields": metrics("fields", "1 thread"),
+    "continuous": metrics("continuous", "1 / 2 threads", engines=lambda e: not e.startswith("Embree"),
+                          columns=["ms", "narrow phase ms"]),
+    "fields": metrics("fields", "1 thread", scenes=lambda s: s.endswith((" 1 %, band 3 %", " 0.1 %, band 0.3 %"))),
     "spatial": spatial,
-    "spatial-times": by_engine("spatial", spatial_time),
-    "spatial-errors": by_engine("spatial errors", spatial_error),
-    "spatial-batches": metrics("spatial batches", "1 / 2 threads"),
-    "simd": metrics("simd", "1 thread"),
-    "lines": metrics("lines", "1 / 2 threads"),
-    "points": metrics("points", "1 / 2 threads"),
-    "shapes": metrics("shapes", "1 thread"),
+    "simd": metrics("simd", "1 thread", scenes=lambda s: s == "organs"),
+    "types": types,
     "rigid": metrics("rigid", "1 / 2 threads"),
-    "proxy": metrics("proxy", "1 / 2 threads"),
     "simplify": metrics("simplify", "1 thread"),
-    "coarse": coarse,
-    "bounds": metrics("bounds", "1 thread"),
     "inside": metrics("inside", "1 / 2 threads"),
 }
 

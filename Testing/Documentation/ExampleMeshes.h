@@ -2,12 +2,13 @@
 
 // Meshes for the hidden code of the documentation's examples.
 
-#include <palpate/Types.h>
+#include <palpate/Palpate.h>
 
 #include <Eigen/Core>
 
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 namespace example {
@@ -62,6 +63,41 @@ inline Mesh sheet(const Eigen::Vector3d& corner, double size) {
       mesh.triangles.push_back({v, v + kRow + 1, v + kRow});
     }
   return mesh;
+}
+
+/// A grid of n x n squares with edges of 1 around the z axis, turned by an angle, and moved up and
+/// down at random.
+inline Mesh unevenGrid(int n, double height, double angle, double bumps) {
+  std::mt19937 generator(2);
+  Mesh mesh;
+  for (int i = 0; i <= n; ++i)
+    for (int j = 0; j <= n; ++j) {
+      const double x = i - 0.5 * n, y = j - 0.5 * n;
+      const double z = height + bumps * (static_cast<double>(generator()) / 2147483648.0 - 1);
+      mesh.positions.push_back({std::cos(angle) * x - std::sin(angle) * y,
+                                std::sin(angle) * x + std::cos(angle) * y, z});
+      if (i == n || j == n) continue;
+      const auto a = static_cast<std::uint32_t>(i * (n + 1) + j),
+                 b = a + static_cast<std::uint32_t>(n) + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  return mesh;
+}
+
+/// Contacts for each vertex of a grid at rest on another one, with edges of 1.
+inline double contactsPerVertex(palpate::Contacts kind, double thickness) {
+  const Mesh lower = unevenGrid(30, 0, 0, 0),
+             upper = unevenGrid(20, thickness / 2, 0.3, thickness / 4);
+  palpate::OctreeBasedCD sheets;
+  const auto a = sheets.addTriangleMesh(lower.positions, lower.triangles);
+  const auto b = sheets.addTriangleMesh(upper.positions, upper.triangles);
+  sheets.addCollisionPair(a, b, {.thickness = thickness, .contacts = kind});
+  sheets.detectCollision();
+  const palpate::CollisionData& data = sheets.collisionData(a, b);
+  return static_cast<double>(data.vertexTriangle().size() + data.triangleVertex().size() +
+                             data.edgeEdge().size()) /
+         static_cast<double>(upper.positions.size());
 }
 
 struct Line {

@@ -2,10 +2,9 @@
 """Writes the tables of a page from the sweeps' CSV: where each method starts to fail.
 
 usage: onsets.py stability.csv PAGE.md
-       onsets.py stability-bodies.csv PAGE.md
 
 Each table stands in the page between the lines "<!-- table NAME -->" and "<!-- end -->". The program
-replaces the lines between these marks only, and only of the tables that the CSV has columns for.
+replaces the lines between these marks only.
 """
 import csv
 import re
@@ -58,26 +57,8 @@ def trust(figures):
     return lines
 
 
-def bodyOnsets(quantity):
-    """Like onsets(), for sweeps of bodies: each setting is a row."""
-    def write(figures):
-        rows = list(dict.fromkeys((row["method"], row["setting"]) for row in figures))
-        sweeps = list(dict.fromkeys((row["sweep"], row["quantity"]) for row in figures))
-        lines = ["| | " + " | ".join(f"{sweep}: {measure}" for sweep, measure in sweeps) + " |", "|---" * (len(sweeps) + 1) + "|"]
-        for method, setting in rows:
-            cells = []
-            for sweep, _ in sweeps:
-                own = [row for row in figures if (row["sweep"], row["method"], row["setting"]) == (sweep, method, setting)]
-                cells.append(onset(own, quantity))
-            lines.append(f"| {method}, {setting} | " + " | ".join(cells) + " |")
-        return lines
-    return write
-
-
 TABLES = {"failed": onsets(falseAnswers, withQuantity=True), "wrong_side": onsets(lambda rows: onset(rows, "wrong_side")),
-          "turned_by_noise": onsets(lambda rows: onset(rows, "turned_by_noise")), "trust": trust,
-          "body_missing": bodyOnsets("missing"), "body_beyond_stated": bodyOnsets("beyond_stated"), "body_wrong_side": bodyOnsets("wrong_side"),
-          "body_silent": bodyOnsets("silent")}
+          "trust": trust}
 
 
 def main(figures_path, page_path):
@@ -86,11 +67,7 @@ def main(figures_path, page_path):
     with open(page_path) as file:
         page = file.read()
 
-    bodies = "beyond_stated" in figures[0]
-
     def table(match):
-        if match[1].startswith("body_") != bodies:
-            return match[0]
         return f"<!-- table {match[1]} -->\n" + "\n".join(TABLES[match[1]](figures)) + "\n<!-- end -->"
 
     page = re.sub(r"<!-- table (\S+) -->\n.*?<!-- end -->", table, page, flags=re.DOTALL)
