@@ -1,6 +1,7 @@
 #include "Bodies/WindingNumber.h"
 
 #include "Bodies/Body.h"
+#include "Octree/Walk.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
@@ -15,12 +16,12 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kBlocksPerPart = 64;
-/// The distances, in radii of a cluster, from which it counts as far away. The cheapest comes
-/// first; all give the same answers.
-constexpr std::array<double, 3> kFarRadii = {4, 8, 24};
+/// The distance, in radii of a cluster, from which it has a share with a useful error bound.
+constexpr double kFarRadii = 1.5;
 
 WindingNumbers::Result decide(double least, double most, double margin) {
-  const bool outside = most<0.5 - margin, inside = least> 0.5 + margin;  // false for NaN
+  const bool outside = most < (0.5 - margin);  // both are false for NaN
+  const bool inside = least > (0.5 + margin);
   return {!outside, outside || inside};
 }
 
@@ -124,33 +125,90 @@ static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
   return sum;
 }
 
+/// Clusters that stand for all triangles that were not summed one by one, as a heap by error.
+struct WindingNumbers::Front {
+  struct Entry {
+    SolidAngleShare share;
+    OctreeNode node;
+    friend bool operator<(const Entry& l, const Entry& r) { return l.share.error < r.share.error; }
+  };
+  std::array<Entry, kMostClusters> all;
+  std::size_t size = 0;
+  SolidAngleShare sum;  ///< updated with each change, and therefore rounded
+
+  bool hasRoom() const { return size + kChildren * kMaxLevels <= all.size(); }
+  void push(OctreeNode, const SolidAngleShare&);
+  OctreeNode popLargestError();
+  SolidAngleShare exactSum() const;
+};
+
+void WindingNumbers::Front::push(OctreeNode node, const SolidAngleShare& share) {
+  PALPATE_ASSERT(size < all.size());
+  all[size++] = {share, node};
+  std::push_heap(all.data(), all.data() + size);
+  sum.add(share);
+}
+
+OctreeNode WindingNumbers::Front::popLargestError() {
+  PALPATE_ASSERT(size > 0);
+  std::pop_heap(all.data(), all.data() + size--);
+  const auto& [share, node] = all[size];
+  sum.value -= share.value;
+  sum.error -= share.error;
+  return node;
+}
+
+SolidAngleShare WindingNumbers::Front::exactSum() const {
+  SolidAngleShare exact;
+  for (std::size_t i = 0; i < size; ++i) exact.add(all[i].share);
+  return exact;
+}
+
+template <class F>
+std::optional<SolidAngleShare> WindingNumbers::sumOfClusters(const Body& body, const Vector3d& p,
+                                                             F&& isEnough) const {
+  const Octree& octree = body.tree.octree();
+  const Positions& now = body.mesh.now;
+  const double slack = kWindingSlack * static_cast<double>(octree.size());
+  Front front;
+  SolidAngleShare near;
+  // Sums what the node holds itself, and adds its children to the front, or opens them if the
+  // point is among their triangles.
+  const auto open = [&](auto& self, OctreeNode node) -> void {
+    const auto [begin, end] = octree.ownRange(node);
+    for (std::uint32_t i = begin; i < end; ++i) {
+      const auto& [a, b, c] = body.tree.ordered()[i];
+      near.add(solidAngleShare(p, now[a], now[b], now[c]));
+    }
+    const OctreeNode children = octree.firstChild(node);
+    for (unsigned slot = 0; children != 0 && slot < kChildren; ++slot) {
+      const OctreeNode child = children + slot;
+      if (octree.isEmpty(child)) continue;
+      const Cluster& cluster = m_clusters[child];
+      const double distance = (cluster.centre - p).norm();
+      if (distance > kFarRadii * cluster.radius)
+        front.push(child, clusterShare(cluster, p, distance));
+      else
+        self(self, child);
+    }
+  };
+  for (open(open, 0); front.hasRoom(); open(open, front.popLargestError())) {
+    // The error bound encloses the sum over all triangles, within its own error bound.
+    const auto sumWith = [&](const SolidAngleShare& far) {
+      return SolidAngleShare{far.value + near.value, far.error + 2 * near.error + slack};
+    };
+    if (front.size == 0 || isEnough(sumWith(front.sum)))
+      if (const SolidAngleShare sum = sumWith(front.exactSum()); isEnough(sum)) return sum;
+    if (front.size == 0) break;
+  }
+  return {};
+}
+
 template <class F>
 SolidAngleShare WindingNumbers::sum(const Body& body, const Vector3d& p, bool bruteForce,
                                     F&& isEnough) const {
-  const Octree& octree = body.tree.octree();
-  const Positions& now = body.mesh.now;
-  for (const double farRadii : kFarRadii) {
-    if (bruteForce) break;
-    SolidAngleShare farSum, nearSum;
-    const auto isNear = [&](OctreeNode node) {
-      const Cluster& cluster = m_clusters[node];
-      const double distance = (cluster.centre - p).norm();
-      if (!(distance > farRadii * cluster.radius)) return true;
-      farSum.add(clusterShare(cluster, p, distance));
-      return false;
-    };
-    forEachEntered(octree, isNear, [&](std::uint32_t begin, std::uint32_t end) {
-      for (std::uint32_t i = begin; i < end; ++i) {
-        const auto& [a, b, c] = body.tree.ordered()[i];
-        nearSum.add(solidAngleShare(p, now[a], now[b], now[c]));
-      }
-    });
-    // The error bound encloses the sum over all triangles, within its own error bound.
-    const SolidAngleShare sum{
-        farSum.value + nearSum.value,
-        farSum.error + 2 * nearSum.error + kWindingSlack * static_cast<double>(octree.size())};
-    if (isEnough(sum)) return sum;
-  }
+  if (!bruteForce)
+    if (const auto found = sumOfClusters(body, p, isEnough)) return *found;
   return sumOfAll(body.mesh, p);
 }
 

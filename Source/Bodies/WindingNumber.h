@@ -8,7 +8,9 @@
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 
 namespace palpate {
 
@@ -22,8 +24,8 @@ struct Body;
 ///          winding numbers for soups and clouds (2018). Difference: the error of far triangles is
 ///          bounded. For triangles of total area A within r of a centre at the distance d it is at
 ///          most 3 A r² / 4 pi (d - r)^4: the remainder after the first two moments, from the third
-///          derivatives of 1 / d. Near triangles are summed one by one. Where the bounds do not
-///          decide, further triangles are summed too, in the end all.
+///          derivatives of 1 / d. The cluster with the largest bound is divided until the sum of
+///          the bounds decides; its triangles are summed one by one. In the end all are.
 class WindingNumbers {
  public:
   struct Result {
@@ -52,6 +54,14 @@ class WindingNumbers {
   };
   void computeOwnCluster(const Body& body, OctreeNode);
   SolidAngleShare clusterShare(const Cluster&, const Eigen::Vector3d& p, double distance) const;
+  /// Most clusters that are weighed against each other. Where more would be needed, all triangles
+  /// are summed.
+  static constexpr std::size_t kMostClusters = 1024;
+  struct Front;
+  /// The sum of clusters and triangles for which isEnough(sum) is true, if there is one.
+  template <class F>
+  std::optional<SolidAngleShare> sumOfClusters(const Body& body, const Eigen::Vector3d&,
+                                               F&& isEnough) const;
   /// The sum of clusters and triangles for which isEnough(sum) is true, or else that of all
   /// triangles.
   template <class F>

@@ -69,7 +69,8 @@ BoundaryCurve::BoundaryCurve(const TriangleMesh& mesh) {
     int count = 0;
     for (; i < passages.size() && passages[i].ends == ends; ++i) count += passages[i].count;
     if (count == 0) continue;
-    m_edges.push_back({mesh.now[ends[0]], mesh.now[ends[1]], std::abs(double(count))});
+    const std::size_t first = count > 0 ? 0 : 1;
+    m_edges.push_back({mesh.now[ends[first]], mesh.now[ends[1 - first]], std::abs(double(count))});
     m_largest = std::max({m_largest, m_edges.back().start.cwiseAbs().maxCoeff(),
                           m_edges.back().end.cwiseAbs().maxCoeff()});
   }
@@ -133,6 +134,17 @@ double BoundaryCurve::steepness(const Vector3d& centre, double radius, double mo
     }
   }
   return kSteepnessSlack * sum / (4.0 * std::numbers::pi);
+}
+
+SolidAngleShare BoundaryCurve::fanNumber(const Vector3d& p) const {
+  SolidAngleShare sum{0.0, kWindingSlack * static_cast<double>(m_edges.size())};
+  if (isEmpty()) return sum;
+  const Vector3d& apex = m_nodes[0].centre;
+  for (const auto& [start, end, count] : m_edges) {
+    const SolidAngleShare share = solidAngleShare(p, apex, start, end);
+    sum.add({count * share.value, count * share.error});
+  }
+  return sum;
 }
 
 }  // namespace palpate

@@ -1,9 +1,11 @@
 #pragma once
 
 #include "Mesh/TriangleMesh.h"
+#include "Math/SolidAngle.h"
 
 #include <Eigen/Core>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -21,16 +23,21 @@ class BoundaryCurve {
   explicit BoundaryCurve(const TriangleMesh&);
 
   bool isEmpty() const { return m_edges.empty(); }
+  std::size_t size() const { return m_edges.size(); }                          ///< number of edges
   double length() const { return m_nodes.empty() ? 0.0 : m_nodes[0].length; }  ///< L
 
   /// 1/L: an upper bound of that gradient in the ball; infinity if it exceeds `most`, or if the
   /// boundary may meet the ball.
   double steepness(const Eigen::Vector3d& centre, double radius, double most) const;
+  /// The winding number about a point, up to an integer: that of the triangles that join one point
+  /// to the edges. They have the same boundary, so that the difference of both sets is closed.
+  /// Cost     linear in the edges.
+  SolidAngleShare fanNumber(const Eigen::Vector3d&) const;
 
  private:
   struct Edge {
-    Eigen::Vector3d start, end;
-    double count;  ///< of passages in one direction, less those in the other
+    Eigen::Vector3d start, end;  ///< in the direction of more passages
+    double count;                ///< of passages in one direction, less those in the other
   };
   struct Node {
     Eigen::Vector3d centre;

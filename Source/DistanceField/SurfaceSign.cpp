@@ -5,6 +5,7 @@
 #include "Core/Assert.h"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace palpate {
@@ -15,6 +16,8 @@ namespace {
 
 constexpr double kMostDefect = 0.375;  ///< of the winding number, from an integer, where reliable
 constexpr double kNumberError = 1.0 / 64.0;
+/// A fan over more edges takes longer than the sum over clusters of triangles.
+constexpr std::size_t kMostFanEdges = 512;
 
 /// In radii of the ball: from its centre to the point at which the winding number is evaluated.
 /// Centres of cells often lie on the surface, this point does not.
@@ -38,8 +41,11 @@ SurfaceSign::Reliability SurfaceSign::in(const Vector3d& centre, double radius) 
   const double way = (1.0 + kAside.norm()) * radius,
                change = way * m_boundary->steepness(centre, radius, kMostDefect / way);
   if (!(change < kMostDefect)) return Reliability::Unknown;
-  const SolidAngleShare number =
-      m_body.prepared->windingNumbers.value(m_body, centre + radius * kAside, kNumberError);
+  const Vector3d aside = centre + radius * kAside;
+  SolidAngleShare number{0.0, std::numeric_limits<double>::infinity()};
+  if (m_boundary->size() <= kMostFanEdges) number = m_boundary->fanNumber(aside);
+  if (!(number.error <= kNumberError))
+    number = m_body.prepared->windingNumbers.value(m_body, aside, kNumberError);
   const double defect = std::abs(number.value - std::round(number.value)),
                doubt = change + number.error + kFieldError;
   if (defect + doubt < kMostDefect) return Reliability::Reliable;
