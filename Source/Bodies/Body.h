@@ -5,8 +5,6 @@
 
 #include "Bodies/GeometryOctree.h"
 #include "Bodies/PreparedData.h"
-#include "Octree/BoxMap.h"
-#include "Octree/Traversal.h"
 #include "Shapes/PlacedShape.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TetrahedralTopology.h"
@@ -76,27 +74,6 @@ void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triang
 
 /// The geometry, for queries. Throws UnsupportedMethod for a distance field that is a geometry.
 const Body& searchable(const Body&);
-
-/// The origin of a geometry's float frame in the world.
-Eigen::Vector3d worldOrigin(const Body&);
-
-/// The map from boxes of a geometry's octree to boxes in the world, as floats relative to `origin`.
-/// It grows them by `thickness`, in units of these floats. The boxes enclose the positions now, or
-/// the whole step. For a geometry that is not placed, the map changes nothing.
-BoxMap worldMap(const Body&, const Eigen::Vector3d& origin, double thickness, bool wholeStep);
-
-/// The frame in which a traversal compares boxes of two geometries.
-enum class BoxFrame {
-  World,  ///< candidates are defined there
-  /// If both are placed: that of a body which does not turn while boxes enclose the step, b's if
-  /// possible; else the world. Elements within the thickness are found in any frame. Here fewer
-  /// others are, and faster, because only one geometry's boxes are mapped.
-  Body
-};
-
-/// The octrees of two geometries, whose frames have one scale, for a traversal. thickness: L.
-TreePair treesOf(const Body& a, const Body& b, double thickness, bool wholeStep,
-                 BoxFrame frame = BoxFrame::World);
 
 /// A geometry in a message. An id alone is that of a geometry that is not there yet, or unknown.
 struct GeometryLabel {

@@ -91,12 +91,7 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_treeVersion.commit(now);
 }
 
-double GeometryOctree::reach() const {
-  const FloatBox box = m_octree.box(0);
-  float reach = 0;
-  for (int k = 0; k < 3; ++k) reach = std::max({reach, -box.lower[k], box.upper[k]});
-  return reach / m_frame.scale;
-}
+double GeometryOctree::reach() const { return m_octree.box(0).reach() / m_frame.scale; }
 
 bool GeometryOctree::isCompact() const {
   return m_octree.isBuilt() && reach() <= 0x1p20 * m_spread;
@@ -131,7 +126,7 @@ void GeometryOctree::updateDops(const TriangleMesh& mesh, OctreeBounds bounds,
             {direction.dot(corners[0]), direction.dot(corners[1]), direction.dot(corners[2])});
         const double error = 0x1p-50 * size;
         dops.lower[k][i] = OutwardRounding::down(static_cast<float>(lower - error));
-        dops.upper[k][i] = OutwardRounding::up(static_cast<float>(upper + error));
+        dops.upper[k][i] = OutwardRounding::up(upper + error);
       }
     }
   });

@@ -1,6 +1,7 @@
 #include "CollisionDetection/BodyContacts.h"
 
 #include "Queries/Containment.h"
+#include "Bodies/OctreeFrame.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 #include "Math/StableLength.h"
@@ -25,14 +26,16 @@ bool mayBeBodies(const PairRecord& record) {
          hasClosedSurface(record.b->body);
 }
 
-Eigen::AlignedBox3d boxOf(const Body& geometry) {
-  const Vector3d origin = worldOrigin(geometry);
-  const FloatBox box = worldMap(geometry, origin, 0.0, false)(geometry.tree.octree().box(0));
-  const double unit = 1.0 / geometry.tree.frame().scale;
-  const auto corner = [&](const std::array<float, 4>& c) {
-    return Vector3d(origin + unit * Vector3d(c[0], c[1], c[2]));
-  };
-  return {corner(box.lower), corner(box.upper)};
+/// In the world; none if the body may be larger than its box.
+std::optional<Eigen::AlignedBox3d> boxOf(const Body& geometry) {
+  const OctreeFrame frame(geometry);
+  auto box = frame.lengthsOf(frame.toWorld()(geometry.tree.octree().box(0)));
+  if (box) box->translate(frame.origin());
+  return box;
+}
+bool mayContain(const Body& outer, const Body& inner) {
+  const auto box = boxOf(outer), within = boxOf(inner);
+  return !box || !within || box->contains(*within);
 }
 
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
@@ -53,7 +56,7 @@ bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
 /// step.
 bool isInside(const Body& inner, const Body& outer, Engine engine, PointQueryStack& stack) {
   const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
-  return boxOf(outer).contains(boxOf(inner)) &&
+  return mayContain(outer, inner) &&
          windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
          wasInside(inner, outer, stack);
 }

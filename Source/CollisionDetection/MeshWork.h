@@ -5,6 +5,7 @@
 #include "CollisionDetection/PairTable.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "Bodies/Body.h"
+#include "Bodies/OctreeFrame.h"
 #include "Octree/Traversal.h"
 #include "Core/MemoryBudget.h"
 

@@ -59,18 +59,15 @@ class RigidSearch::Step {
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
-    const double unit = 1.0 / m_geometry.body.tree.frame().scale;
-    const auto mayExceed = [&](const FloatBox& box) {
-      if (box.empty()) return false;
-      if (box.mayBeClamped()) return true;
-      Vector3d lower, upper;
-      for (int k = 0; k < 3; ++k) lower[k] = box.lower[k], upper[k] = box.upper[k];
-      const Vector3d centre = 0.5 * unit * (lower + upper) + m_geometry.body.tree.frame().origin;
-      const double most =
-          size(m_matrix * centre + m_vector) + growth.dot(0.5 * unit * (upper - lower));
+    const GeometryOctree& tree = m_geometry.body.tree;
+    const auto mayExceed = [&](const FloatBox& floats) {
+      if (floats.empty()) return false;
+      const auto box = tree.frame().lengthsOf(floats);
+      if (!box) return true;
+      const Vector3d centre = box->center() + tree.frame().origin;
+      const double most = size(m_matrix * centre + m_vector) + growth.dot(0.5 * box->sizes());
       return !(most <= best + m_slack);
     };
-    const GeometryOctree& tree = m_geometry.body.tree;
     if (tree.encloses(m_geometry.body.mesh, m_geometry.body.revisions.elements.topology)) {
       forEachOverlapping(tree.octree(), mayExceed, [&](std::uint32_t begin, std::uint32_t end) {
         for (std::uint32_t i = begin; i < end; ++i)

@@ -2,6 +2,7 @@
 
 #include "DistanceField/FieldCells.h"
 #include "DistanceField/FieldMinimum.h"
+#include "Bodies/OctreeFrame.h"
 #include "Shapes/Shape.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
@@ -271,41 +272,28 @@ void forEachElementNear(const Body& geometry, const PlacedField& placed, double 
   const Octree& octree = geometry.tree.octree();
   if (octree.size() == 0) return;
   const Eigen::AlignedBox3d region = placed.domain();
-  const Vector3d origin = worldOrigin(geometry);
-  const BoxMap map = worldMap(geometry, origin, 0.0, false);
-  const double unit = 1.0 / geometry.tree.frame().scale,
-               error = kShapeBoundError *
+  const OctreeFrame frame(geometry);
+  const BoxMap map = frame.toWorld();
+  const Vector3d& origin = frame.origin();
+  const double error = kShapeBoundError *
                        (region.min().cwiseAbs().maxCoeff() + region.max().cwiseAbs().maxCoeff() +
                         2.0 * origin.cwiseAbs().maxCoeff()),
                reach = reachOf(placed.field()),
                above = limit + 2.0 * placed.field().errorBound() + error;
-  const Vector3d margin = Vector3d::Constant(error), lower = region.min() - origin - margin,
-                 upper = region.max() - origin + margin;
-  const auto isOutside = [&](const FloatBox& box) {
-    for (int k = 0; k < 3; ++k)
-      if (unit * double{box.lower[k]} > upper[k] || unit * double{box.upper[k]} < lower[k])
-        return true;
-    return false;
-  };
+  const Vector3d margin = Vector3d::Constant(error);
+  const Eigen::AlignedBox3d grown(region.min() - origin - margin, region.max() - origin + margin);
   const auto mayBeNear = [&](const FloatBox& stored) {
-    if (stored.empty()) return false;
-    const FloatBox box = map(stored);
-    if (box.mayBeClamped()) return true;
-    if (isOutside(box)) return false;
+    const auto box = frame.lengthsOf(map(stored));
+    if (!box) return true;
+    if (!grown.intersects(*box)) return false;
     if (!placed.field().isClosed()) return true;  // the sign may change between two points
-    Vector3d centre, half;
-    for (int k = 0; k < 3; ++k) {
-      const double low = unit * double{box.lower[k]}, high = unit * double{box.upper[k]};
-      centre[k] = 0.5 * (low + high), half[k] = 0.5 * (high - low);
-    }
-    const double value = placed.lookup().distanceBound(placed.inField(centre + origin)),
-                 bound = value - (1.0 + kFieldLengthError) * half.norm();
+    const double value = placed.lookup().distanceBound(placed.inField(box->center() + origin)),
+                 bound = value - (1.0 + kFieldLengthError) * (0.5 * box->sizes()).norm();
     return !(value > -reach && bound > above);
   };
   const auto mayBeInDomain = [&](const FloatBox& stored) {
-    if (stored.empty()) return false;
-    const FloatBox box = map(stored);
-    return box.mayBeClamped() || !isOutside(box);
+    const auto box = frame.lengthsOf(map(stored));
+    return !box || grown.intersects(*box);
   };
   bool goesOn = true;
   forEachOverlapping(

@@ -34,6 +34,12 @@ struct alignas(16) FloatBox {
     return !within;
   }
   bool empty() const { return !(lower[0] <= upper[0]); }
+  /// The largest magnitude of a coordinate in the box; 0 for an empty one.
+  float reach() const {
+    float most = 0;
+    for (int k = 0; k < 3; ++k) most = std::max({most, -lower[k], upper[k]});
+    return most;
+  }
   void add(const FloatBox& other) {
     for (int k = 0; k < 3; ++k) {
       lower[k] = std::min(lower[k], other.lower[k]);
@@ -81,6 +87,7 @@ struct OutwardRounding {
   static_assert(kAbsolute * kRelative >= std::numeric_limits<float>::min());
   static float down(float f) { return f - (std::fabs(f) * kRelative + kAbsolute); }
   static float up(float f) { return f + (std::fabs(f) * kRelative + kAbsolute); }
+  static float up(double value) { return up(static_cast<float>(value)); }
   static FloatBox outward(FloatBox box) {
     for (int k = 0; k < 3; ++k) {
       box.lower[k] = down(box.lower[k]);

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "Math/Box.h"
 #include "Core/Buffer.h"
 
 #include <algorithm>
+#include <array>
+#include <optional>
 #include <span>
 
 namespace palpate {
@@ -32,14 +35,25 @@ struct FloatFrame {
   double shrinking() const { return std::min(scale, 1.0); }
   double growing() const { return std::max(scale, 1.0); }
 
-  /// Rounds to nearest and clamps to kLargestFloat. Clamping brings no two points further apart.
   FloatPoint operator()(const Eigen::Vector3d& position) const {
-    const Eigen::Vector3d v = scaled(origin, position);
+    return rounded(scaled(origin, position));
+  }
+  /// Rounds to nearest and clamps to kLargestFloat. Clamping brings no two points further apart.
+  static FloatPoint rounded(const Eigen::Vector3d& v) {
     const auto of = [&](int k) {
       constexpr double kMax = kLargestFloat;
       return static_cast<float>(std::min(std::max(v[k], -kMax), kMax));
     };
     return {of(0), of(1), of(2), 0.0f};
+  }
+  /// A box of floats in L, relative to the origin. None if its contents may reach beyond it.
+  std::optional<Eigen::AlignedBox3d> lengthsOf(const FloatBox& box) const {
+    if (box.mayBeClamped()) return {};
+    const double unit = 1.0 / scale;
+    const auto corner = [&](const std::array<float, 4>& c) {
+      return Eigen::Vector3d(unit * c[0], unit * c[1], unit * c[2]);
+    };
+    return Eigen::AlignedBox3d(corner(box.lower), corner(box.upper));
   }
   friend bool operator==(const FloatFrame& l, const FloatFrame& r) {
     return l.origin == r.origin && l.scale == r.scale;

@@ -119,9 +119,9 @@ void BodyPair::forEachMeeting(const Vector3d& shift,
                                        orderB = m_b.tree.octree().order();
   if (!m_scratch.pairs) m_scratch.pairs = std::make_unique<PairScratch>();
   PairBound bound;
-  bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_a, m_b)));
+  bound.distance = boxErrorOf(m_a, m_b);
   forNearElements(
-      sideOf(m_a, {}), sideOf(m_b, mapBetween(m_a, m_b, shift)), bound, *m_scratch.pairs,
+      PairSide(m_a), PairSide(m_b, mapBetween(m_a, m_b, shift)), bound, *m_scratch.pairs,
       [&](const NearElements& near) {
         for (std::uint32_t i = 0; i < NearElements::kSide; ++i) {
           if (near.near[i]) setA(orderA[near.placeA + i]);

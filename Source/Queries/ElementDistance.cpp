@@ -17,6 +17,15 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
+SurfacePoint surfacePointOf(const Body& geometry, std::uint32_t element, const Vector3d& weights,
+                            double distance) {
+  const Triangle& vertices = geometry.mesh.topology.triangles[element];
+  Vector3d position = Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    position += weights[i] * geometry.mesh.now[vertices[static_cast<std::size_t>(i)]];
+  return {geometry.id, element, vertices, weights, position, distance};
+}
+
 Vector3d cornerWeights(std::size_t corner) {
   return Vector3d::Unit(static_cast<Eigen::Index>(corner));
 }

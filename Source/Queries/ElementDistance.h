@@ -1,5 +1,8 @@
 #pragma once
 
+#include <palpate/SpatialQueries.h>
+
+#include "Bodies/Body.h"
 #include "Mesh/TriangleMesh.h"
 
 #include <Eigen/Core>
@@ -58,6 +61,9 @@ class Element {
   std::array<Eigen::Vector3d, 3> m_corners;
 };
 
+/// The point of an element with these weights. distance: L.
+SurfacePoint surfacePointOf(const Body&, std::uint32_t element, const Eigen::Vector3d& weights,
+                            double distance);
 Eigen::Vector3d cornerWeights(std::size_t corner);
 Eigen::Vector3d edgeWeights(std::size_t edge, double weight);  ///< weight: of the edge's end
 

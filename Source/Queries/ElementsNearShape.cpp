@@ -1,5 +1,6 @@
 #include "Queries/ElementsNearShape.h"
 
+#include "Bodies/OctreeFrame.h"
 #include "Shapes/ShapeStep.h"
 #include "Math/Tolerances.h"
 
@@ -7,13 +8,36 @@
 
 namespace palpate {
 
+namespace {
+
+/// Finds the elements whose boxes `mayBeNear` accepts, in L relative to the frame's origin, and
+/// those whose boxes may hold anything.
+template <class MayBeNear>
+void findBoxes(const Body& geometry, const OctreeFrame& frame, bool wholeStep,
+               Buffer<std::uint32_t>& out, MayBeNear&& mayBeNear) {
+  const Octree& octree = geometry.tree.octree();
+  const BoxMap map = frame.toWorld(wholeStep);
+  const auto isWanted = [&](const FloatBox& stored) {
+    if (stored.empty()) return false;
+    const auto box = frame.lengthsOf(map(stored));
+    return !box || mayBeNear(*box);
+  };
+  out.clear();
+  if (octree.size() == 0) return;
+  forEachOverlapping(octree, isWanted, [&](std::uint32_t begin, std::uint32_t end) {
+    for (std::uint32_t i = begin; i < end; ++i)
+      if (isWanted(octree.boxes()[i])) out.push_back(octree.order()[i]);
+  });
+}
+
+}  // namespace
+
 void findElementsNear(const Body& geometry, const Shape& before, const Shape& now,
                       double maxDistance, Buffer<std::uint32_t>& out) {
   using Eigen::Vector3d;
   const bool wholeStep = &before != &now;
-  const Vector3d origin = worldOrigin(geometry);
-  const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
-  const double unit = 1.0 / geometry.tree.frame().scale;
+  const OctreeFrame frame(geometry);
+  const Vector3d& origin = frame.origin();
   const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + maxDistance +
                                            2.0 * origin.cwiseAbs().maxCoeff());
   Eigen::AlignedBox3d swept;
@@ -22,13 +46,7 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
   const ShapeStep step(before, now);
   const Vector3d grown = Vector3d::Constant(maxDistance + now.radius() + error);
   swept = {swept.min() - grown, swept.max() + grown};
-  const auto mayBeNear = [&](const FloatBox& stored) {
-    if (stored.empty()) return false;
-    const FloatBox floats = map(stored);
-    if (floats.mayBeClamped()) return true;
-    Eigen::AlignedBox3d box;
-    for (int k = 0; k < 3; ++k) box.min()[k] = floats.lower[k], box.max()[k] = floats.upper[k];
-    box = {unit * box.min(), unit * box.max()};
+  findBoxes(geometry, frame, wholeStep, out, [&](const Eigen::AlignedBox3d& box) {
     if (wholeStep && now.isPlane())
       return step.mayComeNear({box.min() + origin, box.max() + origin}, maxDistance);
     if (!now.isPlane() && !swept.intersects(box)) return false;  // costs less than a distance
@@ -38,43 +56,20 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
     const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();
     return !(at.distance - 0.5 * at.normal.cwiseAbs().dot(box.sizes()) >
              maxDistance + error + kShapeBoundError * size);  // NaN: it may
-  };
-  out.clear();
-  forEachOverlapping(geometry.tree.octree(), mayBeNear,
-                     [&](std::uint32_t begin, std::uint32_t end) {
-                       for (std::uint32_t i = begin; i < end; ++i)
-                         if (mayBeNear(geometry.tree.octree().boxes()[i]))
-                           out.push_back(geometry.tree.octree().order()[i]);
-                     });
+  });
 }
 
 void findElementsNear(const Body& geometry, const Eigen::AlignedBox3d& box, bool wholeStep,
                       Buffer<std::uint32_t>& out) {
-  const Eigen::Vector3d origin = worldOrigin(geometry);
-  const BoxMap map = worldMap(geometry, origin, 0.0, wholeStep);
-  const double unit = 1.0 / geometry.tree.frame().scale,
-               error = kShapeBoundError *
-                       (box.min().cwiseAbs().maxCoeff() + box.max().cwiseAbs().maxCoeff() +
-                        2.0 * origin.cwiseAbs().maxCoeff());
-  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(error),
-                        lower = box.min() - origin - margin, upper = box.max() - origin + margin;
-  const auto mayBeNear = [&](const FloatBox& stored) {
-    if (stored.empty()) return false;
-    const FloatBox floats = map(stored);
-    if (floats.mayBeClamped()) return true;
-    for (int k = 0; k < 3; ++k)
-      if (unit * double{floats.lower[k]} > upper[k] || unit * double{floats.upper[k]} < lower[k])
-        return false;
-    return true;
-  };
-  out.clear();
-  if (geometry.tree.octree().size() == 0) return;
-  forEachOverlapping(geometry.tree.octree(), mayBeNear,
-                     [&](std::uint32_t begin, std::uint32_t end) {
-                       for (std::uint32_t i = begin; i < end; ++i)
-                         if (mayBeNear(geometry.tree.octree().boxes()[i]))
-                           out.push_back(geometry.tree.octree().order()[i]);
-                     });
+  const OctreeFrame frame(geometry);
+  const Eigen::Vector3d& origin = frame.origin();
+  const double error =
+      kShapeBoundError * (box.min().cwiseAbs().maxCoeff() + box.max().cwiseAbs().maxCoeff() +
+                          2.0 * origin.cwiseAbs().maxCoeff());
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(error);
+  const Eigen::AlignedBox3d grown(box.min() - origin - margin, box.max() - origin + margin);
+  findBoxes(geometry, frame, wholeStep, out,
+            [&](const Eigen::AlignedBox3d& element) { return grown.intersects(element); });
 }
 
 }  // namespace palpate

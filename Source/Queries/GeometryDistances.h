@@ -10,15 +10,6 @@
 
 namespace palpate {
 
-/// A geometry for a search of pairs, with the map of its boxes to the common floats.
-PairSide sideOf(const Body&, const BoxMap&);
-/// The map of b's boxes to a's floats, where a is moved by `shift`, L in the world. a's rotation
-/// leaves distances from a's origin as they are within kOrthonormal.
-BoxMap mapBetween(const Body& a, const Body& b,
-                  const Eigen::Vector3d& shift = Eigen::Vector3d::Zero());
-/// In a's floats: boxes of elements with a common point may be so far apart in this map.
-double boxErrorOf(const Body& a, const Body& b);
-
 /// The least distance between two geometries, of which at least one has elements. Of equally near
 /// pairs of elements, by computed distance, that of the lowest element of a, then of b. 0 if
 /// they have a common point, which is decided exactly for elements without radii. Both points have

@@ -93,13 +93,9 @@ std::array<Vector3d, 3> OuterSurface::cornersOf(std::uint32_t element) const {
 
 /// L: how far beside the surface winding numbers are asked for.
 double OuterSurface::aside(const Vector3d& p) const {
-  const FloatFrame& frame = m_geometry.tree.frame();
-  const FloatBox root = m_geometry.tree.octree().box(0);
-  double reach = 0.0;
-  for (int k = 0; k < 3; ++k)
-    reach = std::max({reach, std::abs(double{root.lower[k]}), std::abs(double{root.upper[k]})});
-  return kOuterAside * (reach / frame.scale + worldOrigin(m_geometry).cwiseAbs().maxCoeff() +
-                        p.cwiseAbs().maxCoeff());
+  const OctreeFrame frame(m_geometry);
+  return kOuterAside *
+         (m_geometry.tree.reach() + frame.origin().cwiseAbs().maxCoeff() + p.cwiseAbs().maxCoeff());
 }
 
 bool OuterSurface::isOutside(const Vector3d& q, const Vector3d& direction,
@@ -187,8 +183,8 @@ void OuterSurface::findCreases() const {
   } else {
     const auto scratch = std::make_unique<PairScratch>();
     PairBound bound;
-    bound.distance = OutwardRounding::up(static_cast<float>(boxErrorOf(m_geometry, m_geometry)));
-    const PairSide side = sideOf(m_geometry, {});
+    bound.distance = boxErrorOf(m_geometry, m_geometry);
+    const PairSide side(m_geometry);
     forNearElements(side, side, bound, *scratch, [&](const NearElements& near) {
       for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
         for (std::uint32_t bits = near.near[i]; bits; bits &= bits - 1) {

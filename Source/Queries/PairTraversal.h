@@ -1,5 +1,6 @@
 #pragma once
 
+#include "Bodies/Body.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
 #include "Mesh/FloatPositions.h"
@@ -15,6 +16,12 @@ namespace palpate {
 
 /// One of two geometries, of which the nearest pair of elements is searched.
 struct PairSide {
+  explicit PairSide(const Body& body, const BoxMap& toCommon = {})
+      : octree(body.tree.octree()),
+        floats(body.tree.floats()),
+        ordered(body.tree.ordered().data()),
+        map(toCommon) {}
+
   const Octree& octree;
   const FloatPoint* floats;  ///< of the vertices, in the octree's frame
   const Triangle* ordered;   ///< elements in the octree's order

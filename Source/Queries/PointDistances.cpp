@@ -15,40 +15,15 @@ namespace palpate {
 
 namespace {
 
-/// Rounded up to float.
-float up(double value) { return OutwardRounding::up(static_cast<float>(value)); }
-
 NearestSearch searchOf(const Body& geometry, const Eigen::Vector3d& point) {
-  const FloatFrame& frame = geometry.tree.frame();
-  const Positions& now = geometry.mesh.now;
-  Eigen::Vector3d inBody = point;
-  double error = 0.0;  // L
-  if (now.isPlaced()) {
-    const RigidTransform& pose = now.transform();
-    // By the frame's origin, because an inexact rotation changes lengths.
-    inBody = frame.origin + pose.rotation.transpose() * (point - worldOrigin(geometry));
-    // Roundings of this transform and of the vertices' transform.
-    error = kPlacedPointError *
-            (point.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() + inBody.cwiseAbs().sum());
-  }
-  const FloatPoint p = frame(inBody);
-  const FloatBox root = geometry.tree.octree().box(0);
-  float largest = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-  for (int k = 0; k < 3; ++k)
-    largest = std::max({largest, std::abs(root.lower[k]), std::abs(root.upper[k])});
-  // Both points are off by at most 2^-24 of `largest` along each axis, and by 2 kOrthonormal of
-  // their distances from the frame's origin. kFloatPointError has a margin. Clamped floats say
-  // nothing about a distance.
-  const float slack =
-      largest >= kLargestFloat
-          ? std::numeric_limits<float>::infinity()
-          : largest * kFloatPointError + up(error * frame.scale) + OutwardRounding::kAbsolute;
+  const OctreeFrame frame(geometry);
+  const FloatPoint p = FloatFrame::rounded(frame.toFrame(point));
   NearestSearch search{geometry.tree.octree(), geometry.tree.floats(),
-                       geometry.tree.ordered().data(), p, slack};
+                       geometry.tree.ordered().data(), p, frame.slackAt(p)};
   if (!geometry.mesh.radii.empty()) {
     const auto [least, most] =
         std::minmax_element(geometry.mesh.radii.begin(), geometry.mesh.radii.end());
-    search.tolerance = up((*most - *least) * frame.scale);
+    search.tolerance = OutwardRounding::up((*most - *least) * frame.scale());
   }
   return search;
 }
@@ -173,8 +148,8 @@ float PointDistances::boundOf(double distance) const {
   // The search bounds distances to centre lines and points. Distances are rounded after the radius
   // was subtracted.
   const double radius = m_geometry.mesh.largestRadius;
-  return up((distance + radius + kNearestError * radius) * m_geometry.tree.frame().scale *
-            (1 + kNearestError));
+  return OutwardRounding::up((distance + radius + kNearestError * radius) *
+                             m_geometry.tree.frame().scale * (1 + kNearestError));
 }
 
 template <class F>

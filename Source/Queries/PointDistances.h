@@ -4,7 +4,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "Queries/NearestElements.h"
-#include "Bodies/Body.h"
+#include "Bodies/OctreeFrame.h"
 #include "Core/Threads.h"
 
 #include <Eigen/Core>

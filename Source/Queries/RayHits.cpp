@@ -1,6 +1,7 @@
 #include "Queries/RayHits.h"
 
 #include "Queries/ElementDistance.h"
+#include "Bodies/OctreeFrame.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
@@ -28,34 +29,22 @@ RayHits::RayHits(const Body& geometry, const Ray& ray, bool bruteForce, std::vec
 /// Never negative, which would end the traversal: m_start is rounded.
 float RayHits::floatOf(double t) const {
   const double along = (t * m_perT - m_start) * (1.0 + kNearestError);
-  return std::max(OutwardRounding::up(static_cast<float>(along)), 0.0f);
+  return std::max(OutwardRounding::up(along), 0.0f);
 }
 
 bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
   std::construct_at(&line);  // in place here and below, as a copy would wait for each part
   const RaySegment& ray = m_ray;
   const double radius = m_geometry.mesh.largestRadius + m_radius;  // by which boxes grow
-  const FloatFrame& frame = m_geometry.tree.frame();
-  const Positions& now = m_geometry.mesh.now;
-  Vector3d origin = ray.origin, direction = ray.direction;
+  const OctreeFrame frame(m_geometry);
   const FloatBox root = m_geometry.tree.octree().box(0);
-  double extent = 0.0;
-  for (std::size_t k = 0; k < 3; ++k)
-    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
-  double error = 0.0;  // L
-  if (now.isPlaced()) {
-    const RigidTransform& pose = now.transform();
-    origin = pose.rotation.transpose() * (origin - pose.translation);
-    direction = pose.rotation.transpose() * direction;
-    error = kPlacedPointError * (ray.origin.cwiseAbs().sum() + pose.translation.cwiseAbs().sum() +
-                                 origin.cwiseAbs().sum()) +
-            4.0 * kOrthonormal * (frame.origin.cwiseAbs().maxCoeff() + extent / frame.scale);
-  }
+  double extent = root.reach();
+  const double error = frame.error() + (m_geometry.isPlaced() ? 4.0 * kOrthonormal * extent : 0.0);
+  Vector3d origin = frame.toFrame(ray.origin), direction = frame.turned(ray.direction);
   Eigen::Index axis;
-  const double length = direction.cwiseAbs().maxCoeff(&axis), perT = length * frame.scale;
-  origin = (origin - frame.origin) * frame.scale;
+  const double length = direction.cwiseAbs().maxCoeff(&axis), perT = length * frame.scale();
   direction /= length;
-  extent += radius * frame.scale;
+  extent += radius * frame.scale();
   // A ray from far away begins where it enters the grown root box.
   double enter = ray.tMin * perT, leave = ray.tMax * perT;
   const double far = origin.cwiseAbs().maxCoeff(), reach = far + std::abs(enter);
@@ -64,10 +53,10 @@ bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
   // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
   // errors of the origin in double.
   const double doubleError =
-      kPlacedPointError * far + (error + radius * (1.0 + kNearestError)) * frame.scale;
+      kPlacedPointError * far + error + radius * (1.0 + kNearestError) * frame.scale();
   const double slack =
       kFloatRayError * (extent + (isNear ? reach : 0.0)) + doubleError + OutwardRounding::kAbsolute;
-  clipped.slack = OutwardRounding::up(static_cast<float>(slack));
+  clipped.slack = OutwardRounding::up(slack);
   m_perT = perT;
   if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
       !(slack < kLargestFloat)) {  // every box is entered at once
@@ -96,16 +85,16 @@ bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
   }
   if (!(enter <= leave)) return false;
   m_start = enter;
-  clipped.tMax = OutwardRounding::up(static_cast<float>((leave - enter) * (1.0 + kNearestError)));
+  clipped.tMax = OutwardRounding::up((leave - enter) * (1.0 + kNearestError));
   origin += enter * direction;
   for (int k = 0; k < 3; ++k)
     clipped.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
   if (radius == 0) {
-    const double unit = 1.0 / frame.scale, most = extent + origin.cwiseAbs().maxCoeff();
-    std::construct_at(&line, unit * origin + frame.origin, direction, static_cast<int>(axis),
-                      unit * most,
+    const double unit = frame.unit(), most = extent + origin.cwiseAbs().maxCoeff();
+    const Vector3d& zero = m_geometry.tree.frame().origin;
+    std::construct_at(&line, unit * origin + zero, direction, static_cast<int>(axis), unit * most,
                       unit * (doubleError + kPlacedPointError * most) +
-                          kPlacedPointError * frame.origin.cwiseAbs().maxCoeff());
+                          kPlacedPointError * zero.cwiseAbs().maxCoeff());
   }
   return true;
 }

@@ -7,6 +7,7 @@
 #include "NarrowPhase/Order.h"
 #include "Bodies/Body.h"
 #include "Bodies/InputChecks.h"
+#include "Bodies/OctreeFrame.h"
 #include "Octree/Traversal.h"
 #include "Core/FloatingPoint.h"
 

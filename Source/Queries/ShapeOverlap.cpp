@@ -188,29 +188,15 @@ std::optional<bool> meetsSlabs(const Convex& convex, const std::array<Vector3d, 
 
 /// The shape in the floats of a geometry's octree; none beyond float's range.
 std::optional<FloatConvex> floatsOf(const Convex& convex, const Body& geometry) {
-  const FloatFrame& frame = geometry.tree.frame();
-  const Positions& now = geometry.mesh.now;
-  Vector3d p = convex.p, q = convex.q;
-  double error = 0.0;  // L
-  if (now.isPlaced()) {
-    // By the frame's origin. A rotation within kOrthonormal changes heights and distances in the
-    // frame by less than 2^-27 of the extent below, which kFloatOverlapError covers.
-    const RigidTransform& pose = now.transform();
-    const Vector3d origin = worldOrigin(geometry);
-    p = frame.origin + pose.rotation.transpose() * (p - origin);
-    q = frame.origin + pose.rotation.transpose() * (q - origin);
-    error = kPlacedPointError *
-            (convex.p.cwiseAbs().sum() + convex.q.cwiseAbs().sum() +
-             2 * pose.translation.cwiseAbs().sum() + p.cwiseAbs().sum() + q.cwiseAbs().sum());
-  }
-  p = (p - frame.origin) * frame.scale;
-  q = (q - frame.origin) * frame.scale;
-  const double radius = (convex.radius + geometry.mesh.largestRadius) * frame.scale;
-  double extent = p.cwiseAbs().sum() + q.cwiseAbs().sum() + radius + convex.magnitude * frame.scale;
-  const FloatBox root = geometry.tree.octree().box(0);
-  for (std::size_t k = 0; k < 3; ++k)
-    extent = std::max({extent, double{std::abs(root.lower[k])}, double{std::abs(root.upper[k])}});
-  const double slack = kFloatOverlapError * extent + error * frame.scale;
+  const OctreeFrame frame(geometry);
+  const Vector3d p = frame.toFrame(convex.p), q = frame.toFrame(convex.q);
+  const double scale = frame.scale(),
+               radius = (convex.radius + geometry.mesh.largestRadius) * scale,
+               sizes = p.cwiseAbs().sum() + q.cwiseAbs().sum() + radius + convex.magnitude * scale,
+               extent = std::max(sizes, double{geometry.tree.octree().box(0).reach()});
+  // A rotation within kOrthonormal changes heights and distances in the frame by less than 2^-27 of
+  // the extent, which kFloatOverlapError covers.
+  const double slack = kFloatOverlapError * extent + 2.0 * frame.error();
   if (!(extent < kLargestFloat)) return {};
   FloatConvex floats;
   floats.slack = static_cast<float>(slack) + OutwardRounding::kAbsolute;
@@ -226,11 +212,10 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const Body& geometry) 
   floats.slabCount = convex.slabCount;
   for (std::size_t i = 0; i < convex.slabCount; ++i) {
     const auto& [normal, least, most, isTwoSided] = convex.slabs[i];
-    const Vector3d n =
-        now.isPlaced() ? Vector3d(now.transform().rotation.transpose() * normal) : normal;
+    const Vector3d n = frame.turned(normal);
     for (int k = 0; k < 3; ++k) floats.slabs[i].normal[k] = static_cast<float>(n[k]);
-    floats.slabs[i].middle = static_cast<float>(0.5 * (least + most) * frame.scale + n.dot(p));
-    floats.slabs[i].halfWidth = static_cast<float>(0.5 * (most - least) * frame.scale);
+    floats.slabs[i].middle = static_cast<float>(0.5 * (least + most) * scale + n.dot(p));
+    floats.slabs[i].halfWidth = static_cast<float>(0.5 * (most - least) * scale);
   }
   return floats;
 }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "Bodies/Body.h"
+#include "Bodies/OctreeFrame.h"
 #include "Octree/PointQueries.h"
 #include "Core/Threads.h"
 
@@ -10,22 +10,17 @@
 
 namespace palpate {
 
-/// Converts points in the world to float boxes, for comparison with the boxes of a geometry's
-/// octree after map().
+/// Finds the elements of a body's octree whose boxes hold a point of the world.
 class PointFrame {
  public:
-  explicit PointFrame(const Body& geometry)
-      : m_frame{worldOrigin(geometry), geometry.tree.frame().scale},
-        m_map(worldMap(geometry, m_frame.origin, 0.0, false)) {}
+  explicit PointFrame(const Body& geometry) : m_frame(geometry), m_map(m_frame.toWorld()) {}
 
   const BoxMap& map() const { return m_map; }
-  FloatBox boxOf(const Eigen::Vector3d& p) const {
-    return OutwardRounding::outward(m_frame(p).box());
-  }
+  FloatBox boxOf(const Eigen::Vector3d& p) const { return m_frame.boxInWorld(p); }
 
  private:
-  FloatFrame m_frame;  ///< of boxes in the world
-  BoxMap m_map;        ///< from the octree's boxes to m_frame
+  OctreeFrame m_frame;
+  BoxMap m_map;
 };
 
 /// Scratch of searchVertices(), which remembers its peak.

@@ -1,4 +1,5 @@
 #include "Queries/ElementsNearShape.h"
+#include "Bodies/OctreeFrame.h"
 
 #include "Common/RandomMeshes.h"
 #include "Common/ShapeTruth.h"
