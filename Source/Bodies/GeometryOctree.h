@@ -8,7 +8,7 @@
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
 #include "Mesh/UnfoldedStars.h"
-#include "Core/Arena.h"
+#include "Core/ReusableMemory.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 
@@ -88,8 +88,8 @@ class GeometryOctree {
   double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
-  std::span<Triangle> m_ordered;  ///< empty during a build
-  Arena m_orderedMemory;          ///< of m_ordered, or of the keys during a build
+  std::span<Triangle> m_ordered;   ///< empty during a build
+  ReusableMemory m_orderedMemory;  ///< of m_ordered, or of the keys during a build
   UnfoldedStars m_stars;
   Octree m_octree;
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild

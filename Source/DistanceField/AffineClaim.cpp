@@ -11,7 +11,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "DistanceField/AffineClaim.cpp"
 #include "Core/Simd.h"
-#include "DistanceField/TriangleLanes.h"
+#include "Math/TriangleLanes.h"
 
 #ifndef PALPATE_AFFINE_CLAIM_CPP
 #define PALPATE_AFFINE_CLAIM_CPP
@@ -30,6 +30,12 @@ struct ClaimSearch {
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+
+using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
+using V = hn::Vec<SetTag>;
+using Mask = hn::Mask<SetTag>;
+using Triangles = TrianglesInLanes<SetTag>;
+using Vectors = Triangles::Vectors;
 
 HWY_ATTR HWY_INLINE Vectors absolute(const Vectors& a) {
   return {hn::Abs(a.x), hn::Abs(a.y), hn::Abs(a.z)};
@@ -112,7 +118,7 @@ class SideInLanes {
         hn::Or(isBeside(set, {hn::Neg(z), zero, x}), isBeside(set, {y, hn::Neg(x), zero})));
   }
   /// Only the part of a triangle near the plane H = level counts: a thin polygon.
-  HWY_ATTR HWY_INLINE Mask isBeside(const TrianglesInLanes& set) const {
+  HWY_ATTR HWY_INLINE Mask isBeside(const Triangles& set) const {
     const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
     const Vectors corners[3] = {set.a, set.b, set.c};
     Vectors points[6];
@@ -260,14 +266,14 @@ class ClaimProof {
     const std::size_t count = m_count;
     m_count = 0;
     for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-      const TrianglesInLanes set = TrianglesInLanes::load(m_corners, i);
+      const Triangles set = Triangles::load(m_corners, i);
       const Mask isUsed = hn::FirstN(d, count - i);
       for (const AffineClaim::Side& side : m_claim.sides)
         if (side.isWanted && !isAllowed(set, isUsed, side)) return false;
     }
     return true;
   }
-  HWY_ATTR bool isAllowed(const TrianglesInLanes& set, const Mask& isUsed,
+  HWY_ATTR bool isAllowed(const Triangles& set, const Mask& isUsed,
                           const AffineClaim::Side& side) const {
     const SideInLanes lanes(m_claim, side);
     const Mask isBelow = lanes.isBelow(set);

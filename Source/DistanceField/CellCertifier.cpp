@@ -3,7 +3,7 @@
 #include <palpate/SpatialQueries.h>
 
 #include "DistanceField/AffineClaim.h"
-#include "DistanceField/NearestTriangle.h"
+#include "Math/DistanceBounds.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 

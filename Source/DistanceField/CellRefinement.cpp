@@ -2,6 +2,7 @@
 
 #include <palpate/Error.h>
 
+#include "Queries/PointDistances.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 #include "Core/Text.h"
@@ -79,8 +80,9 @@ void evaluate(CellTree& tree, std::size_t i, const FieldSurface& surface, PointQ
       if ((point - tree.positionOf(corner)).norm() < 0.999 * distance - tree.domain.tolerance)
         sign = tree.distances[corner] < 0.0f ? -1 : 1;
     }
-  const auto near =
-      surface.nearest.at(point, std::span(likely).first(parent == CellTree::kNone ? 1 : 8));
+  const auto near = PointDistances(surface.body, point, false)
+                        .roughlyNearest(tree.domain.tolerance,
+                                        std::span(likely).first(parent == CellTree::kNone ? 1 : 8));
   if (sign == 0) sign = surface.sign.isInside(point, stack) ? -1 : 1;
   tree.distances[i] = static_cast<float>(sign * near.distance / tree.domain.unit);
   tree.nearest[i] = near.place;

@@ -2,8 +2,8 @@
 
 #include "DistanceField/CellCertifier.h"
 #include "DistanceField/CellTree.h"
-#include "DistanceField/NearestTriangle.h"
 #include "DistanceField/SurfaceSign.h"
+#include "Bodies/Body.h"
 #include "Core/Threads.h"
 
 #include <cstddef>
@@ -14,7 +14,7 @@ namespace palpate {
 /// What a build asks about the mesh.
 struct FieldSurface {
   const SurfaceSign& sign;
-  const NearestTriangle nearest;
+  const Body& body;  ///< without copies of triangles
   const CellCertifier certifier;
 };
 

@@ -67,8 +67,7 @@ FieldCells buildField(const Body& body, bool isClosed, const DistanceFieldSettin
   const std::vector<Triangle> kept = withoutCopies(body);
   if (!kept.empty()) makeBody(body.mesh.now.body(), kept, threads, distinct);
   const Body& distances = kept.empty() ? body : distinct;
-  const FieldSurface surface{
-      sign, {distances, domain.tolerance}, {distances, sign, domain.tolerance}};
+  const FieldSurface surface{sign, distances, {distances, sign, domain.tolerance}};
   BuildProgress build{threads, settings.progress};
   CellTree tree(domain, settings.memoryLimit);
   for (std::size_t first = 0; first < tree.cells.size();) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Exact/ErrorBounds.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -30,6 +31,7 @@ inline double blossom(const CubicBernstein& b, double r, double s, double t) {
 /// positive, else downwards. The result is in the interval for any coefficients.
 inline double approximateRoot(const CubicBernstein& b, double low, double high, int rising) {
   const QuadraticBernstein slope{3.0 * (b[1] - b[0]), 3.0 * (b[2] - b[1]), 3.0 * (b[3] - b[2])};
+  PALPATE_ASSERT(low <= high && rising != 0);
   double t = 0.5 * (low + high);
   for (int i = 0; i < 64; ++i) {
     const double value = blossom(b, t, t, t);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 namespace palpate {
 
@@ -24,6 +25,7 @@ Tangent leastTangent(F&& tangentAt) {
     if (middle.slope == 0.0) break;
     (middle.slope < 0.0 ? left : right) = middle;
   }
+  PALPATE_ASSERT(least.at >= 0.0 && least.at <= 1.0 && !(least.value > low.value));
   return least;
 }
 

@@ -1,6 +1,7 @@
 #include "Mesh/Rotation.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <cmath>
 
@@ -37,6 +38,7 @@ RigidTransform withExactRotation(const RigidTransform& pose) {
     const Matrix3d square = product(exact.rotation.transpose(), exact.rotation);
     exact.rotation = 0.5 * product(exact.rotation, 3.0 * Matrix3d::Identity() - square);
   }
+  PALPATE_ASSERT(deviationFromRotation(exact.rotation) <= kOrthonormal);
   return exact;
 }
 

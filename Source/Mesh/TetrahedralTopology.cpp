@@ -106,6 +106,7 @@ TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
     if (!topology.isPositive[side / 4]) std::swap(face[1], face[2]);
     topology.surfaceOwner.push_back(side / 4);
   }
+  PALPATE_ASSERT(std::is_sorted(topology.surfaceOwner.begin(), topology.surfaceOwner.end()));
   return topology;
 }
 

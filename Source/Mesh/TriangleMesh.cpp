@@ -38,12 +38,16 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
     if (i == 0 || edge != sides[i - 1].edge) edges.push_back(edge);
     triangleEdges[triangle][side] = static_cast<std::uint32_t>(edges.size() - 1);
   }
+  PALPATE_ASSERT(std::is_sorted(edges.begin(), edges.end()));
   findOwners({});
 }
 
 void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
   CountedVector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
-  for (const std::uint32_t triangle : newDisabled) newIsDisabled[triangle] = true;
+  for (const std::uint32_t triangle : newDisabled) {
+    PALPATE_ASSERT(triangle < triangles.size());
+    newIsDisabled[triangle] = true;
+  }
   CountedVector<std::uint32_t> sorted;
   for (std::uint32_t t = 0; t < newIsDisabled.size(); ++t)
     if (newIsDisabled[t]) sorted.push_back(t);

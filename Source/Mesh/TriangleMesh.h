@@ -33,7 +33,10 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   for (std::size_t i = 0; i < keyCount; ++i) lists.offsets[i + 1] += lists.offsets[i];
   lists.items.resize(lists.offsets.back());
   CountedVector<std::uint32_t> next(lists.offsets.begin(), lists.offsets.end() - 1);
-  forEachIncidence([&](std::uint32_t key, std::uint32_t item) { lists.items[next[key]++] = item; });
+  forEachIncidence([&](std::uint32_t key, std::uint32_t item) {
+    PALPATE_ASSERT(next[key] == lists.offsets[key] || lists.items[next[key] - 1] <= item);
+    lists.items[next[key]++] = item;
+  });
   return lists;
 }
 

@@ -1,6 +1,7 @@
 #include "Octree/BoxMap.h"
 
 #include "Math/Box.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,6 +29,7 @@ HWY_EXPORT(mapKernel);
 void setShift(float& lower, float& upper, double offset, double thickness) {
   constexpr double kMax = 0x1p125;      // boxes of kLargestFloat stay finite
   constexpr double kFinite = 0x1p1000;  // so is each sum; the error covers what is cut off
+  PALPATE_ASSERT(!(thickness < 0));
   const auto clamped = [](double v, double most) { return std::min(std::max(v, -most), most); };
   const double moved = clamped(offset, kFinite), widened = clamped(thickness, kFinite);
   const double error = (std::abs(moved) + widened) * OutwardRounding::kRelative;

@@ -1,5 +1,7 @@
 #include "Octree/Fit.h"
 
+#include "Core/Assert.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Octree/Fit.cpp"
 #include "Core/Simd.h"
@@ -16,6 +18,7 @@ HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, st
     const OctreeBlock& block = blocks[b];
     OctreeBlock& parent = blocks[blockOf(parents[b])];
     const unsigned slot = slotOf(parents[b]);
+    PALPATE_ASSERT(b == 0 || blockOf(parents[b]) < b);
     FloatBox box;
     for (int k = 0; k < 3; ++k) {
       auto lower = hn::Load(d, block.lower[k]), upper = hn::Load(d, block.upper[k]);

@@ -1,5 +1,7 @@
 #include "Octree/KeySort.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <atomic>
 #include <bit>
@@ -129,6 +131,8 @@ int KeySort::sortByDigits(const KeyRange& range, std::uint32_t* ends,
                           const Threads* threads) const {
   const std::size_t size = range.end - range.begin,
                     bins = std::size_t{1} << Key::kDigitBits * range.digits;
+  PALPATE_ASSERT(range.digits >= 1 && range.digits <= PartEnds::kMaxDigits);
+  PALPATE_ASSERT(range.begin < range.end && range.end <= m_keys.size());
   // One part for each thread; the sorted order does not depend on the number of parts.
   const bool shared = threads && threads->count() > 1 && size >= KeyRange::kShared;
   const std::size_t wanted = shared ? static_cast<std::size_t>(threads->count()) : 1,
@@ -174,6 +178,7 @@ int KeySort::sortByDigits(const KeyRange& range, std::uint32_t* ends,
 
 void KeySort::sortByOneDigit(const KeyRange& range, std::array<std::uint32_t, 9>& begins) const {
   const std::size_t size = range.end - range.begin;
+  PALPATE_ASSERT(range.digits == 1 && size <= KeyRange::kFew);
   std::array<std::uint64_t, KeyRange::kFew> keys;
   loadKeys(range, 0, size, keys.data());
   const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(

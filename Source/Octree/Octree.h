@@ -6,7 +6,7 @@
 #include "Octree/Dops.h"
 #include "Octree/Keys.h"
 #include "Math/Box.h"
-#include "Core/Arena.h"
+#include "Core/ReusableMemory.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
@@ -93,7 +93,7 @@ class BlockPool {
       m_memory.reserve(std::max(blocks, had + std::max(kGrowth, had / 2)) * sizeof(OctreeBlock));
   }
 
-  Arena m_memory;
+  ReusableMemory m_memory;
   std::span<OctreeBlock> m_blocks;
 };
 

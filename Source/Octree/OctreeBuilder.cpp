@@ -1,5 +1,7 @@
 #include "Octree/OctreeBuilder.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -51,6 +53,7 @@ void OctreeBuilder::build(const BoxArrays& boxes, const FloatBox& bounds, double
                           Buffer<std::uint32_t>& order, OctreeNodes& nodes,
                           const Threads& threads) {
   const auto size = static_cast<std::uint32_t>(order.size());
+  PALPATE_ASSERT(keys.size() >= size && boxes.lower[0].size() >= size);
   nodes.rootCube = cubeOf(bounds, bulk);
   const KeySort sort(boxes, keys, nodes.pool.lend<std::uint64_t>(size), m_sharedCounts);
   layOutTop(sort, size, nodes.rootCube, settings, threads);
@@ -114,6 +117,7 @@ void OctreeBuilder::assemble(std::uint32_t size, OctreeNodes& nodes, const Threa
     nodes.pool[blockOf(node)].child[slotOf(node)] =
         child & OctreeBlock::kLeaf ? child : child + nodes.partBlocks[task + 1];
   }
+  PALPATE_ASSERT(std::is_sorted(nodes.groups.begin(), nodes.groups.end()));
 }
 
 /// Computes the place of each entry of the top's groups. A task's entry takes as many places as the

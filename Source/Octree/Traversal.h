@@ -6,6 +6,7 @@
 #include "Octree/Dops.h"
 #include "Octree/Octree.h"
 #include "Math/Box.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 
 #include <algorithm>
@@ -47,7 +48,10 @@ class PairSink {
     }
     return m_pairs.data() + m_size;
   }
-  void advance(std::size_t count) { m_size += count; }
+  void advance(std::size_t count) {
+    PALPATE_ASSERT(count <= kMaxAtOnce && m_size + count <= m_pairs.size());
+    m_size += count;
+  }
   void flush() {
     if (m_function && m_size > 0) {
       m_function(m_context, std::span(m_pairs).first(m_size));
@@ -58,6 +62,7 @@ class PairSink {
   std::span<const ElementPair> kept() const { return std::span(m_pairs).first(m_size); }
   /// Swaps the kept pairs with a buffer, which is filled next time.
   void takeKept(Buffer<ElementPair>& pairs) {
+    PALPATE_ASSERT(!m_function);
     m_pairs.resize(m_size);
     m_pairs.swap(pairs);
     m_size = 0;

@@ -48,6 +48,7 @@ class Walk {
       m_children = block.child[slot];
       m_end = m_blocks[m_children].begin[0];
     }
+    PALPATE_ASSERT(m_begin <= m_end);
     return true;
   }
 
@@ -63,6 +64,7 @@ class Walk {
     PALPATE_ASSERT(hasChildren() && (bits & ~kAllChildren) == 0);
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<unsigned>(std::countr_zero(bits));
+      PALPATE_ASSERT(m_count < kMostWaiting);
       m_waiting[m_count++] = child(slot) | (marks >> slot & 1 ? kMark : 0);
     }
   }
@@ -77,25 +79,58 @@ class Walk {
   std::array<std::uint32_t, kMostWaiting> m_waiting;
 };
 
+/// What waits while octrees are walked nearest first. What is entered after one step of the walk is
+/// sorted, the least bound on top, above what waited before.
+template <class Bound, class Node, std::size_t kMost>
+class NearestStack {
+ public:
+  struct Entry {
+    Bound bound;
+    Node node;
+  };
+
+  void clear() { m_count = m_first = 0; }
+  /// Takes the top entry, of those with a bound of at most `most`. Returns false if there is none.
+  bool next(Bound most, Entry& entry) {
+    while (m_count > 0) {
+      entry = m_waiting[--m_count];
+      if (entry.bound > most) continue;
+      m_first = m_count;
+      return true;
+    }
+    return false;
+  }
+  void enter(const Node& node, Bound bound) {
+    PALPATE_ASSERT(m_count < kMost);
+    std::size_t place = m_count++;
+    for (; place > m_first && m_waiting[place - 1].bound < bound; --place)
+      m_waiting[place] = m_waiting[place - 1];
+    m_waiting[place] = {bound, node};
+  }
+
+ private:
+  std::size_t m_count = 0, m_first = 0;
+  std::array<Entry, kMost> m_waiting;
+};
+
 /// A walk that goes on with the child of the least bound, of those of the node that was entered
 /// last. The search enters children one by one.
 template <class Bound>
 class NearestWalk {
  public:
-  NearestWalk(const Octree& octree, Bound ofRoot) : m_octree(octree) { enter(0, ofRoot); }
+  NearestWalk(const Octree& octree, Bound ofRoot) : m_octree(octree) {
+    PALPATE_ASSERT(octree.isBuilt());
+    enter(0, ofRoot);
+  }
 
   /// Goes on to the next node with a bound of at most `most`.
   bool next(Bound most) {
-    while (m_count > 0) {
-      const Entry& entry = m_waiting[--m_count];
-      if (entry.bound > most) continue;
-      const auto [begin, end] = m_octree.ownRange(entry.node);
-      m_begin = begin, m_end = end;
-      m_children = m_octree.firstChild(entry.node);
-      m_first = m_count;
-      return true;
-    }
-    return false;
+    typename Waiting::Entry entry;
+    if (!m_waiting.next(most, entry)) return false;
+    const auto [begin, end] = m_octree.ownRange(entry.node);
+    m_begin = begin, m_end = end;
+    m_children = m_octree.firstChild(entry.node);
+    return true;
   }
   std::uint32_t begin() const { return m_begin; }
   std::uint32_t end() const { return m_end; }
@@ -105,25 +140,15 @@ class NearestWalk {
     for (unsigned slot = 0; m_children != 0 && slot < kChildren; ++slot)
       if (!m_octree.isEmpty(m_children + slot)) f(m_children + slot);
   }
-  void enter(OctreeNode child, Bound bound) {
-    PALPATE_ASSERT(m_count < kMostWaiting);
-    std::size_t place = m_count++;
-    for (; place > m_first && m_waiting[place - 1].bound < bound; --place)
-      m_waiting[place] = m_waiting[place - 1];
-    m_waiting[place] = {bound, child};
-  }
+  void enter(OctreeNode child, Bound bound) { m_waiting.enter(child, bound); }
 
  private:
-  struct Entry {
-    Bound bound;
-    OctreeNode node;
-  };
+  using Waiting = NearestStack<Bound, OctreeNode, kMostWaiting>;
 
   const Octree& m_octree;
   std::uint32_t m_begin = 0, m_end = 0;
   OctreeNode m_children = 0;
-  std::size_t m_count = 0, m_first = 0;
-  std::array<Entry, kMostWaiting> m_waiting;
+  Waiting m_waiting;
 };
 
 }  // namespace palpate

@@ -1,5 +1,7 @@
 #include "Queries/NearestElements.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -7,20 +9,13 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/NearestElements.cpp"
 #include "Core/Simd.h"
+#include "Math/TriangleLanes.h"
 #include "Octree/BoxLanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
-
-/// The quotient clamped to [0, 1]; 0 if the divisor is not positive.
-template <class D, class V>
-HWY_ATTR HWY_INLINE V clampedQuotient(D d, V dividend, V divisor) {
-  const V quotient = dividend / divisor;
-  const V clamped = hn::Min(hn::Max(quotient, hn::Zero(d)), hn::Set(d, 1.0f));
-  return hn::IfThenElseZero(hn::Gt(divisor, hn::Zero(d)), clamped);
-}
 
 /// Bounds of the distances of up to sixteen triangles from p.
 ///
@@ -38,38 +33,12 @@ HWY_ATTR HWY_INLINE void boundDistances(D d, const FloatPoint& p,
     hn::LoadInterleaved4(d, &corners[corner][i].x, x, y, z, unused);
     return Vector3<V>{x - hn::Set(d, p.x), y - hn::Set(d, p.y), z - hn::Set(d, p.z)};
   };
-  const Vector3<V> a = load(0), b = load(1), c = load(2);
-  const Vector3<V> ab = b - a, ac = c - a, bc = c - b;
-  const V zero = hn::Zero(d);
-  const V ba = hn::Neg(dot(a, ab)), ca = hn::Neg(dot(a, ac)), cb = hn::Neg(dot(b, bc));
-  const V bb = dot(ab, ab), cc = dot(ac, ac), both = dot(ab, ac);
-  // The nearest of the closest points of the three edges, and of the face if it is inside.
-  Vector3<V> q = a + clampedQuotient(d, ba, bb) * ab;
-  V square = dot(q, q);
-  const auto take = [&](const Vector3<V>& other, const auto& valid) HWY_ATTR {
-    const V otherSquare = dot(other, other);
-    const auto nearer = hn::And(valid, hn::Lt(otherSquare, square));
-    square = hn::IfThenElse(nearer, otherSquare, square);
-    q.x = hn::IfThenElse(nearer, other.x, q.x);
-    q.y = hn::IfThenElse(nearer, other.y, q.y);
-    q.z = hn::IfThenElse(nearer, other.z, q.z);
-  };
-  const auto all = hn::Ge(bb, zero);
-  take(a + clampedQuotient(d, ca, cc) * ac, all);
-  take(b + clampedQuotient(d, cb, dot(bc, bc)) * bc, all);
-  const V determinant = bb * cc - both * both;
-  const V s = cc * ba - both * ca, t = bb * ca - both * ba;
-  const auto inside =
-      hn::And(hn::And(hn::Gt(s, zero), hn::Gt(t, zero)), hn::Lt(s + t, determinant));
-  const V inverse = hn::Set(d, 1.0f) / determinant;
-  take(a + (s * inverse) * ab + (t * inverse) * ac, inside);
-
-  const V furthest = hn::Sqrt(hn::Max(dot(a, a), hn::Max(dot(b, b), dot(c, c))));
-  const V error = furthest * hn::Set(d, 0x1p-20f) + hn::Set(d, slack);
-  const V length = hn::Sqrt(square);
-  const V along = hn::Min(dot(a, q), hn::Min(dot(b, q), dot(c, q))) / length;
+  const TrianglesInLanes<D> triangles{load(0), load(1), load(2)};
+  const Vector3<V> q = triangles.nearest();
+  const V length = hn::Sqrt(dot(q, q)), zero = hn::Zero(d);
+  const V error = triangles.furthest() * hn::Set(d, 0x1p-20f) + hn::Set(d, slack);
   // Comparisons with NaN are false: the lower bound is then 0, and the upper one infinite.
-  const V low = along - error, high = length + error;
+  const V low = triangles.leastAlong(q) / length - error, high = length + error;
   hn::Store(hn::IfThenElseZero(hn::Gt(low, zero), low), d, lower);
   hn::Store(
       hn::IfThenElse(hn::Ge(high, zero), high, hn::Set(d, std::numeric_limits<float>::infinity())),
@@ -102,6 +71,7 @@ class Search {
       } else {
         const OctreeBlock& children = blocks[block->child[slot]];
         addElements(begin, children.begin[0]);
+        PALPATE_ASSERT(depth < kMaxLevels);
         setOrder(children, path[depth++]);
       }
       // The nearest sibling that was not visited, on the lowest level that has one within the
@@ -234,6 +204,7 @@ class Search {
     }
     m_kept = std::min(size, m_count);
     std::copy_n(sorted, m_kept, m_uppers);
+    PALPATE_ASSERT(std::is_sorted(m_uppers, m_uppers + m_kept));
     if (m_kept == m_count) lower(std::bit_cast<float>(m_uppers[m_kept - 1] | kNumber));
   }
 
@@ -290,6 +261,7 @@ HWY_EXPORT(searchNearestKernel);
 void searchNearest(const NearestSearch& search, float bound, std::size_t count, void* context,
                    TakeCandidates take) {
   search.octree.requireBuilt();
+  PALPATE_ASSERT(search.slack >= 0 && search.tolerance >= 0);
   HWY_DYNAMIC_DISPATCH(searchNearestKernel)(search, bound, count, context, take);
 }
 

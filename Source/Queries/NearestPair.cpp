@@ -22,9 +22,9 @@ namespace {
 /// After so many tests of pairs for each element, elements that coincide with a lower one are
 /// skipped: they are equally near, and the lower one counts. To find them costs about one test
 /// for each element.
-static constexpr double kTestsPerElement = 4.0;
+constexpr double kTestsPerElement = 4.0;
 /// A row of pairs of boxes costs some hundredth of a test.
-static constexpr double kTestsPerPairs = 0x1p-6;
+constexpr double kTestsPerPairs = 0x1p-6;
 
 /// By place: whether no lower element has the same corners and radii.
 std::vector<std::uint8_t> lowestOfCoincident(const Body& geometry) {

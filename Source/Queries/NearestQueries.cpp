@@ -92,9 +92,7 @@ void SpatialQueries::elementsWithin(GeometryId id, const Eigen::Vector3d& point,
   if (!geometry.tree.ordered().empty())
     findWithin(geometry, point, radius, source->engine() == Engine::BruteForce, scratch->nearShape,
                found);
-  scratch->sort(found);
-  elements.reserve(found.size());  // nothing below throws
-  elements.assign(found.begin(), found.end());
+  scratch->giveSorted(elements);
 }
 
 }  // namespace palpate

@@ -40,9 +40,7 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   if (!geometry.tree.ordered().empty())
     findOverlapping(geometry, shape, pose, source->engine() == Engine::BruteForce, scratch->shapes,
                     scratch->nearShape, found);
-  scratch->sort(found);
-  elements.reserve(found.size());  // nothing below throws
-  elements.assign(found.begin(), found.end());
+  scratch->giveSorted(elements);
 }
 
 void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,

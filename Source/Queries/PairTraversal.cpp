@@ -1,10 +1,11 @@
 #include "Queries/PairTraversal.h"
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
-#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/PairTraversal.cpp"
@@ -57,6 +58,7 @@ class ElementHeights {
   float operator[](std::uint32_t place) { return at(place)[0]; }
   /// Those of `count` elements from a place on, at most NearElements::kSide.
   void copy(std::uint32_t place, std::uint32_t count, float* out) {
+    PALPATE_ASSERT(count <= NearElements::kSide);
     for (std::uint32_t i = 0; i < NearElements::kSide; ++i)
       out[i] = i < count ? (*this)[place + i] : std::numeric_limits<float>::infinity();
   }
@@ -101,27 +103,30 @@ class PairDescent {
         m_b(b, scratch.b),
         m_context(context),
         m_test(test),
-        m_entries(scratch.entries) {}
+        m_waiting(scratch.waiting) {}
 
   HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
-    push(0.0f, {0, static_cast<std::uint32_t>(m_a.side().octree.size())},
-         {0, static_cast<std::uint32_t>(m_b.side().octree.size())});
-    while (m_count > 0) {
-      const Entry entry = m_entries[--m_count];
-      if (entry.square > m_limit) continue;
-      const float lowestA = lowestOf(m_a, entry.a), lowestB = lowestOf(m_b, entry.b);
+    m_waiting.clear();
+    m_waiting.enter({{0, static_cast<std::uint32_t>(m_a.side().octree.size())},
+                     {0, static_cast<std::uint32_t>(m_b.side().octree.size())}},
+                    0.0f);
+    for (decltype(PairScratch::waiting)::Entry entry; m_waiting.next(m_limit, entry);) {
+      const auto& [a, b] = entry.node;
+      const float lowestA = lowestOf(m_a, a), lowestB = lowestOf(m_b, b);
       if (lowestA + lowestB > m_lowest) continue;
-      const FloatBox boxA = boxOf(m_a.side(), entry.a), boxB = boxOf(m_b.side(), entry.b);
-      const OctreeNode childA = childOf(m_a.side(), entry.a), childB = childOf(m_b.side(), entry.b);
+      const FloatBox boxA = boxOf(m_a.side(), a), boxB = boxOf(m_b.side(), b);
+      const OctreeNode childA = childOf(m_a.side(), a), childB = childOf(m_b.side(), b);
       if (childA != 0 && (childB == 0 || sizeOf(boxA) >= sizeOf(boxB)))
-        expand(m_a, entry.a, childA, boxB, lowestB, entry.square,
-               [&](float square, const Subtree& part) { push(square, part, entry.b); });
+        expand(m_a, a, childA, boxB, lowestB, entry.bound, [&](const Subtree& part, float square) {
+          m_waiting.enter({part, entry.node.b}, square);
+        });
       else if (childB != 0)
-        expand(m_b, entry.b, childB, boxA, lowestA, entry.square,
-               [&](float square, const Subtree& part) { push(square, entry.a, part); });
+        expand(m_b, b, childB, boxA, lowestA, entry.bound, [&](const Subtree& part, float square) {
+          m_waiting.enter({entry.node.a, part}, square);
+        });
       else
-        testElements(entry.a, entry.b, boxB);
+        testElements(a, b, boxB);
     }
   }
 
@@ -132,7 +137,6 @@ class PairDescent {
   /// Heights are compared for subtrees of at most so many elements.
   static constexpr std::uint32_t kFew = 128;
   using Subtree = PairScratch::Subtree;
-  using Entry = PairScratch::Entry;
 
   void setBound(const PairBound& bound) {
     // Computed squares are off by less than 2^-20 of themselves.
@@ -141,9 +145,6 @@ class PairDescent {
     m_lowest = bound.heights;
     m_a.setDirection(bound.alongA);
     m_b.setDirection(bound.alongB);
-  }
-  void push(float square, const Subtree& a, const Subtree& b) {
-    m_entries[m_count++] = {square, a, b};
   }
   /// Whether heights exclude any elements.
   bool hasHeights() const { return m_lowest < std::numeric_limits<float>::infinity(); }
@@ -158,7 +159,7 @@ class PairDescent {
   }
   static std::uint32_t beginOf(const PairSide& side, const Subtree& part) {
     const OctreeNode node = part.node & ~kOwn;
-    return side.octree.blocks()[node >> 3].begin[node & 7];
+    return side.octree.blocks()[blockOf(node)].begin[slotOf(node)];
   }
   static OctreeNode childOf(const PairSide& side, const Subtree& part) {
     return part.node & kOwn ? 0 : side.octree.firstChild(part.node);
@@ -171,14 +172,13 @@ class PairDescent {
            (box.upper[2] - box.lower[2]);
   }
 
-  /// Pushes the node's own elements and its children near the box, the nearest last.
-  template <class Push>
+  /// Enters the node's own elements and its children near the box.
+  template <class Enter>
   HWY_ATTR HWY_INLINE void expand(const ElementHeights& heights, const Subtree& part,
                                   OctreeNode child, const FloatBox& other, float lowest,
-                                  float square, Push&& push) {
+                                  float square, Enter&& enter) {
     const PairSide& side = heights.side();
-    const std::size_t first = m_count;
-    const OctreeBlock& block = side.octree.blocks()[child >> 3];
+    const OctreeBlock& block = side.octree.blocks()[blockOf(child)];
     alignas(64) float squares[8];
     std::uint32_t bits = 0;
     const NodeTag d;
@@ -197,12 +197,10 @@ class PairDescent {
     for (; bits; bits &= bits - 1) {
       const auto slot = static_cast<std::uint32_t>(std::countr_zero(bits));
       if (block.isEmpty(slot)) continue;
-      push(squares[slot], Subtree{child + slot, slot < 7 ? block.begin[slot + 1] : part.end});
-      for (std::size_t i = m_count - 1; i > first && m_entries[i - 1].square < squares[slot]; --i)
-        std::swap(m_entries[i], m_entries[i - 1]);
+      enter({child + slot, slot < 7 ? block.begin[slot + 1] : part.end}, squares[slot]);
     }
     const auto [begin, end] = side.octree.ownRange(part.node);
-    if (begin < end) push(square, Subtree{part.node | kOwn, end});
+    if (begin < end) enter({part.node | kOwn, end}, square);
   }
 
   /// Boxes of elements, in the common floats.
@@ -279,8 +277,7 @@ class PairDescent {
   const TestElements m_test;
   float m_limit = 0;   ///< of computed squared distances of boxes
   float m_lowest = 0;  ///< of computed sums of heights
-  std::size_t m_count = 0;
-  std::array<Entry, 1024>& m_entries;
+  decltype(PairScratch::waiting)& m_waiting;
 };
 
 HWY_ATTR void searchPairsKernel(const PairSide& a, const PairSide& b, const PairBound& bound,
@@ -300,6 +297,7 @@ void searchPairs(const PairSide& a, const PairSide& b, const PairBound& bound, P
                  void* context, TestElements test) {
   a.octree.requireBuilt();
   b.octree.requireBuilt();
+  PALPATE_ASSERT(bound.distance >= 0);
   HWY_DYNAMIC_DISPATCH(searchPairsKernel)(a, b, bound, scratch, context, test);
 }
 

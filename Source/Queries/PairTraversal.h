@@ -3,6 +3,7 @@
 #include "Bodies/Body.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Octree.h"
+#include "Octree/Walk.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
 
@@ -55,14 +56,14 @@ struct PairScratch {
     OctreeNode node;
     std::uint32_t end;
   };
-  struct Entry {
-    float square;
+  struct Subtrees {
     Subtree a, b;
   };
 
   Heights a, b;
-  /// All siblings remain on each level of each octree.
-  std::array<Entry, 2 * kChildren * kMaxLevels + 48> entries;
+  /// Squared distances of boxes. On each level of each octree, all siblings and the own elements of
+  /// their parent wait.
+  NearestStack<float, Subtrees, 2 * (kChildren * kMaxLevels + 1)> waiting;
 };
 
 /// Tests elements. Returns the bound for those that follow.

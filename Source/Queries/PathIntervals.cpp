@@ -36,6 +36,7 @@ namespace {
 
 /// Appends a part, or joins it to the last one if they touch.
 void append(const PathPart& part, std::vector<PathPart>& parts) {
+  PALPATE_ASSERT(part.enter <= part.leave);
   if (parts.empty() || part.enter > parts.back().leave) return parts.push_back(part);
   PathPart& last = parts.back();
   if (part.leave > last.leave) {

@@ -1,11 +1,13 @@
 #include "Queries/PointDistances.h"
 
 #include "Math/ClosestPoint.h"
+#include "Math/DistanceBounds.h"
 #include "Math/ExactClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/VertexTriangleDistances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -29,7 +31,7 @@ NearestSearch searchOf(const Body& geometry, const Eigen::Vector3d& point) {
 }
 
 /// The vertices of the feature that holds a closest point, ascending; unused places hold the last.
-std::array<std::uint32_t, 3> featureOf(const Triangle& corners, TriangleFeature feature) {
+std::array<std::uint32_t, 3> verticesOf(const Triangle& corners, TriangleFeature feature) {
   const auto index = static_cast<std::size_t>(feature);
   std::array<std::uint32_t, 3> vertices = corners;
   if (index < 3) vertices.fill(corners[index]);
@@ -80,18 +82,24 @@ PointDistances::Near PointDistances::at(std::uint32_t place) const {
                 std::max({largest(a), largest(b), largest(c)}));
 }
 
+TriangleBatch PointDistances::batchOf(std::span<const std::uint32_t> places) const {
+  PALPATE_ASSERT(places.size() <= TriangleBatch::kSize);
+  const Positions& now = m_geometry.mesh.now;
+  TriangleBatch batch;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto& [a, b, c] = m_geometry.tree.ordered()[places[i]];
+    batch.set(i, now[a], now[b], now[c]);
+  }
+  return batch;
+}
+
 template <class F>
 void PointDistances::forEach(std::span<const std::uint32_t> places, F&& f) const {
   if (places.size() <= 2) {  // a few are faster one by one
     for (const std::uint32_t place : places) f(at(place));
     return;
   }
-  const Positions& now = m_geometry.mesh.now;
-  TriangleBatch batch;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const Triangle& corners = m_geometry.tree.ordered()[places[i]];
-    batch.set(i, now[corners[0]], now[corners[1]], now[corners[2]]);
-  }
+  const TriangleBatch batch = batchOf(places);
   const VertexTriangleDistances distances(m_point, batch, places.size());
   for (std::size_t i = 0; i < places.size(); ++i)
     f(nearOf(places[i], distances[i], distances.reach(i)));
@@ -103,7 +111,7 @@ bool PointDistances::isNearer(const Near& one, const Near& two) const {
   const Triangle &first = m_geometry.tree.ordered()[one.place],
                  &second = m_geometry.tree.ordered()[two.place];
   if (!isTapered(first) && !isTapered(second) &&
-      featureOf(first, one.closest.feature) == featureOf(second, two.closest.feature))
+      verticesOf(first, one.closest.feature) == verticesOf(second, two.closest.feature))
     return one.element < two.element;
   const Positions& now = m_geometry.mesh.now;
   const Eigen::Vector3d corners[] = {now[first[0]],  now[first[1]],  now[first[2]],
@@ -152,25 +160,31 @@ float PointDistances::boundOf(double distance) const {
                              m_geometry.tree.frame().scale * (1 + kNearestError));
 }
 
+template <class Bound, class Test>
+void PointDistances::forCandidates(std::size_t count, Bound&& bound, Test&& test) const {
+  forNearCandidates(m_search, bound(), count, [&](const NearCandidate* all, std::size_t size) {
+    std::array<std::uint32_t, TriangleBatch::kSize> places;
+    for (std::size_t i = 0; i < size;) {
+      const float most = bound() + m_search.tolerance;
+      std::size_t some = 0;
+      for (; i < size && some < places.size(); ++i)
+        if (!(all[i].lower > most)) places[some++] = all[i].place;
+      test(std::span<const std::uint32_t>(places).first(some));
+    }
+    return bound();
+  });
+}
+
 template <class F>
 void PointDistances::search(double most, std::size_t count, F&& f) const {
   const auto take = [&](const Near& near) { most = f(near, most); };
-  if (!m_bruteForce) {
-    forNearCandidates(m_search, boundOf(most), count,
-                      [&](const NearCandidate* all, std::size_t size) {
-                        std::array<std::uint32_t, TriangleBatch::kSize> places;
-                        for (std::size_t i = 0; i < size;) {
-                          const float bound = boundOf(most) + m_search.tolerance;
-                          std::size_t some = 0;
-                          for (; i < size && some < places.size(); ++i)
-                            if (!(all[i].lower > bound)) places[some++] = all[i].place;
-                          forEach(std::span(places).first(some), take);
-                        }
-                        return boundOf(most);
-                      });
-    return;
-  }
-  for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place) take(at(place));
+  if (m_bruteForce)
+    for (std::uint32_t place = 0; place < m_geometry.tree.ordered().size(); ++place)
+      take(at(place));
+  else
+    forCandidates(
+        count, [&] { return boundOf(most); },
+        [&](std::span<const std::uint32_t> places) { forEach(places, take); });
 }
 
 std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
@@ -187,6 +201,30 @@ std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
     forEach({&likely, 1}, [&](const Near& near) { most = take(near, most); });
   search(most, 1, take);
   return best;
+}
+
+PointDistances::RoughlyNear PointDistances::roughlyNearest(
+    double tolerance, std::span<const std::uint32_t> likely) const {
+  PALPATE_ASSERT(m_geometry.mesh.radii.empty() && !m_bruteForce);
+  RoughlyNear best{kInfinity, 0};
+  double lower = kInfinity, upper = kInfinity;
+  const auto test = [&](std::span<const std::uint32_t> places) {
+    if (places.empty()) return;
+    const DistanceBounds bounds(m_point, batchOf(places), places.size());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      lower = std::min(lower, bounds.lower[i]);
+      if (!(bounds.distance[i] < best.distance)) continue;
+      best = {bounds.distance[i], places[i]};
+      upper = bounds.distance[i] + bounds.error[i];
+    }
+  };
+  test(likely);
+  forCandidates(
+      1, [&] { return boundOf(upper); }, test);
+  if (best.distance - lower <= tolerance) return best;
+  const auto exact = nearest(kInfinity, best.place);
+  PALPATE_ASSERT(exact.has_value());
+  return {exact->distance, exact->place};
 }
 
 // Sums of magnitudes are lengths or more, and do not underflow.
@@ -209,6 +247,7 @@ void PointDistances::Last::set(const PointDistances& distances, const Near& near
 }
 
 void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const {
+  PALPATE_ASSERT(k > 0);
   out.clear();
   bool isHeap = false;  // made when more than k elements come
   const auto isNearerThan = [&](const Near& a, const Near& b) { return isNearer(a, b); };
@@ -233,6 +272,7 @@ void PointDistances::nearest(std::size_t k, double maxDistance, std::vector<Near
 }
 
 void PointDistances::within(double distance, std::vector<std::uint32_t>& elements) const {
+  PALPATE_ASSERT(distance >= 0);
   search(distance, 0, [&](const Near& near, double most) {
     if (isWithin(near, distance)) elements.push_back(near.element);
     return most;

@@ -5,6 +5,7 @@
 
 #include "Queries/NearestElements.h"
 #include "Bodies/OctreeFrame.h"
+#include "Math/VertexTriangleDistances.h"
 #include "Core/Threads.h"
 
 #include <Eigen/Core>
@@ -41,6 +42,15 @@ class PointDistances {
   /// that is likely near; any place is valid. bound: L; some element is at most that far away.
   std::optional<Near> nearest(double maxDistance, std::uint32_t likely,
                               double bound = kInfinity) const;
+  /// An element, and about its distance in L.
+  struct RoughlyNear {
+    double distance;
+    std::uint32_t place;
+  };
+  /// The nearest triangle of a mesh without radii, for distances that need not be exact. They are
+  /// off by at most `tolerance`, in L, or by 16 u of the largest coordinate difference. likely:
+  /// places of at most eight triangles that are likely near.
+  RoughlyNear roughlyNearest(double tolerance, std::span<const std::uint32_t> likely) const;
   /// The k nearest elements, or fewer, in the order of isNearer(). None is further away than
   /// maxDistance. out: replaced.
   void nearest(std::size_t k, double maxDistance, std::vector<Near>& out) const;
@@ -69,6 +79,11 @@ class PointDistances {
   /// returns such a bound. count: how many nearest elements are wanted; 0 for all.
   template <class F>
   void search(double most, std::size_t count, F&& f) const;
+  /// Calls test(places), for up to TriangleBatch::kSize elements each, until all have been tested
+  /// that may be within bound(), in the octree's floats. count: as above.
+  template <class Bound, class Test>
+  void forCandidates(std::size_t count, Bound&& bound, Test&& test) const;
+  TriangleBatch batchOf(std::span<const std::uint32_t> places) const;
   /// Up to TriangleBatch::kSize elements, side by side. f(near): see at().
   template <class F>
   void forEach(std::span<const std::uint32_t> places, F&& f) const;

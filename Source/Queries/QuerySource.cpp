@@ -6,6 +6,7 @@
 #include "Queries/Embedding.h"
 #include "Mesh/Rotation.h"
 #include "Math/Range.h"
+#include "Core/Assert.h"
 #include "Core/Text.h"
 
 #include <algorithm>
@@ -62,7 +63,10 @@ void SpatialQueries::Source::Pool::release() {
   m_free.clear();
 }
 
-void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) {
+namespace {
+
+/// Sorts different numbers: as the bits of a field if they lie close together.
+void sort(std::vector<std::uint32_t>& numbers, std::vector<std::uint64_t>& bits) {
   if (numbers.empty()) return;
   const auto [least, most] = std::minmax_element(numbers.begin(), numbers.end());
   const std::size_t first = *least / 64, words = *most / 64 - first + 1;
@@ -77,6 +81,15 @@ void SpatialQueries::Source::Scratch::sort(std::vector<std::uint32_t>& numbers) 
     for (std::uint64_t word = bits[w]; word; word &= word - 1)
       numbers[count++] = static_cast<std::uint32_t>((first + w) * 64) +
                          static_cast<std::uint32_t>(std::countr_zero(word));
+  PALPATE_ASSERT(count == numbers.size());
+}
+
+}  // namespace
+
+void SpatialQueries::Source::Scratch::giveSorted(std::vector<std::uint32_t>& out) {
+  sort(elements, bits);
+  out.reserve(elements.size());  // nothing below throws
+  out.assign(elements.begin(), elements.end());
 }
 
 void SpatialQueries::Source::prepareInside(const Body& body, const InsideSettings& settings) {

@@ -54,8 +54,9 @@ class SpatialQueries::Source {
     PenetrationScratch penetration;
     std::vector<std::uint64_t> bits;
 
-    /// Sorts different numbers: as bits of a field if they lie close together.
-    void sort(std::vector<std::uint32_t>& numbers);
+    /// Replaces `out` by `elements`, which are different numbers, in ascending order. If it throws,
+    /// `out` is as before.
+    void giveSorted(std::vector<std::uint32_t>& out);
   };
   /// What all sources of one owner share: the scratch that no call uses.
   class Pool {

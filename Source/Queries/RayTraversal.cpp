@@ -1,6 +1,7 @@
 #include "Queries/RayTraversal.h"
 
 #include "Octree/Walk.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -67,6 +68,7 @@ class RaySearch {
   /// Begins at the root. `task` must stay until the end.
   HWY_ATTR HWY_INLINE Visit start(const Octree& octree, const RayTask& task, Cursor& at) {
     m_blocks = octree.blocks();
+    PALPATE_ASSERT(task.ray.slack >= 0 && task.ray.tMax >= 0);
     m_task = &task;
     m_boxTest = BoxTest(task.ray);
     m_tMax = task.ray.tMax;
@@ -283,6 +285,7 @@ void traverseRay(const Octree& octree, const RayTask& task) {
 void traverseRays(const Octree& octree, std::span<const RayTask> tasks, void* context,
                   NextRay next) {
   octree.requireBuilt();
+  PALPATE_ASSERT(tasks.size() <= kRaysInFlight);
   HWY_DYNAMIC_DISPATCH(traverseRaysKernel)(octree, tasks, context, next);
 }
 

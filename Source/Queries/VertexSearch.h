@@ -2,8 +2,10 @@
 
 #include "Bodies/OctreeFrame.h"
 #include "Octree/PointQueries.h"
+#include "Core/Assert.h"
 #include "Core/Threads.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -60,6 +62,9 @@ void searchVertices(const MeshTopology& topology, const Threads& threads,
   out.clear();
   for (std::size_t i = 0; i < count; ++i)
     out.insert(out.end(), parts[i].found.begin(), parts[i].found.end());
+  PALPATE_ASSERT(std::is_sorted(out.begin(), out.end(), [](const Result& l, const Result& r) {
+    return l.vertex < r.vertex;
+  }));
 }
 
 }  // namespace palpate

@@ -1,6 +1,4 @@
 // No include guard: for files with SIMD code, after Core/Simd.h.
-#include "Math/Tolerances.h"
-
 #include <cstddef>
 
 HWY_BEFORE_NAMESPACE();
@@ -8,19 +6,18 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
-using V = hn::Vec<SetTag>;
-using Vectors = Vector3<V>;
-using Mask = hn::Mask<SetTag>;
-
-/// Triangles relative to a point.
+/// Triangles relative to a point, as many as D has lanes.
+template <class D>
 struct TrianglesInLanes {
+  using V = hn::Vec<D>;
+  using Vectors = Vector3<V>;
+
   Vectors a, b, c;
 
   /// corners: corner, axis, triangle.
   HWY_ATTR HWY_INLINE static TrianglesInLanes load(const double (&corners)[3][3][8],
                                                    std::size_t i) {
-    const SetTag d;
+    const D d;
     const auto corner = [&](int k) HWY_ATTR {
       return Vectors{hn::Load(d, &corners[k][0][i]), hn::Load(d, &corners[k][1][i]),
                      hn::Load(d, &corners[k][2][i])};
@@ -28,14 +25,21 @@ struct TrianglesInLanes {
     return {corner(0), corner(1), corner(2)};
   }
 
-  /// The largest component along w.
+  /// The largest and the least component along w.
   HWY_ATTR HWY_INLINE V along(const Vectors& w) const {
     return hn::Max(dot(w, a), hn::Max(dot(w, b), dot(w, c)));
   }
+  HWY_ATTR HWY_INLINE V leastAlong(const Vectors& w) const {
+    return hn::Min(dot(a, w), hn::Min(dot(b, w), dot(c, w)));
+  }
+  /// The distance of the furthest corner.
+  HWY_ATTR HWY_INLINE V furthest() const {
+    return hn::Sqrt(hn::Max(dot(a, a), hn::Max(dot(b, b), dot(c, c))));
+  }
   /// A point of the triangle near the one closest to the point, however rounded.
   HWY_ATTR HWY_INLINE Vectors nearest() const {
-    const SetTag d;
-    const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
+    const D d;
+    const V zero = hn::Zero(d), one = hn::Set(d, hn::TFromD<D>(1));
     const auto clamped = [&](V dividend, V divisor) HWY_ATTR {
       return hn::IfThenElseZero(hn::Gt(divisor, zero),
                                 hn::Min(hn::Max(dividend / divisor, zero), one));
@@ -46,14 +50,14 @@ struct TrianglesInLanes {
     // The nearest of the closest points of the three edges, and of the face if it is inside.
     Vectors q = a + clamped(ba, bb) * ab;
     V square = dot(q, q);
-    const auto take = [&](const Vectors& other, const Mask& valid) HWY_ATTR {
+    const auto take = [&](const Vectors& other, const hn::Mask<D>& valid) HWY_ATTR {
       const V otherSquare = dot(other, other);
-      const Mask nearer = hn::And(valid, hn::Lt(otherSquare, square));
+      const auto nearer = hn::And(valid, hn::Lt(otherSquare, square));
       square = hn::IfThenElse(nearer, otherSquare, square);
       q = {hn::IfThenElse(nearer, other.x, q.x), hn::IfThenElse(nearer, other.y, q.y),
            hn::IfThenElse(nearer, other.z, q.z)};
     };
-    const Mask all = hn::Ge(bb, zero);
+    const auto all = hn::Ge(bb, zero);
     take(a + clamped(ca, cc) * ac, all);
     take(b + clamped(cb, dot(bc, bc)) * bc, all);
     const V determinant = bb * cc - both * both;

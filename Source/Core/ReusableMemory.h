@@ -18,15 +18,15 @@ namespace palpate {
 ///
 /// start() ends the lifetime of all elements and begins that of others in the same bytes. Spans
 /// that start() returned before must not be used afterwards.
-class Arena {
+class ReusableMemory {
  public:
   static constexpr std::size_t kAlignment = 64;
 
-  Arena() = default;
-  Arena(const Arena&) = delete;
-  Arena& operator=(const Arena&) = delete;
+  ReusableMemory() = default;
+  ReusableMemory(const ReusableMemory&) = delete;
+  ReusableMemory& operator=(const ReusableMemory&) = delete;
 
-  ~Arena() { release(); }
+  ~ReusableMemory() { release(); }
 
   std::size_t bytes() const { return m_bytes; }
   /// Keeps the elements that start() returned last, and no more memory than they need. Returns
@@ -34,7 +34,7 @@ class Arena {
   template <class T>
   std::span<T> shrink(std::span<T> elements) {
     if (elements.size_bytes() == m_bytes) return elements;
-    Arena smaller;
+    ReusableMemory smaller;
     try {
       const std::span<T> copy = smaller.start<T>(elements.size());
       std::copy(elements.begin(), elements.end(), copy.begin());
