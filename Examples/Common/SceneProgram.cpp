@@ -6,8 +6,10 @@
 #include "WriteFile.h"
 
 #include <palpate/Error.h>
+#ifdef PALPATE_HAS_MESH_FILES
+#include <palpate/MeshFiles.h>
+#endif
 #ifdef PALPATE_HAS_VTK
-#include <palpate/vtk/MeshFile.h>
 #include <palpate/vtk/Window.h>
 #endif
 
@@ -343,12 +345,13 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
 }
 
 SceneMesh readMesh([[maybe_unused]] const std::filesystem::path& path) {
-#ifdef PALPATE_HAS_VTK
-  vtk::MeshFile file = vtk::readTriangleMesh(path);
+#ifdef PALPATE_HAS_MESH_FILES
+  MeshArrays file = readMeshFile(path, {.weldDistance = 0.0});
   return {std::move(file.positions), std::move(file.triangles)};
 #else
-  throw Error(ErrorCode::NotAvailable,
-              "This program was built without VTK and cannot read \"" + path.string() + "\".");
+  throw Error(
+      ErrorCode::NotAvailable,
+      "This program was built without mesh files and cannot read \"" + path.string() + "\".");
 #endif
 }
 

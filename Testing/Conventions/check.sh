@@ -36,6 +36,7 @@ allowedIn() {
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
     Vtk | Fcl) echo "$1/" ;;
   esac
 }
@@ -86,8 +87,8 @@ checkPlaces() {
 # that these and the standard library do not.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
-  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/Vtk/Public
-    -ISource/Adapters/Fcl/Public -isystem "$2") header include
+  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/MeshFiles/Public
+    -ISource/Adapters/Vtk/Public -ISource/Adapters/Fcl/Public -isystem "$2") header include
   # The files that a compilation, with these options, reads.
   reached() { "${compile[@]}" -fsyntax-only -MD -MF /dev/stdout "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
   local allowed files
@@ -100,7 +101,7 @@ checkPublicHeaders() {
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
     while read -r include; do fault "$header reaches $include"; done < <(
-      comm -13 <(echo "$allowed") <(echo "$files") | grep -vE '^(Source/((Adapters/(Vtk|Fcl)|Simplify)/)?Public/palpate/|/dev/null)')
+      comm -13 <(echo "$allowed") <(echo "$files") | grep -vE '^(Source/((Adapters/(MeshFiles|Vtk|Fcl)|Simplify)/)?Public/palpate/|/dev/null)')
   done
 }
 

@@ -8,7 +8,7 @@ trap 'rm -rf "$tree"' EXIT
 missed=0
 
 # A tree with every module, without faults.
-for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/Vtk Adapters/Fcl \
+for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/MeshFiles Adapters/Vtk Adapters/Fcl \
   Public/palpate Adapters/Vtk/Public/palpate/vtk; do
   mkdir -p "$tree/Source/$module"
 done
@@ -42,6 +42,7 @@ plant Includes Source/Octree/A.cpp '#include "Mesh/TriangleMesh.h"\n'
 plant Includes Source/NarrowPhase/A.h '#include "Octree/Pool.h"\n'
 plant Includes Source/Mesh/A.h '#include "Shapes/Shape.h"\n'
 plant Includes Source/Shapes/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
+plant Includes Source/Adapters/MeshFiles/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Adapters/Vtk/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Public/palpate/A.h '#include "Core/Buffer.h"\n'
 plant Places Source/Mesh/A.cpp '#include <tbb/parallel_for.h>\n'

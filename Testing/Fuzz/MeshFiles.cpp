@@ -1,45 +1,77 @@
 #include "Limits.h"
 
-#include "Vtk/MeshFile.h"
+#include "MeshFiles/Formats.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace palpate::fuzz {
 
 namespace {
 
-void expectValid(const vtk::MeshFile& mesh) {
-  EXPECT_FALSE(mesh.triangles.empty());
+using Reader = void (*)(files::FileText, files::MeshBuilder&);
+using Writer = std::string (*)(const MeshArrays&, const MeshWriteSettings&);
+
+void expectValid(const MeshArrays& mesh) {
   EXPECT_TRUE(std::ranges::all_of(mesh.positions, [](const auto& p) { return p.allFinite(); }));
-  EXPECT_TRUE(std::ranges::all_of(mesh.triangles, [&](const Triangle& triangle) {
-    return std::ranges::max(triangle) < mesh.positions.size();
-  }));
+  const auto expectIndices = [&](const auto& elements) {
+    EXPECT_TRUE(std::ranges::all_of(elements, [&](const auto& element) {
+      return std::ranges::max(element) < mesh.positions.size();
+    }));
+  };
+  expectIndices(mesh.triangles);
+  expectIndices(mesh.tetrahedra);
+  expectIndices(mesh.segments);
+  expectIndices(files::pointElements(mesh));
 }
 
-/// Reads a file's content as readTriangleMesh() does. decoded: bytes at most that it stands for.
-void read(vtk::Polygons (*reader)(std::string_view), Bytes bytes, std::size_t decoded) {
+/// What is read can be written, and then reads the same.
+void expectRoundTrip(const MeshArrays& mesh, Reader reader, Writer writer) {
+  for (const bool isBinary : {false, true}) {
+    const MeshArrays again = files::meshOf(reader, writer(mesh, {.binary = isBinary}));
+    EXPECT_EQ(again.positions, mesh.positions);
+    EXPECT_EQ(again.triangles, mesh.triangles);
+    EXPECT_EQ(again.tetrahedra, mesh.tetrahedra);
+    EXPECT_EQ(again.segments, mesh.segments);
+    EXPECT_EQ(again.points, mesh.points);
+  }
+}
+
+/// Reads a file's content as readMeshFile() does. decoded: bytes at most that it stands for.
+void read(Reader reader, Writer writer, Bytes bytes, std::size_t decoded) {
+  std::optional<MeshArrays> mesh;
   withinLimits(decoded, [&] {
     try {
-      expectValid(reader(textOf(bytes)).mesh());
-    } catch (const vtk::FileFault& fault) {
+      mesh = files::meshOf(reader, textOf(bytes));
+    } catch (const files::FileFault& fault) {
       expectShort(fault.reason);
     }
   });
+  if (!mesh) return;
+  expectValid(*mesh);
+  if (writer) expectRoundTrip(*mesh, reader, writer);
+}
+
+void readXml(Reader reader, Writer writer, Bytes bytes) {
+  constexpr std::size_t kMostCompression = 1032;  // of ZLib
+  const bool isCompressed = textOf(bytes).find("compressor=") != std::string_view::npos;
+  read(reader, writer, bytes, (isCompressed ? kMostCompression : 1) * bytes.size());
 }
 
 }  // namespace
 
-void objFile(Bytes bytes) { read(vtk::readObj, bytes, bytes.size()); }
-void stlFile(Bytes bytes) { read(vtk::readStl, bytes, bytes.size()); }
-void plyFile(Bytes bytes) { read(vtk::readPly, bytes, bytes.size()); }
-void vtkFile(Bytes bytes) { read(vtk::readLegacyVtk, bytes, bytes.size()); }
-
-void vtpFile(Bytes bytes) {
-  constexpr std::size_t kMostCompression = 1032;  // of Zlib
-  const bool isCompressed = textOf(bytes).find("compressor=") != std::string_view::npos;
-  read(vtk::readVtp, bytes, (isCompressed ? kMostCompression : 1) * bytes.size());
+void objFile(Bytes bytes) { read(files::readObj, files::writeObj, bytes, bytes.size()); }
+// Vertices of an STL file that is written are those of its facets.
+void stlFile(Bytes bytes) { read(files::readStl, nullptr, bytes, bytes.size()); }
+void plyFile(Bytes bytes) { read(files::readPly, files::writePly, bytes, bytes.size()); }
+void vtkFile(Bytes bytes) {
+  read(files::readLegacyVtk, files::writeLegacyVtk, bytes, bytes.size());
 }
+void vtpFile(Bytes bytes) { readXml(files::readVtp, files::writeVtp, bytes); }
+void vtuFile(Bytes bytes) { readXml(files::readVtu, files::writeVtu, bytes); }
+void gmshFile(Bytes bytes) { read(files::readGmsh, files::writeGmsh, bytes, bytes.size()); }
+void meditFile(Bytes bytes) { read(files::readMedit, files::writeMedit, bytes, bytes.size()); }
 
 }  // namespace palpate::fuzz

@@ -17,6 +17,9 @@ void stlFile(Bytes);
 void plyFile(Bytes);
 void vtkFile(Bytes);
 void vtpFile(Bytes);
+void vtuFile(Bytes);
+void gmshFile(Bytes);
+void meditFile(Bytes);
 void captureFile(Bytes);
 void fieldFile(Bytes);
 void distance(Bytes);
@@ -34,6 +37,9 @@ inline constexpr std::array kTargets{Target{"Obj", objFile},
                                      Target{"Ply", plyFile},
                                      Target{"Vtk", vtkFile},
                                      Target{"Vtp", vtpFile},
+                                     Target{"Vtu", vtuFile},
+                                     Target{"Gmsh", gmshFile},
+                                     Target{"Medit", meditFile},
                                      Target{"Capture", captureFile},
                                      Target{"Field", fieldFile},
                                      Target{"Distance", distance},

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <palpate/Error.h>
+#include <palpate/MeshFiles.h>
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+namespace palpate::testing {
+
+/// A value's bytes in a file.
+template <class T>
+std::string bytes(T value, bool bigEndian = false) {
+  std::string text(sizeof value, '\0');
+  std::memcpy(text.data(), &value, sizeof value);
+  const bool isReversed = bigEndian != (std::endian::native == std::endian::big);
+  return isReversed ? std::string(text.rbegin(), text.rend()) : text;
+}
+
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.rfind(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+/// A folder for the files of one test.
+class MeshFileFixture : public ::testing::Test {
+ protected:
+  MeshFileFixture()
+      : folder(std::filesystem::path(::testing::TempDir()) /
+               (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
+                ".mesh-files")) {
+    std::filesystem::create_directories(folder);
+  }
+  ~MeshFileFixture() override { std::filesystem::remove_all(folder); }
+
+  std::filesystem::path write(const std::string& name, const std::string& content) const {
+    std::filesystem::remove(folder / name);  // a file truncated and written again goes to the disk
+    std::ofstream(folder / name, std::ios::binary) << content;
+    return folder / name;
+  }
+
+  static std::string contentOf(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  MeshArrays read(const std::string& name, const std::string& content,
+                  const MeshReadSettings& settings = {}) const {
+    return readMeshFile(write(name, content), settings);
+  }
+
+  /// The message of the error, which must name the file. Empty if the file is read.
+  std::string refusal(const std::filesystem::path& path) const {
+    try {
+      readMeshFile(path);
+      return "";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::File);
+      EXPECT_NE(std::string(error.what()).find(path.string()), std::string::npos) << error.what();
+      return error.what();
+    }
+  }
+  std::string refusal(const std::string& name, const std::string& content) const {
+    return refusal(write(name, content));
+  }
+
+  void expectRefused(const std::string& name, const std::string& content,
+                     const std::string& reason) const {
+    EXPECT_NE(refusal(name, content).find(reason), std::string::npos)
+        << name << ": expected \"" << reason << "\" in \"" << refusal(name, content) << "\"";
+  }
+
+  std::filesystem::path folder;
+};
+
+}  // namespace palpate::testing
