@@ -346,7 +346,9 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
 
 SceneMesh readMesh([[maybe_unused]] const std::filesystem::path& path) {
 #ifdef PALPATE_HAS_MESH_FILES
-  MeshArrays file = readMeshFile(path, {.weldDistance = 0.0});
+  MeshReadSettings settings;
+  if (path.extension() == ".stl") settings.weldDistance = 0.0;  // its triangles share no vertices
+  MeshArrays file = readMeshFile(path, settings);
   return {std::move(file.positions), std::move(file.triangles)};
 #else
   throw Error(

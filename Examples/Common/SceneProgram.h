@@ -80,7 +80,7 @@ struct SceneProgram {
 ///          one sentence gives the reason, and nothing is written.
 int runScene(const SceneProgram&, int count, char** arguments);
 
-/// Throws Error if the file cannot be used, or if the program was built without VTK.
+/// Throws Error if the file cannot be used, or if the program was built without mesh files.
 SceneMesh readMesh(const std::filesystem::path&);
 
 }  // namespace palpate::scenes

@@ -108,8 +108,8 @@ XmlArrays::Compressor XmlArrays::compressorNamed(std::string_view name) const {
 
 /// The text from an element's first tag to its last.
 std::string_view XmlArrays::elementIn(std::string_view text, std::string_view name) const {
-  const std::size_t begin = text.find("<" + std::string(name)),
-                    end = text.find("</" + std::string(name));
+  const std::size_t begin = text.find(std::string("<").append(name)),
+                    end = text.find(std::string("</").append(name));
   if (begin == text.npos) refuse(text, "expected an element " + std::string(name));
   if (end == text.npos || end < begin)
     refuse(text.substr(begin), "expected the end of the element " + std::string(name));
