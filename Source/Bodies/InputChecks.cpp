@@ -140,10 +140,12 @@ void checkOnePerVertex(const GeometryLabel& label, std::span<const Eigen::Vector
                 label.id);
 }
 
-void checkThreads(int threads) {
-  if (threads < 0 || threads > 1024)
-    throw Error(ErrorCode::InvalidSettings,
-                "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
+void checkVertex(const GeometryLabel& label, std::uint32_t vertex, std::size_t count) {
+  if (vertex >= count)
+    throw Error(ErrorCode::IndexOutOfRange,
+                nameOf(label) + ": vertex " + std::to_string(vertex) +
+                    " is out of range; the geometry has " + std::to_string(count) + " vertices",
+                label.id, vertex);
 }
 
 }  // namespace palpate

@@ -28,6 +28,7 @@ TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen:
 void checkRadii(const GeometryLabel&, std::span<const double>);
 void checkOnePerVertex(const GeometryLabel&, std::span<const Eigen::Vector3d>,
                        std::span<const double> radii);
-void checkThreads(int threads);
+/// Throws unless the vertex is one of `count`.
+void checkVertex(const GeometryLabel&, std::uint32_t vertex, std::size_t count);
 
 }  // namespace palpate

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cassert>
-
 /// Internal invariants, never on user input (that throws). Checked in all builds but Release, where
 /// they cost nothing.
 #if defined(PALPATE_ASSERTIONS) || defined(PALPATE_VALIDATE) || !defined(NDEBUG)

@@ -2,7 +2,10 @@
 
 #include <palpate/Error.h>
 
+#include "Core/Assert.h"
+
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <new>
 #include <string>
@@ -34,7 +37,9 @@ std::shared_ptr<MemoryBudget> MemoryBudget::make(std::size_t limit) {
 }
 
 void MemoryBudget::leave() noexcept {
-  if (m_users.fetch_sub(1) == 1) delete this;
+  const std::size_t users = m_users.fetch_sub(1);
+  PALPATE_ASSERT(users > 1 || m_total.now == 0);
+  if (users == 1) delete this;
 }
 
 void MemoryBudget::Count::raisePeak(std::size_t bytes) {
@@ -55,6 +60,7 @@ void MemoryBudget::charge(MemoryStage stage, std::size_t bytes) {
 }
 
 void MemoryBudget::discharge(MemoryStage stage, std::size_t bytes) noexcept {
+  PALPATE_ASSERT(m_stages[static_cast<std::size_t>(stage)].now >= bytes && m_total.now >= bytes);
   m_stages[static_cast<std::size_t>(stage)].now -= bytes;
   m_total.now -= bytes;
   leave();
@@ -90,6 +96,7 @@ MemoryScope::~MemoryScope() { place = m_before; }
 MemoryScope::Place MemoryScope::current() { return place; }
 
 void* allocateCounted(std::size_t bytes, std::size_t alignment) {
+  PALPATE_ASSERT(std::has_single_bit(alignment));
   const std::size_t offset = offsetOf(alignment), all = bytes + offset;
   const MemoryScope::Place now = place;
   if (now.budget) now.budget->charge(now.stage, all);

@@ -2,6 +2,8 @@
 
 #include <palpate/CountedVector.h>
 
+#include "Core/Assert.h"
+
 #include <algorithm>
 #include <cstddef>
 #include <exception>
@@ -33,6 +35,7 @@ class ReusableMemory {
   /// where they are now. Without memory for a smaller copy they stay where they are.
   template <class T>
   std::span<T> shrink(std::span<T> elements) {
+    PALPATE_ASSERT(elements.empty() || static_cast<void*>(elements.data()) == m_memory);
     if (elements.size_bytes() == m_bytes) return elements;
     ReusableMemory smaller;
     try {

@@ -2,8 +2,8 @@
 
 #include <palpate/Error.h>
 
-#include "Core/FloatingPoint.h"
-#include "Core/MemoryBudget.h"
+#include "Core/Assert.h"
+#include "Core/LoopsOnExecutor.h"
 #include "Core/Spin.h"
 
 #include <algorithm>
@@ -11,8 +11,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <exception>
-#include <limits>
 #include <mutex>
 #include <new>
 #include <optional>
@@ -296,159 +294,7 @@ class ThreadPool final : public Executor {
   int m_concurrency;
 };
 
-/// A loop's function, and the exception of the lowest index that threw one.
-class LoopBody {
- public:
-  LoopBody(void (*call)(void*, std::size_t), void* function)
-      : m_call(call), m_function(function), m_memory(MemoryScope::current()) {}
-
-  void runOne(std::size_t i) noexcept {
-    if (i > m_lowestFailed.load(std::memory_order_relaxed)) return;
-    const StandardFloatingPoint standard;
-    const MemoryScope memory(m_memory);
-    try {
-      m_call(m_function, i);
-    } catch (...) {
-      // current_exception() is never null here: without memory it returns std::bad_alloc.
-      const std::lock_guard guard(m_lock);
-      if (i > m_lowestFailed) return;
-      m_lowestFailed = i;
-      m_exception = std::current_exception();
-    }
-  }
-  static void task(void* body, std::size_t i) noexcept { static_cast<LoopBody*>(body)->runOne(i); }
-
-  void rethrow() const {
-    if (m_exception) std::rethrow_exception(m_exception);
-  }
-
- private:
-  void (*m_call)(void*, std::size_t);
-  void* m_function;
-  const MemoryScope::Place m_memory;
-  std::atomic<std::size_t> m_lowestFailed{std::numeric_limits<std::size_t>::max()};
-  std::mutex m_lock;
-  std::exception_ptr m_exception;
-};
-
-/// A loop on an executor that may be faulty. The executor gets runs, each of which takes indices
-/// one by one until none is left. The order of the runs does not matter, nor how often each one is
-/// called. A run that is called too late finds the loop closed.
-class LoopOnExecutor {
- public:
-  LoopOnExecutor* nextAbandoned = nullptr;
-
-  /// Whether no run of the last loop can still be called.
-  bool isFree() {
-    const std::lock_guard guard(m_lock);
-    return !m_open && m_begun >= m_runs;
-  }
-
-  void run(Executor& executor, std::size_t runs, std::size_t size, LoopBody& body) {
-    open(runs, size, body);
-    try {
-      executor.run(runs, task, this);
-    } catch (...) {
-      close();
-      throw;
-    }
-    if (!close())
-      throw Error(ErrorCode::InvalidSettings,
-                  "the executor's run() returned before it had run all tasks");
-  }
-
- private:
-  static void task(void* loop, std::size_t) noexcept {
-    static_cast<LoopOnExecutor*>(loop)->takeAll();
-  }
-
-  void open(std::size_t runs, std::size_t size, LoopBody& body) {
-    const std::lock_guard guard(m_lock);
-    m_body = &body;
-    m_size = size;
-    m_next = 0;
-    m_runs = runs;
-    m_begun = 0;
-    m_open = true;
-  }
-
-  /// Waits for the runs that have begun. Returns false if some run has not begun.
-  bool close() {
-    std::unique_lock guard(m_lock);
-    const bool all = m_begun >= m_runs;
-    m_open = false;
-    if (!all) m_next = m_size;
-    m_ended.wait(guard, [&] { return m_active == 0; });
-    return all;
-  }
-
-  void takeAll() noexcept {
-    {
-      const std::lock_guard guard(m_lock);
-      ++m_begun;
-      if (!m_open) return;
-      ++m_active;
-    }
-    for (std::size_t i; (i = m_next++) < m_size;) m_body->runOne(i);
-    const std::lock_guard guard(m_lock);
-    if (--m_active == 0) m_ended.notify_all();
-  }
-
-  std::mutex m_lock;
-  std::condition_variable m_ended;
-  LoopBody* m_body = nullptr;
-  std::size_t m_size = 0, m_runs = 0, m_begun = 0, m_active = 0;
-  std::atomic<std::size_t> m_next{0};
-  bool m_open = false;
-};
-
-void checkThreads(int threads) {
-  if (threads < 0 || threads > kMaxThreads)
-    throw Error(ErrorCode::InvalidSettings,
-                "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
-}
-
 }  // namespace
-
-/// A pool of loop objects for reuse. It has as many as have ever run at the same time.
-struct Threads::LoopsOnExecutor {
-  LoopsOnExecutor() = default;
-  /// A loop of which the executor still holds a run is never freed, because the run may still be
-  /// called. A list of all such loops tells leak checkers that this is intended.
-  ~LoopsOnExecutor() {
-    static std::atomic<LoopOnExecutor*> abandoned{nullptr};
-    for (auto& loop : all)
-      if (!loop->isFree()) {
-        loop->nextAbandoned = abandoned;
-        while (!abandoned.compare_exchange_weak(loop->nextAbandoned, loop.get())) {
-        }
-        static_cast<void>(loop.release());
-      }
-  }
-  LoopsOnExecutor(const LoopsOnExecutor&) = delete;
-  LoopsOnExecutor& operator=(const LoopsOnExecutor&) = delete;
-
-  LoopOnExecutor* take() {
-    const std::lock_guard guard(lock);
-    const auto found =
-        std::find_if(idle.begin(), idle.end(), [](LoopOnExecutor* loop) { return loop->isFree(); });
-    if (found == idle.end()) {
-      idle.reserve(all.size() + 1);  // so that putting it back cannot fail
-      return all.emplace_back(std::make_unique<LoopOnExecutor>()).get();
-    }
-    LoopOnExecutor* const loop = *found;
-    idle.erase(found);
-    return loop;
-  }
-  void putBack(LoopOnExecutor* loop) {
-    const std::lock_guard guard(lock);
-    idle.push_back(loop);
-  }
-
-  std::mutex lock;
-  std::vector<std::unique_ptr<LoopOnExecutor>> all;
-  std::vector<LoopOnExecutor*> idle;
-};
 
 Threads::Threads(int count, std::shared_ptr<Executor> executor)
     : m_executor(std::move(executor)), m_count(1) {
@@ -482,19 +328,19 @@ Threads& Threads::operator=(Threads&& other) noexcept {
 }
 
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
+  PALPATE_ASSERT(m_executor && m_count > 1 && size > 1);
   LoopBody body(call, function);
-  if (!m_loops) {
+  if (!m_loops)
     m_executor->run(size, LoopBody::task, &body);
-  } else {
-    LoopOnExecutor* const loop = m_loops->take();
-    const struct Return {
-      LoopsOnExecutor& loops;
-      LoopOnExecutor* loop;
-      ~Return() { loops.putBack(loop); }
-    } atEnd{*m_loops, loop};
-    loop->run(*m_executor, std::min(size, static_cast<std::size_t>(m_count)), size, body);
-  }
+  else
+    m_loops->run(*m_executor, std::min(size, static_cast<std::size_t>(m_count)), size, body);
   body.rethrow();
+}
+
+void checkThreads(int threads) {
+  if (threads < 0 || threads > kMaxThreads)
+    throw Error(ErrorCode::InvalidSettings,
+                "threads is " + std::to_string(threads) + "; it must be in [0, 1024]");
 }
 
 Executor::~Executor() = default;

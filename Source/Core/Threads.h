@@ -2,11 +2,15 @@
 
 #include <palpate/Executor.h>
 
+#include "Core/Assert.h"
+
 #include <cstddef>
 #include <memory>
 #include <type_traits>
 
 namespace palpate {
+
+class LoopsOnExecutor;
 
 /// The one place for threads: a pool of std::thread, oneTBB where PALPATE_THREADS=TBB, or the
 /// caller's executor.
@@ -43,6 +47,7 @@ class Threads {
   /// when all are done. An exception from f is rethrown here.
   template <class F>
   void forChunks(std::size_t size, std::size_t grain, F&& f) const {
+    PALPATE_ASSERT(grain > 0);
     if (size == 0) return;
     const std::size_t chunks = (size + grain - 1) / grain;
     forEach(chunks, [&](std::size_t chunk) {
@@ -66,8 +71,6 @@ class Threads {
   }
 
  private:
-  struct LoopsOnExecutor;
-
   void run(std::size_t size, void (*call)(void*, std::size_t), void* function) const;
 
   std::shared_ptr<Executor> m_executor;  ///< null: one thread
@@ -75,5 +78,8 @@ class Threads {
       m_loops;  ///< null if the executor is the library's pool with all its threads
   int m_count;
 };
+
+/// Throws InvalidSettings unless a number of threads is in [0, 1024].
+void checkThreads(int threads);
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <palpate/Error.h>
 
+#include "Bodies/InputChecks.h"
 #include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 #include "Core/Text.h"
@@ -269,12 +270,7 @@ ShapeMotion Snapshot::motion(GeometryId id) const {
 
 Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double time) const {
   const Body& geometry = m_contents.at(id);
-  const std::size_t size = positionsOf(geometry, geometry.mesh.now).size();
-  if (vertex >= size)
-    throw Error(ErrorCode::IndexOutOfRange,
-                nameOf(geometry) + ": vertex " + std::to_string(vertex) +
-                    " is out of range; the geometry has " + std::to_string(size) + " vertices",
-                id, vertex);
+  checkVertex(geometry, vertex, positionsOf(geometry, geometry.mesh.now).size());
   if (!std::isfinite(time))
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(geometry) + ": time is " + textOf(time) + "; it must be finite", id);
