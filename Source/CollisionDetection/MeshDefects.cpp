@@ -1,15 +1,14 @@
+// Part of <palpate/ClosedMesh.h>: findMeshDefects() with positions, which runs a detection.
 #include <palpate/ClosedMesh.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Math/TriangleIntersection.h"
+#include "Core/DisjointSets.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
-#include <vector>
 
-// findMeshDefects() with positions. It is here, because it runs a detection.
 namespace palpate {
 
 using Eigen::Vector3d;
@@ -18,23 +17,16 @@ namespace {
 
 bool namesTwice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
 
-/// For each vertex, the lowest vertex that triangles connect it with.
-std::vector<std::uint32_t> partsOf(const TriangleMeshView& mesh) {
-  std::vector<std::uint32_t> parents(mesh.positions.size());
-  std::iota(parents.begin(), parents.end(), 0u);
-  const auto partOf = [&](std::uint32_t v) {
-    while (parents[v] != v) v = parents[v] = parents[parents[v]];
-    return v;
-  };
+/// The vertices that triangles connect.
+DisjointSets partsOf(const TriangleMeshView& mesh) {
+  DisjointSets parts;
+  parts.start(mesh.positions.size());
   for (const Triangle& t : mesh.triangles) {
     if (namesTwice(t)) continue;
-    for (const std::uint32_t v : {t[1], t[2]}) {
-      const auto [low, high] = std::minmax({partOf(t[0]), partOf(v)});
-      parents[high] = low;
-    }
+    parts.join(t[0], t[1]);
+    parts.join(t[0], t[2]);
   }
-  for (std::uint32_t v = 0; v < parents.size(); ++v) parents[v] = partOf(v);
-  return parents;
+  return parts;
 }
 
 /// Whether the volume is negative by more than rounding. Each term has an error below 16 u of its
@@ -73,8 +65,8 @@ MeshDefects findMeshDefects(const TriangleMeshView& mesh) {
   MeshDefects defects = findMeshDefects(mesh.triangles);
   if (defects.unwelded) return defects;
   defects.insideOut = defects.closed() && hasNegativeVolume(mesh);
-  const std::vector<std::uint32_t> parts = partsOf(mesh);
-  const auto partOf = [&](std::uint32_t t) { return parts[mesh.triangles[t][0]]; };
+  const DisjointSets parts = partsOf(mesh);
+  const auto partOf = [&](std::uint32_t t) { return parts.find(mesh.triangles[t][0]); };
   const auto cornersOf = [&](std::uint32_t t) {
     const auto& [p, q, r] = mesh.triangles[t];
     return Corners{mesh.positions[p], mesh.positions[q], mesh.positions[r]};
