@@ -1,3 +1,4 @@
+// Part of <palpate/ConstraintRows.h>: contact motions and tangents.
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 

@@ -14,7 +14,8 @@
 #include <vector>
 
 // Functions that this module calls and the module Diagnostics defines. Diagnostics includes this
-// module; nothing else in this module depends on Diagnostics.
+// module; nothing else in this module depends on Diagnostics. Its files CandidatesByBruteForce.cpp,
+// DetectionByBruteForce.cpp, Problem.cpp and Audit.cpp define them.
 namespace palpate {
 
 /// Lists all element pairs whose boxes in double overlap when each is inflated by half the

@@ -5,6 +5,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/NormalCone.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -45,6 +46,7 @@ class ExcludedImpacts {
   /// Whether edges of the pair's second mesh are those of lines near a triangle mesh.
   bool linesAreSecond() const { return m_pair.a.topology.hasFaces(); }
   const Segment& lineEdge(const EdgeEdgeContact& c) const {
+    PALPATE_ASSERT(mayExclude());
     return linesAreSecond() ? c.edgeB : c.edgeA;
   }
 

@@ -60,9 +60,9 @@ void FieldWork::run(int round, std::size_t job, JobScratch& scratch) const {
   if (round == 0)
     found.findValues(share(near.vertices.size(), job), share(near.vertices.size(), job + 1));
   else if (round == 1)
-    found.findEdges(begin, end, scratch.contacts);
+    found.findEdges(begin, end, scratch.contacts.shapes);
   else
-    found.findFaces(begin, end, scratch.contacts);
+    found.findFaces(begin, end, scratch.contacts.shapes);
   scratch.narrowMilliseconds += watch.lap();
 }
 

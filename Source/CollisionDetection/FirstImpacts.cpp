@@ -1,6 +1,7 @@
 #include "CollisionDetection/FirstImpacts.h"
 
 #include "CollisionDetection/ExcludedImpacts.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -139,6 +140,8 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
 void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& ordered,
                         CollisionData::Contents& contents) {
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+    PALPATE_ASSERT(ordered.preferred[list].empty() ||
+                   ordered.preferred[list].size() == contacts.size());
     m_dropped[list].assign(contacts.size(), 0);
   });
   dropExcluded(meshes, end, ordered, contents);

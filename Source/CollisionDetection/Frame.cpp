@@ -122,6 +122,7 @@ void Frame::runRounds(const Threads& threads) {
       any |= pair.runs;
     }
     if (!any) return;
+    PALPATE_ASSERT(round < 3);
     threads.forEach(m_places.size(), [&](std::size_t i) {
       const Pair& pair = m_pairs[m_places[i].pair];
       if (!pair.runs) return;
@@ -140,13 +141,16 @@ void Frame::join(Pair& pair, const FrameJoin& join, bool keepsCandidates) {
   PairRecord& record = *pair.record;
   const std::size_t exactBefore = join.statistics.exactDecisions;
   for (const auto& job : jobsOf(pair)) {
-    const std::size_t exact = job->contacts.exactDecisions + job->intersections.exactDecisions;
+    const ContactBuffers& found = job->contacts;
+    const std::size_t features = found.featurePairs + found.shapes.featurePairs,
+                      exact = found.exactDecisions + found.shapes.exactDecisions +
+                              job->intersections.exactDecisions;
     join.statistics.candidatePairs += job->candidateCount;
-    join.statistics.featurePairs += job->contacts.featurePairs;
+    join.statistics.featurePairs += features;
     join.statistics.exactDecisions += exact;
     join.statistics.validityPairs += job->intersections.validityPairs;
     record.statistics.candidatePairs += job->candidateCount;
-    record.statistics.featurePairs += job->contacts.featurePairs;
+    record.statistics.featurePairs += features;
   }
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
   record.statistics.exactDecisions += join.statistics.exactDecisions - exactBefore;

@@ -21,7 +21,7 @@ namespace palpate {
 
 struct Geometry;
 
-/// How a geometry moves in its step.
+/// How a geometry moves in its step (GeometryMotion.cpp).
 class GeometryMotion {
  public:
   /// Updates range(), correction() and arcDeviation().

@@ -1,3 +1,4 @@
+// Part of CollisionDetection/Geometry.h: how a geometry moves.
 #include "CollisionDetection/Geometry.h"
 
 #include <Eigen/Geometry>

@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -61,6 +62,7 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
 GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
   if (m_changed.capacity() == m_geometries.size())  // so that no frame allocates
     m_changed.reserve(2 * m_geometries.size() + 1);
+  PALPATE_ASSERT(m_geometries.empty() || m_geometries.back()->body.id < geometry->body.id);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
   ++m_state;
@@ -170,6 +172,7 @@ void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransfo
 }
 
 void GeometryTable::restoreNow(Geometry& geometry, const Positions& now) noexcept {
+  PALPATE_ASSERT(now.size() == geometry.body.mesh.now.size());
   geometry.step.restoreNow(geometry.body.mesh, shapeOf(geometry), now);
   ++m_state;
 }

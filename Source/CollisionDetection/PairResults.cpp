@@ -10,6 +10,7 @@ namespace {
 
 /// Sorts ids, which are below `count`, and keeps each once.
 void sortUnique(Buffer<std::uint32_t>& ids, std::size_t count, Buffer<std::uint8_t>& flags) {
+  PALPATE_ASSERT(std::all_of(ids.begin(), ids.end(), [&](std::uint32_t id) { return id < count; }));
   if (ids.size() < count) {
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
@@ -64,21 +65,24 @@ void PairResults::keepFirstImpacts(PairRecord& record, double end) {
     m_firstImpacts.keep(record.meshes(), end, m_orderScratch, record.next.contents());
 }
 
-void PairResults::keepDistinct(PairRecord& record) {
+void keepDistinct(const PairRecord& record, DistinctContacts& distinct,
+                  CountedVector<ShapeContact>& contacts) {
   PALPATE_ASSERT(record.plan.kind == PairKind::MeshAndShape);
-  const MeshPair pair = record.meshes();
-  auto& contacts = record.next.contents().shape;
-  contacts.resize(m_distinctContacts.keep(pair.mesh(), pair.shape().now,
-                                          pair.poses().before.transform(),
-                                          pair.poses().now.transform(), pair.settings, contacts));
+  const Body& shape = record.shape().body;
+  contacts.resize(distinct.keep(record.mesh().body.mesh, shape.shape->now,
+                                shape.mesh.before.transform(), shape.mesh.now.transform(),
+                                record.meshes().settings, contacts));
 }
 
 void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
-  forEachTimed(contacts, [&](auto& list) {
+  const auto take = [&](auto& list, int = 0) {
     for (const auto& contact : list)
       record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);
     list.clear();
-  });
+  };
+  forEachImpactList(contacts, take);
+  take(contacts.shapes.shape);
+  take(contacts.shapes.shapeShape);
 }
 
 void describeExact(CollisionData::Contents& contents) {
@@ -96,6 +100,7 @@ std::size_t sizeOf(const CollisionData::Contents& contents) {
 }
 
 void countContacts(std::size_t atImpact, CollisionData::Contents& contents) {
+  PALPATE_ASSERT(atImpact <= sizeOf(contents));
   contents.validity.atImpact = atImpact;
   contents.validity.atEnd = sizeOf(contents) - atImpact;
 }

@@ -21,6 +21,9 @@
 
 namespace palpate {
 
+/// Contacts::Distinct for the contacts of a mesh and a shape.
+void keepDistinct(const PairRecord&, DistinctContacts&, CountedVector<ShapeContact>&);
+
 /// From what the jobs of a pair found to the pair's results, in steps that the kinds of work share.
 /// Its scratch remembers its peak.
 class PairResults {
@@ -44,7 +47,9 @@ class PairResults {
   /// Contacts::Distinct for impacts before `end`.
   void keepFirstImpacts(PairRecord&, double end);
   /// Contacts::Distinct for a shape.
-  void keepDistinct(PairRecord&);
+  void keepDistinct(PairRecord& record) {
+    palpate::keepDistinct(record, m_distinctContacts, record.next.contents().shape);
+  }
 
   /// Of work on meshes.
   struct Meshes {

@@ -21,7 +21,7 @@ FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
   PALPATE_ASSERT(usesField());
   if (!fieldScratch) fieldScratch = std::make_unique<FieldScratch>();
   const MeshPair both = meshes();
-  return {both.mesh(), placed, both.settings.contacts, both.thicknessAtEnd(), *fieldScratch};
+  return {mesh().body.mesh, placed, both.settings.contacts, both.thicknessAtEnd(), *fieldScratch};
 }
 
 bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
@@ -176,6 +176,7 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
     record.proxy.reset();
     record.proxyVersion.invalidate();
   }
+  PALPATE_ASSERT(m_records[record.index].get() == &record);
   record.pair.settings = m_pairs[record.index].settings = settings;
   planWithoutMotion(record);
   record.settingsRevision = m_revisions.next();
@@ -223,6 +224,7 @@ void PairTable::removeIf(Predicate&& isRemoved) noexcept {
   }
   m_pairs.resize(kept);
   m_records.resize(kept);
+  PALPATE_ASSERT(m_byIds.size() == kept);
 }
 
 void PairTable::remove(GeometryTable& geometries, GeometryId a, GeometryId b) {

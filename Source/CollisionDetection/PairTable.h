@@ -51,10 +51,6 @@ struct PairRecord : CountedObject {
             plan.step,
             settings.restDistance > 0.0 ? &filters.nearAtRest : nullptr,
             filters.predicate ? &filters.predicate : nullptr,
-            a->body.shape ? &*a->body.shape : nullptr,
-            b->body.shape ? &*b->body.shape : nullptr,
-            usesField() ? body().body.field.get() : nullptr,
-            usesField() ? &body().body.mesh : nullptr,
             guarded != nullptr};
   }
   /// Whether a distance field answers in this frame.
@@ -94,6 +90,8 @@ struct PairRecord : CountedObject {
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);
   /// For a pair with a shape, or if usesField(): the geometry with elements.
   const Geometry& mesh() const { return a->body.shape || (usesField() && &body() == a) ? *b : *a; }
+  /// Of a shape and a mesh: the shape.
+  const Geometry& shape() const { return a->body.shape ? *a : *b; }
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
   bool hasWiderBoxes() const {

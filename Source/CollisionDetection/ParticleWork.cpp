@@ -77,8 +77,9 @@ void ParticleWork::runByBruteForce(JobScratch& scratch) {
 }
 
 void ParticleWork::writeHits(JobScratch& scratch) const {
-  scratch.contacts.shape.resize(scratch.hits.count);
-  m_particles.write(scratch, scratch.contacts.shape.data());
+  auto& found = scratch.contacts.shapes.shape;
+  found.resize(scratch.hits.count);
+  m_particles.write(scratch, found.data());
 }
 
 void ParticleWork::findOthers(JobScratch& scratch) const {

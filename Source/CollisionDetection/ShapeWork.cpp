@@ -11,43 +11,38 @@
 
 namespace palpate {
 
+void findWithShape(const PairRecord& record, std::span<const std::uint32_t> elements,
+                   ShapeContactBuffers& out) {
+  const auto &a = record.a->body.shape, &b = record.b->body.shape;
+  const MeshPair meshes = record.meshes();
+  const PairSettings& settings = meshes.settings;
+  PALPATE_ASSERT(a || b);
+  if (a && b)
+    meshes.keepsApart ? findShapePairNearing(*a, *b, settings.timeTolerance, out)
+                      : findShapePair(*a, *b, settings, out);
+  else if (meshes.keepsApart)
+    findShapeNearings(record.mesh().body.mesh, a ? *a : *b, settings.timeTolerance, elements, out);
+  else
+    findShapeContacts(record.mesh().body.mesh, a ? *a : *b, settings, elements, out);
+}
+
 std::size_t ShapeWork::start(const FrameStart&) const {
   const Geometry& mesh = m_record->mesh();
   return mesh.body.shape || mesh.body.tree.octree().size() > 0 ? 1 : 0;
 }
 
 void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
-  const MeshPair meshes = m_record->meshes();
-  if (meshes.isShapePair())
-    findPair(meshes, scratch);
-  else
-    findNearMesh(meshes, scratch);
-  if (meshes.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
-}
-
-void ShapeWork::findPair(const MeshPair& meshes, JobScratch& scratch) const {
-  PALPATE_ASSERT(meshes.isShapePair());
-  if (meshes.keepsApart)
-    findShapePairNearing(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings.timeTolerance,
-                         scratch.contacts);
-  else
-    findShapePair(*meshes.shapeOfA, *meshes.shapeOfB, meshes.settings, scratch.contacts);
-}
-
-void ShapeWork::findNearMesh(const MeshPair& meshes, JobScratch& scratch) const {
-  PALPATE_ASSERT(meshes.hasShape() && !meshes.isShapePair());
-  const auto& [analytical, now, before] = meshes.shape();
-  findElementsNear(m_record->mesh().body, m_record->plan.swept() ? before : now, now,
-                   meshes.maxFeatureDistance(), scratch.elements);
+  const PairRecord& record = *m_record;
+  if (record.plan.kind == PairKind::MeshAndShape) {
+    const PlacedShape& shape = *record.shape().body.shape;
+    findElementsNear(record.mesh().body, record.plan.swept() ? shape.before : shape.now, shape.now,
+                     record.meshes().maxFeatureDistance(), scratch.elements);
+  }
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  if (meshes.keepsApart)
-    findShapeNearings(meshes.mesh(), meshes.shape(), meshes.settings.timeTolerance,
-                      scratch.elements, scratch.contacts);
-  else
-    findShapeContacts(meshes.mesh(), meshes.shape(), meshes.settings, scratch.elements,
-                      scratch.contacts);
+  findWithShape(record, scratch.elements, scratch.contacts.shapes);
   scratch.narrowMilliseconds += watch.lap();
+  if (record.pair.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
 }
 
 void ShapeWork::runByBruteForce(JobScratch& scratch) const {
@@ -62,7 +57,7 @@ void ShapeWork::join(Jobs jobs, const FrameJoin& join) const {
   results.start(jobs);
   for (const ContactBuffers* found : results.found()) {
     results.facts().add(found->facts);
-    results.facts().addShape(*found, continuous);
+    results.facts().addShape(found->shapes, continuous);
   }
   results.sortFacts(record);
   results.order(record);

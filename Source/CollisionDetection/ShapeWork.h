@@ -4,8 +4,15 @@
 #include "CollisionDetection/PairTable.h"
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 
 namespace palpate {
+
+/// Finds the contacts of two shapes, or of a shape with these elements of a mesh, by the pair's
+/// plan.
+void findWithShape(const PairRecord&, std::span<const std::uint32_t> elements,
+                   ShapeContactBuffers&);
 
 /// Work on an analytical shape and the elements near it, or on two shapes: one job.
 class ShapeWork {
@@ -19,9 +26,6 @@ class ShapeWork {
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  void findPair(const MeshPair&, JobScratch&) const;
-  void findNearMesh(const MeshPair&, JobScratch&) const;
-
   PairRecord* m_record;
 };
 

@@ -3,13 +3,13 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/ExcludedImpacts.h"
-#include "CollisionDetection/FirstImpacts.h"
-#include "NarrowPhase/Continuous.h"
+#include "CollisionDetection/PairResults.h"
+#include "Diagnostics/DistinctImpacts.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Shapes/DistinctContacts.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -17,13 +17,9 @@
 #include <functional>
 #include <initializer_list>
 #include <iterator>
-#include <limits>
-#include <map>
 #include <random>
 #include <string>
 #include <system_error>
-#include <tuple>
-#include <type_traits>
 
 namespace palpate {
 
@@ -36,6 +32,7 @@ std::uint32_t high(std::uint64_t value) { return static_cast<std::uint32_t>(valu
 /// Communications of the ACM 30, 1987.)
 std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
                                        std::mt19937_64& random) {
+  PALPATE_ASSERT(count <= size);
   std::vector<std::uint64_t> drawn;
   for (std::uint64_t last = size - count; last < size; ++last) {
     std::uint64_t number = random() % (last + 1);
@@ -67,27 +64,31 @@ int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
 /// the answer lists.
 class Coverage {
  public:
-  Coverage(const MeshPair& meshes, const FeatureLists& sample)
-      : m_meshes(meshes),
+  Coverage(const PairRecord& record, const FeatureLists& sample)
+      : m_record(record),
         m_sample(sample),
-        m_byTriangles(meshes.settings.method == Method::Intersection) {}
+        m_byTriangles(record.plan.method == Method::Intersection) {
+    PALPATE_ASSERT(std::is_sorted(sample.verticesOfA.begin(), sample.verticesOfA.end()));
+    PALPATE_ASSERT(std::is_sorted(sample.verticesOfB.begin(), sample.verticesOfB.end()));
+    PALPATE_ASSERT(std::is_sorted(sample.edgesOfA.begin(), sample.edgesOfA.end()));
+    PALPATE_ASSERT(std::is_sorted(sample.trianglesOfA.begin(), sample.trianglesOfA.end()));
+  }
 
   bool coversVertexTriangle(const VertexTriangleContact& c) const {
-    if (c.vertex >= m_meshes.a.topology.vertexCount) return true;  // there is no such vertex
+    if (c.vertex >= ofA().vertexCount) return true;  // there is no such vertex
     return m_byTriangles || holds(m_sample.verticesOfA, c.vertex);
   }
   bool coversTriangleVertex(const VertexTriangleContact& c) const {
     return m_byTriangles || holds(m_sample.verticesOfB, c.vertex);
   }
   bool coversEdges(const EdgeEdgeContact& c) const {
-    const std::uint32_t edgeA = m_meshes.a.topology.edgeOf(c.edgeA),
-                        edgeB = m_meshes.b.topology.edgeOf(c.edgeB);
+    const std::uint32_t edgeA = ofA().edgeOf(c.edgeA), edgeB = ofB().edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
     return m_byTriangles || holds(m_sample.edgesOfA, edgeA);
   }
   /// Vertices and edges are covered by the element that owns them.
   bool coversShape(const ShapeContact& c) const {
-    const MeshTopology& mesh = m_meshes.mesh().topology;
+    const MeshTopology& mesh = m_record.mesh().body.mesh.topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
     const std::uint32_t edge = isVertex ? 0 : mesh.edgeOf({c.vertices[0], c.vertices[1]});
@@ -96,15 +97,18 @@ class Coverage {
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
   bool coversTriangles(const ElementPair& pair) const {
-    return holds(m_sample.trianglesOfA, m_meshes.self() ? std::min(pair.a, pair.b) : pair.a);
+    return holds(m_sample.trianglesOfA,
+                 m_record.a == m_record.b ? std::min(pair.a, pair.b) : pair.a);
   }
 
  private:
+  const MeshTopology& ofA() const { return m_record.a->body.mesh.topology; }
+  const MeshTopology& ofB() const { return m_record.b->body.mesh.topology; }
   static bool holds(const std::vector<std::uint32_t>& list, std::uint32_t id) {
     return std::binary_search(list.begin(), list.end(), id);
   }
 
-  const MeshPair& m_meshes;
+  const PairRecord& m_record;
   const FeatureLists& m_sample;
   bool m_byTriangles;
 };
@@ -164,154 +168,6 @@ class KnownVertices {
   const MeshPair& m_meshes;
 };
 
-/// Contacts::Distinct for impacts of lines and points: drops excluded impacts for which others
-/// stand. Computes all impacts of their vertices and edges.
-class ExcludedByBruteForce {
- public:
-  explicit ExcludedByBruteForce(const MeshPair& meshes) : m_meshes(meshes), m_rule(meshes) {}
-
-  bool isDropped(const VertexTriangleContact& c, bool swapped) {
-    if (!m_rule.isExcluded(c, swapped)) return false;
-    m_ofVertices.clear();
-    addImpactsOf(c.vertex, swapped);
-    return m_rule.isReplaced(c, swapped, [&](auto&& f) { return anyOfVertices(swapped, f); });
-  }
-  bool isDropped(const EdgeEdgeContact& c) {
-    if (!m_rule.isExcluded(c)) return false;
-    const bool swapped = m_rule.linesAreSecond();
-    const Segment& edge = m_rule.lineEdge(c);
-    m_ofVertices.clear();
-    for (const std::uint32_t end : edge) addImpactsOf(end, swapped);
-    findImpactsOf(edge);
-    return m_rule.isReplaced(c, [&](auto&& f) {
-      return std::any_of(
-                 m_ofEdge.edgeEdge.begin(), m_ofEdge.edgeEdge.end(),
-                 [&](const auto& s) { return !m_rule.isExcluded(s) && f(s, m_rule.planeOf(s)); }) ||
-             anyOfVertices(swapped, f);
-    });
-  }
-
- private:
-  template <class F>
-  bool anyOfVertices(bool swapped, F&& f) const {
-    const auto& impacts = swapped ? m_ofVertices.triangleVertex : m_ofVertices.vertexTriangle;
-    return std::any_of(impacts.begin(), impacts.end(), [&](const auto& s) {
-      return !m_rule.isExcluded(s, swapped) && f(s, m_rule.planeOf(s, swapped));
-    });
-  }
-  void addImpactsOf(std::uint32_t vertex, bool swapped) {
-    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
-                                                               swapped ? m_meshes.a : m_meshes.b};
-    const MeshTopology& others = (swapped ? m_meshes.a : m_meshes.b).topology;
-    for (std::uint32_t t = 0; t < others.triangles.size(); ++t)
-      if (others.isEnabled(t) && !m_meshes.excludesVertex(vertex, t))
-        addImpact(m_meshes, features, vertex, t, swapped, m_ofVertices);
-  }
-  /// Of an edge of a line near a triangle mesh.
-  void findImpactsOf(const Segment& edge) {
-    const bool second = m_rule.linesAreSecond();
-    const Features<ImpactQuery::Kind::EdgeEdge> features{m_meshes.a, m_meshes.b};
-    const std::uint32_t line = (second ? m_meshes.b : m_meshes.a).topology.edgeOf(edge);
-    const MeshTopology& others = (second ? m_meshes.a : m_meshes.b).topology;
-    m_ofEdge.clear();
-    for (std::uint32_t other = 0; other < others.edges.size(); ++other)
-      if (!others.edgeTriangles[other].empty())
-        addImpact(m_meshes, features, second ? other : line, second ? line : other, false,
-                  m_ofEdge);
-  }
-
-  const MeshPair& m_meshes;
-  const ExcludedImpacts m_rule;
-  ContactBuffers m_ofVertices, m_ofEdge;
-};
-
-void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expected) {
-  const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct || !ExcludedImpacts(meshes).mayExclude() ||
-      !(impactsOnly || meshes.step.reportsImpacts))
-    return;
-  ExcludedByBruteForce excluded(meshes);
-  forEachImpactList(expected, [&](auto& contacts, int list) {
-    std::erase_if(contacts, [&](const auto& contact) {
-      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        return excluded.isDropped(contact);
-      else
-        return excluded.isDropped(contact, list == 1);
-    });
-  });
-}
-
-/// Contacts::Distinct for impacts: drops expected contacts for which an earlier contact is kept.
-/// The earlier contact is either expected, too, or in the answer if the sample does not cover it.
-void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
-                         CollisionData::Contents& expected) {
-  const bool impactsOnly = meshes.settings.method == Method::Continuous;
-  if (meshes.settings.contacts != Contacts::Distinct ||
-      !(impactsOnly || meshes.step.reportsImpacts))
-    return;
-  const double end = impactsOnly ? std::numeric_limits<double>::infinity() : 1.0;
-  using Rank = std::tuple<double, int, std::array<std::uint32_t, 4>>;
-  const auto rankOf = [](const auto& contact, int list) -> Rank {
-    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-      return {contact.timeOfImpact, list, idsOf(contact)};
-    else if (list == 1)
-      return {contact.timeOfImpact, list, {contact.triangle, contact.vertex, 0, 0}};
-    else
-      return {contact.timeOfImpact, list, {contact.vertex, contact.triangle, 0, 0}};
-  };
-  const auto featuresOf = [&](const auto& contact, int list) {
-    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-      return sharedFeatures(contact, meshes.self());
-    else
-      return sharedFeatures(contact, list == 1, meshes.self());
-  };
-  std::map<ImpactFeatures, Rank> first;
-  const auto recordFirst = [&](const auto& contacts, int list) {
-    for (const auto& contact : contacts)
-      if (const auto features = featuresOf(contact, list); features && contact.timeOfImpact < end) {
-        const Rank rank = rankOf(contact, list);
-        const auto [place, isNew] = first.emplace(*features, rank);
-        if (!isNew) place->second = std::min(place->second, rank);
-      }
-  };
-  recordFirst(answer.vertexTriangle(), 0);
-  recordFirst(answer.triangleVertex(), 1);
-  recordFirst(answer.edgeEdge(), 2);
-  forEachImpactList(expected, recordFirst);
-  const auto isDropped = [&](const auto& contact, int list) {
-    const auto features = featuresOf(contact, list);
-    const auto place = features ? first.find(*features) : first.end();
-    return place != first.end() && contact.timeOfImpact < end &&
-           place->second < rankOf(contact, list);
-  };
-  // Brute force may find a contact at the step's end that Auto reports by its impact. Auto may then
-  // drop this impact.
-  const auto isDroppedImpact = [&](const auto& contact, int list) {
-    if (contact.timeOfImpact < end) return false;
-    ContactBuffers impact;
-    if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>) {
-      const Features<ImpactQuery::Kind::EdgeEdge> features{meshes.a, meshes.b};
-      addImpact(meshes, features, meshes.a.topology.edgeOf(contact.edgeA),
-                meshes.b.topology.edgeOf(contact.edgeB), false, impact);
-    } else {
-      const bool swapped = list == 1;
-      const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? meshes.b : meshes.a,
-                                                                 swapped ? meshes.a : meshes.b};
-      addImpact(meshes, features, contact.vertex, contact.triangle, swapped, impact);
-    }
-    bool dropped = false;
-    forEachImpactList(impact, [&](const auto& contacts, int of) {
-      for (const auto& found : contacts) dropped |= isDropped(found, of);
-    });
-    return dropped;
-  };
-  forEachImpactList(expected, [&](auto& contacts, int list) {
-    std::erase_if(contacts, [&](const auto& contact) {
-      return isDropped(contact, list) || isDroppedImpact(contact, list);
-    });
-  });
-}
-
 /// Calls report(fault, expected, found) where two lists differ. A contact that was found but not
 /// expected counts only if it is covered.
 template <class Contact, class Covered, class Report>
@@ -340,9 +196,9 @@ void compare(CountedVector<Contact> expected, std::span<const Contact> allFound,
 
 }  // namespace
 
-FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
-                          const AuditSettings& settings, std::uint64_t frame) {
-  FeatureLists features = everyFeature(meshes);
+FeatureLists drawFeatures(const PairRecord& record, const AuditSettings& settings,
+                          std::uint64_t frame) {
+  FeatureLists features = everyFeature(record);
   const std::initializer_list<std::vector<std::uint32_t>*> lists{
       &features.verticesOfA, &features.verticesOfB, &features.edgesOfA, &features.trianglesOfA};
   std::uint64_t size = 0;
@@ -350,7 +206,8 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
   const auto count = static_cast<std::uint64_t>(settings.features);
   if (count >= size) return features;
 
-  const auto a = static_cast<std::uint32_t>(pair.a), b = static_cast<std::uint32_t>(pair.b);
+  const auto a = static_cast<std::uint32_t>(record.pair.a),
+             b = static_cast<std::uint32_t>(record.pair.b);
   std::seed_seq seed{low(settings.seed), high(settings.seed), low(frame), high(frame), a, b};
   std::mt19937_64 random(seed);
   const std::vector<std::uint64_t> drawn = drawNumbers(count, size, random);
@@ -367,16 +224,17 @@ FeatureLists drawFeatures(const MeshPair& meshes, const CollisionPair& pair,
   return features;
 }
 
-void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionData& data,
-           const AuditSettings& settings, std::uint64_t frame, bool sidesAreKnown,
-           std::vector<AuditFailure>& out) {
+void audit(const PairRecord& record, const CollisionData& data, const AuditSettings& settings,
+           std::uint64_t frame, std::vector<AuditFailure>& out) {
   ContactBuffers contacts, pierced;
-  const FeatureLists sample = drawFeatures(meshes, pair, settings, frame);
-  const Coverage coverage(meshes, sample);
+  const MeshPair meshes = record.meshes();
+  const CollisionPair& pair = record.pair;
+  const FeatureLists sample = drawFeatures(record, settings, frame);
+  const Coverage coverage(record, sample);
   // Any contact with a shape may stand for one of the sample.
   const bool needsAll =
-      meshes.hasShape() && !meshes.isShapePair() && meshes.settings.contacts == Contacts::Distinct;
-  findContactsByBruteForce(meshes, needsAll ? everyFeature(meshes) : sample, contacts);
+      record.plan.kind == PairKind::MeshAndShape && meshes.settings.contacts == Contacts::Distinct;
+  findContactsByBruteForce(record, needsAll ? everyFeature(record) : sample, contacts);
   if (meshes.settings.method == Method::Intersection)
     addListed(meshes, coverage, data, contacts, pierced);
   ContactBuffers* const buffers[] = {&contacts, &pierced};
@@ -398,8 +256,9 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
     return c && known.mayDrop(*c);
   };
   const auto reporterFor = [&](List list) {
-    return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (isAuto && (fault != Fault::FalseNegative || (sidesAreKnown && mayBeDropped(e, list))))
+    return [=, &record, &pair, &out](Fault fault, const Any& e, const Any& f) {
+      if (isAuto &&
+          (fault != Fault::FalseNegative || (record.sidesAreKnown && mayBeDropped(e, list))))
         return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
@@ -414,9 +273,8 @@ void audit(const MeshPair& meshes, const CollisionPair& pair, const CollisionDat
   dropExcludedImpacts(meshes, expected);
   dropRepeatedImpacts(meshes, data, expected);
   if (needsAll) {
-    expected.shape.resize(DistinctContacts().keep(
-        meshes.mesh(), meshes.shape().now, meshes.poses().before.transform(),
-        meshes.poses().now.transform(), meshes.settings, expected.shape));
+    DistinctContacts distinct;
+    keepDistinct(record, distinct, expected.shape);
     std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
   }
   const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
@@ -453,6 +311,7 @@ CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, Ge
 /// file's name in each failure.
 static void keepProblem(const CollisionProblem& problem, const AuditSettings& settings,
                         std::span<AuditFailure> failures) {
+  PALPATE_ASSERT(!failures.empty());
   const AuditFailure& first = failures.front();
   const std::string name = "frame" + std::to_string(first.frame) + "-pair" +
                            std::to_string(static_cast<std::uint32_t>(first.a)) + "-" +
@@ -487,8 +346,7 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
         pair->plan.kind == PairKind::ParticlesByLeaves)
       continue;
     const std::size_t first = failures.size();
-    audit(pair->meshes(), pair->pair, pair->data, settings.audit, record.frame, pair->sidesAreKnown,
-          failures);
+    audit(*pair, pair->data, settings.audit, record.frame, failures);
     const auto own = std::span(failures).subspan(first);
     if (own.empty() || settings.audit.folder.empty()) continue;
     if (record.files < settings.audit.maxFiles) {

@@ -6,7 +6,6 @@
 #include <palpate/Settings.h>
 
 #include "Diagnostics/ContactsByBruteForce.h"
-#include "NarrowPhase/NarrowPhase.h"
 
 #include <cstdint>
 #include <span>
@@ -16,15 +15,14 @@ namespace palpate {
 
 /// Draws at most settings.features of all features that the pair's method tests, each with the same
 /// probability. The same seed, frame and pair give the same sample.
-FeatureLists drawFeatures(const MeshPair&, const CollisionPair&, const AuditSettings&,
-                          std::uint64_t frame);
+FeatureLists drawFeatures(const PairRecord&, const AuditSettings&, std::uint64_t frame);
 
 /// Compares `data` with brute force for a drawn sample of features. Appends false negatives, false
 /// positives, and contacts that differ. For Method::Auto it appends false negatives only, and with
-/// earliestTimeOnly impacts before the reported time. sidesAreKnown: Auto ran Intersection, as the
-/// step begins in intersection, and may leave out contacts of vertices whose side is known.
-void audit(const MeshPair&, const CollisionPair&, const CollisionData& data, const AuditSettings&,
-           std::uint64_t frame, bool sidesAreKnown, std::vector<AuditFailure>& out);
+/// earliestTimeOnly impacts before the reported time. With PairRecord::sidesAreKnown Auto may leave
+/// out contacts of vertices whose side is known.
+void audit(const PairRecord&, const CollisionData& data, const AuditSettings&, std::uint64_t frame,
+           std::vector<AuditFailure>& out);
 
 /// The problem reduced to one of its pairs.
 CollisionProblem reducedToPair(const CollisionProblem&, GeometryId a, GeometryId b);

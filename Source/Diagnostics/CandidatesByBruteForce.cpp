@@ -1,3 +1,4 @@
+// Part of CollisionDetection/DiagnosticsInterface.h: candidates.
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "Core/Assert.h"
@@ -14,7 +15,7 @@ static std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool s
 }
 
 void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out) {
-  PALPATE_ASSERT(!meshes.hasShape());
+  PALPATE_ASSERT(!meshes.has(GeometryType::Shape));
   const double thickness =
       meshes.settings.method == Method::Intersection ? 0.0 : meshes.maxFeatureDistance();
   const bool swept =

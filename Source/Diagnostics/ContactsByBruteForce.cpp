@@ -1,5 +1,6 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 
+#include "CollisionDetection/ShapeWork.h"
 #include "DistanceField/FieldContacts.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Filters.h"
@@ -9,9 +10,8 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
-#include "Shapes/ShapeContacts.h"
-#include "Shapes/ShapeNearings.h"
 #include "Math/ClosestPoint.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <numeric>
@@ -247,7 +247,7 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
 void findProximity(const MeshPair& pair, const FeatureLists& features, ContactBuffers& out) {
   findVertexTriangle<false>(pair, features.verticesOfA, out);
   findVertexTriangle<true>(pair, features.verticesOfB, out);
-  if (pair.hasLines())
+  if (pair.has(GeometryType::Lines))
     findLineEdges(pair, features.edgesOfA, out);
   else
     findEdgeEdge(pair, features.edgesOfA, out);
@@ -324,25 +324,33 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
   out.exactDecisions += pierced.exactDecisions;
 }
 
+void fill(std::vector<std::uint32_t>& list, std::size_t size) {
+  list.resize(size);
+  std::iota(list.begin(), list.end(), 0u);
+}
+
+FeatureLists everyElement(const MeshTopology& mesh) {
+  FeatureLists every;
+  fill(every.trianglesOfA, mesh.triangles.size());
+  std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
+  return every;
+}
+
 }  // namespace
+
+FeatureLists everyFeature(const PairRecord& record) {
+  return record.a->body.shape || record.b->body.shape || record.usesField()
+             ? everyElement(record.mesh().body.mesh.topology)
+             : everyFeature(record.meshes());
+}
 
 FeatureLists everyFeature(const MeshPair& pair) {
   FeatureLists every;
-  const auto fill = [](std::vector<std::uint32_t>& list, std::size_t size) {
-    list.resize(size);
-    std::iota(list.begin(), list.end(), 0u);
-  };
   const auto fillTested = [&](std::vector<std::uint32_t>& list, const MeshTopology& topology) {
     fill(list, topology.vertexCount);
     std::erase_if(list, [&](std::uint32_t v) { return topology.vertexTriangles[v].empty(); });
   };
-  if (pair.settings.method == Method::Intersection || pair.hasShape() || pair.field) {
-    const MeshTopology& mesh =
-        pair.hasShape() || pair.field ? pair.mesh().topology : pair.a.topology;
-    fill(every.trianglesOfA, mesh.triangles.size());
-    std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
-    return every;
-  }
+  if (pair.settings.method == Method::Intersection) return everyElement(pair.a.topology);
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
   if (areTested(a, b, true)) fillTested(every.verticesOfA, a);
   if (areTested(b, a, false) && !pair.self()) fillTested(every.verticesOfB, b);
@@ -354,23 +362,24 @@ FeatureLists everyFeature(const MeshPair& pair) {
 
 void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features,
                               ContactBuffers& out) {
-  if (pair.keepsApart && pair.isShapePair())
-    return findShapePairNearing(*pair.shapeOfA, *pair.shapeOfB, pair.settings.timeTolerance, out);
-  if (pair.keepsApart && pair.hasShape())
-    return findShapeNearings(pair.mesh(), pair.shape(), pair.settings.timeTolerance,
-                             features.trianglesOfA, out);
-  if (pair.isShapePair()) return findShapePair(*pair.shapeOfA, *pair.shapeOfB, pair.settings, out);
-  if (pair.hasShape())
-    return findShapeContacts(pair.mesh(), pair.shape(), pair.settings, features.trianglesOfA, out);
-  if (pair.field)
-    return FieldContacts::findByBruteForce(
-        pair.mesh(), PlacedField(*pair.field, pair.fieldMesh->now), pair.settings.contacts,
-        pair.thicknessAtEnd(), features.trianglesOfA, out);
   const Method method = pair.settings.method;
   if (method == Method::Intersection) return findIntersections(pair, features, out);
   if (method == Method::Continuous) return findImpacts(pair, features, out);
   findProximity(pair, features, out);
   if (method == Method::Auto) findFastImpacts(pair, features, out);
+}
+
+void findContactsByBruteForce(const PairRecord& record, const FeatureLists& features,
+                              ContactBuffers& out) {
+  PALPATE_ASSERT(record.plan.kind != PairKind::Proxy);
+  const MeshPair meshes = record.meshes();
+  if (record.a->body.shape || record.b->body.shape)
+    return findWithShape(record, features.trianglesOfA, out.shapes);
+  if (record.usesField())
+    return FieldContacts::findByBruteForce(record.mesh().body.mesh, record.placedField(),
+                                           meshes.settings.contacts, meshes.thicknessAtEnd(),
+                                           features.trianglesOfA, out.shapes);
+  findContactsByBruteForce(meshes, features, out);
 }
 
 }  // namespace palpate

@@ -1,3 +1,4 @@
+// Part of CollisionDetection/DiagnosticsInterface.h: contacts of a pair.
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "NarrowPhase/Intersection.h"
@@ -11,7 +12,7 @@ namespace palpate {
 void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
                             ContactBuffers& intersections) {
   MeshPair meshes = record.meshes();
-  findContactsByBruteForce(meshes, contacts);
+  findContactsByBruteForce(record, everyFeature(record), contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
   const auto forEachPair = [&](auto&& f) {
@@ -29,6 +30,7 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
     return;
   if (meshes.step.motion > 0.0)
     forEachPair([&](const ElementPair& pair) { addCrossingsAtStart(meshes, pair, intersections); });
+  PALPATE_ASSERT(record.plan.kind == PairKind::Meshes);
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, intersections);
 }
@@ -38,7 +40,7 @@ void detectVerticesByBruteForce(const PairRecord& record, std::span<const std::u
   PALPATE_ASSERT(std::is_sorted(vertices.begin(), vertices.end()));
   FeatureLists features;
   features.verticesOfA.assign(vertices.begin(), vertices.end());
-  findContactsByBruteForce(record.meshes(), features, contacts);
+  findContactsByBruteForce(record, features, contacts);
 }
 
 }  // namespace palpate

@@ -1,3 +1,4 @@
+// Part of CollisionDetection/DiagnosticsInterface.h: the input of a detection.
 #include "CollisionDetection/DiagnosticsInterface.h"
 
 #include <span>

@@ -1,10 +1,11 @@
+// Part of <palpate/Palpate.h>: the names of enumerators. A switch without a default has the
+// compiler check that none is missing.
 #include <palpate/Audit.h>
 #include <palpate/ClosedMesh.h>
 #include <palpate/Distance.h>
 #include <palpate/LooseOctree.h>
 #include <palpate/Palpate.h>
 
-// The names of enumerators. A switch without a default has the compiler check that none is missing.
 namespace palpate {
 
 /// For a value that is no enumerator.

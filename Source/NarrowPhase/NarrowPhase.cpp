@@ -42,17 +42,14 @@ void ContactBuffers::clear() {
   crossings.clear();
   crossingsAtStart.clear();
   pierced.clear();
-  shape.clear();
-  shapeShape.clear();
-  shapeGap = std::numeric_limits<double>::infinity();
-  shapeSideUnknown = false;
+  shapes.clear();
   featurePairs = exactDecisions = validityPairs = 0;
   facts.clear();
 }
 
 void findContacts(const MeshPair& pair, std::span<const ElementPair> candidates,
                   ContactBuffers& out) {
-  PALPATE_ASSERT(!pair.hasShape() && !pair.field);
+  PALPATE_ASSERT(!pair.has(GeometryType::Shape) && !pair.has(GeometryType::Field));
   const Method method = pair.settings.method;
   if (method == Method::Proximity) return findProximity(pair, candidates, out);
   if (method == Method::Intersection) return findIntersections(pair, candidates, out);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <palpate/CollisionData.h>
-#include <palpate/DistanceField.h>
 #include <palpate/Settings.h>
 
 #include "NarrowPhase/FeaturePairs.h"
@@ -51,13 +50,8 @@ struct MeshPair {
   StepPlan step{};
   const IndexLists* nearAtRest = nullptr;  ///< per vertex: later ones within restDistance at rest
   const ContactPredicate* predicate = nullptr;
-  /// The shape of an analytical geometry, whose mesh has no elements. Null for all others.
-  const PlacedShape *shapeOfA = nullptr, *shapeOfB = nullptr;
-  /// Method::DistanceField: the field, and the mesh of its geometry, whose transform places it.
-  const DistanceField* field = nullptr;
-  const TriangleMesh* fieldMesh = nullptr;
-  /// For a StepGuard: Continuous reports features with radii, and elements and shapes, that come
-  /// nearer than findNearing() and findShapeNearings() let them.
+  /// For a StepGuard: Continuous reports features with radii that come nearer than findNearing()
+  /// lets them.
   bool keepsApart = false;
   double thicknessAtEnd() const { return settings.thickness + step.extraThickness; }
   /// L: features whose distance without radii is larger than this are no contacts.
@@ -89,16 +83,7 @@ struct MeshPair {
     return most;
   }
   bool hasFilters() const { return nearAtRest || predicate || a.outerSideOnly || b.outerSideOnly; }
-  bool hasShape() const { return shapeOfA || shapeOfB; }
-  bool isShapePair() const { return shapeOfA && shapeOfB; }
-  /// For a pair with a shape or a field: the mesh of the other geometry; and the shape.
-  const TriangleMesh& mesh() const { return shapeOfA || fieldMesh == &a ? b : a; }
-  const PlacedShape& shape() const { return *(shapeOfA ? shapeOfA : shapeOfB); }
-  /// The mesh that has the shape's poses.
-  const TriangleMesh& poses() const { return shapeOfA ? a : b; }
-  bool hasLines() const {
-    return a.topology.type == GeometryType::Lines || b.topology.type == GeometryType::Lines;
-  }
+  bool has(GeometryType type) const { return a.topology.type == type || b.topology.type == type; }
   /// Self-collision excludes a vertex with the triangles around it. Of two points, the lower one is
   /// tested as the vertex.
   bool excludesVertex(std::uint32_t vertex, std::uint32_t triangle) const {
@@ -132,7 +117,7 @@ struct StepFacts {
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
   void clear();
   void add(const StepFacts&);
-  /// Takes over what was found about a shape. atStart: with Continuous.
+  /// Adds what was found about a shape. atStart: with Continuous.
   void addShape(const ShapeContactBuffers&, bool atStart);
 };
 
@@ -160,7 +145,8 @@ struct PiercedPair {
 };
 
 /// What one worker found. Unsorted; cleared and filled again each frame.
-struct ContactBuffers : ShapeContactBuffers {
+struct ContactBuffers {
+  ShapeContactBuffers shapes;  ///< of pairs with shapes, fields and proxies
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
@@ -171,7 +157,9 @@ struct ContactBuffers : ShapeContactBuffers {
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch
   StepFacts facts;
-  std::size_t validityPairs = 0;  ///< triangle pairs tested for Validity::startedApart
+  std::size_t featurePairs = 0;    ///< tested
+  std::size_t exactDecisions = 0;  ///< left to exact arithmetic
+  std::size_t validityPairs = 0;   ///< triangle pairs tested for Validity::startedApart
   void clear();
 };
 

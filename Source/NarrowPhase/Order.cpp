@@ -3,6 +3,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 namespace palpate {
@@ -26,16 +27,16 @@ Ids byElement(const ShapeContact& c) {
 
 /// Sorts the buffers' contacts of one list, each once, into `out`. Returns the number of contacts
 /// from the first `preferred` buffers. flags: if not null, receives which contacts these are.
-template <class Contact, class Buffers, class Entries, class IdsOf>
-std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred,
-                  Buffer<Contact> Buffers::*member, Entries& entries, CountedVector<Contact>& out,
-                  IdsOf&& idsOf, Buffer<std::uint8_t>* flags) {
+template <class Contact, class ListOf, class Entries, class IdsOf>
+std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred, ListOf&& listOf,
+                  Entries& entries, CountedVector<Contact>& out, IdsOf&& idsOf,
+                  Buffer<std::uint8_t>* flags) {
   std::size_t size = 0;
-  for (const ContactBuffers* found : buffers) size += (found->*member).size();
+  for (const ContactBuffers* found : buffers) size += std::invoke(listOf, *found).size();
   entries.clear();
   if (size > entries.capacity()) entries.reserve(size + size / 8);
   for (std::size_t i = 0; i < buffers.size(); ++i)
-    for (const Contact& contact : buffers[i]->*member) {
+    for (const Contact& contact : std::invoke(listOf, *buffers[i])) {
       const Ids ids = idsOf(contact);
       entries.push_back({ContactSortKey(ids[0], ids[1], i < preferred), &contact});
     }
@@ -86,6 +87,7 @@ void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch
 std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                           OrderScratch& scratch, CollisionData::Contents& out) {
   PALPATE_ASSERT(preferred <= buffers.size());
+  const auto shapesOf = [](const ContactBuffers& found) -> auto& { return found.shapes.shape; };
   const std::size_t count =
       order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
             out.vertexTriangle, byVertex, &scratch.preferred[0]) +
@@ -93,11 +95,11 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
             out.triangleVertex, byTriangle, &scratch.preferred[1]) +
       order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges,
             &scratch.preferred[2]);
-  order(buffers, preferred, &ContactBuffers::shape, scratch.shape, out.shape, byElement, nullptr);
+  order(buffers, preferred, shapesOf, scratch.shape, out.shape, byElement, nullptr);
   out.shapeShape.clear();
   for (const ContactBuffers* buffer : buffers)
-    out.shapeShape.insert(out.shapeShape.end(), buffer->shapeShape.begin(),
-                          buffer->shapeShape.end());
+    out.shapeShape.insert(out.shapeShape.end(), buffer->shapes.shapeShape.begin(),
+                          buffer->shapes.shapeShape.end());
   auto& triangles = out.intersectingTriangles;
   triangles.clear();
   for (const ContactBuffers* buffer : buffers)

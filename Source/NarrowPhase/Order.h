@@ -3,6 +3,7 @@
 #include <palpate/CollisionData.h>
 
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Assert.h"
 
 #include <array>
 #include <cstdint>
@@ -15,7 +16,9 @@ class ContactSortKey {
  public:
   /// `second` is below 2^63.
   ContactSortKey(std::uint64_t first, std::uint64_t second, bool isPreferred)
-      : m_words{first, second << 1 | (isPreferred ? 0 : 1)} {}
+      : m_words{first, second << 1 | (isPreferred ? 0 : 1)} {
+    PALPATE_ASSERT(second >> 63 == 0);
+  }
   bool isPreferred() const { return (m_words[1] & 1) == 0; }
   bool hasElementsOf(const ContactSortKey& other) const {
     return m_words[0] == other.m_words[0] && m_words[1] >> 1 == other.m_words[1] >> 1;

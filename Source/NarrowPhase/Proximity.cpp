@@ -220,7 +220,8 @@ class ProximityFinder {
                       out),
         m_sharedVertex(pair.a.topology, pair.self() ? pair.floats : nullptr, candidates),
         m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
-        m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.hasLines()) {}
+        m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.has(GeometryType::Lines)) {
+  }
 
   void find(std::span<const ElementPair> candidates) {
     for (const ElementPair& candidate : candidates) add(candidate);
@@ -277,7 +278,7 @@ class ProximityFinder {
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
-    if (m_pair.hasLines()) return testLineEdges(m_pair, edgeA, edgeB, m_check, m_out);
+    if (m_pair.has(GeometryType::Lines)) return testLineEdges(m_pair, edgeA, edgeB, m_check, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);
   }
 

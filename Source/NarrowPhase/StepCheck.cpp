@@ -3,6 +3,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/MotionBound.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -63,6 +64,7 @@ void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuf
     return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
   };
   const auto &ofA = touched.verticesA, &ofB = pair.self() ? ofA : touched.verticesB;
+  PALPATE_ASSERT(std::is_sorted(ofA.begin(), ofA.end()) && std::is_sorted(ofB.begin(), ofB.end()));
   const auto moveImpacts = [&](Buffer<VertexTriangleContact>& list, bool swapped) {
     const Features<Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
                                                   swapped ? pair.a : pair.b};

@@ -1,3 +1,4 @@
+// Part of Shapes/Polytope.h: distances.
 #include "Shapes/Polytope.h"
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"

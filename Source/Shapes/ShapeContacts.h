@@ -25,6 +25,14 @@ struct ShapeContactBuffers {
   bool shapeSideUnknown = false;   ///< as StepFacts::sideUnknown
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
+
+  void clear() {
+    shape.clear();
+    shapeShape.clear();
+    shapeGap = std::numeric_limits<double>::infinity();
+    shapeSideUnknown = false;
+    featurePairs = exactDecisions = 0;
+  }
 };
 
 /// Finds the contacts between the shape and the features that the given elements of the mesh own.

@@ -1,3 +1,4 @@
+// Part of Shapes/Shape.h: the distance of two shapes.
 #include "Shapes/Shape.h"
 #include "Shapes/ShapeLengths.h"
 

@@ -1,6 +1,7 @@
 #include "Validity/IntersectionAtEnd.h"
 
 #include "Math/MotionBound.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -44,6 +45,7 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
   using Ids = std::span<const std::uint32_t>;
   const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
   const double rounding = pair.step.motionWithRounding - pair.step.motion;
+  PALPATE_ASSERT(!(rounding < 0.0));
   std::size_t checksLeft = kFreeChecks;
   forEachTimed(contacts, [&](const auto& list) { checksLeft += list.size(); });
   Buffer<ElementPair>& batch = counts.part;

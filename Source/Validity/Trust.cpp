@@ -88,7 +88,8 @@ bool measuredApart(const MeshPair& meshes, const PairPlan& plan, const StepFacts
     return facts.gapAtStart > 0.0;
   }
   if (plan.method != Method::Proximity) return false;
-  const double moved = plan.motion + plan.arcDeviation, left = meshes.hasShape() ? moved : 0.0;
+  const double moved = plan.motion + plan.arcDeviation,
+               left = meshes.has(GeometryType::Shape) ? moved : 0.0;
   return moved <= meshes.settings.thickness && facts.clearance > left + roundingOf(plan.step);
 }
 
@@ -214,7 +215,8 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
       (haveTriangles(a, b) || measuredApart(meshes, plan, facts, contents.earliestTimeOfImpact));
   validity.displacementLimit = displacementLimitOf(settings, a, b, plan);
   const bool listsFastVertices = !usesMotionTolerance(settings, a, b) &&
-                                 plan.method != Method::Continuous && !meshes.hasShape();
+                                 plan.method != Method::Continuous &&
+                                 !meshes.has(GeometryType::Shape);
   if (listsFastVertices && !(plan.motion <= validity.displacementLimit)) {
     addFastVertices(validity.untrustedVerticesA, a, b, validity.displacementLimit);
     if (&a.mesh != &b.mesh)
@@ -266,6 +268,7 @@ void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair
   }
   // Earliest times come without contacts, and filtered features are not among the contacts.
   if (meshes.settings.earliestTimeOnly || meshes.hasFilters()) return;
+  PALPATE_ASSERT(m_atStart.meeting.has_value() || !m_atStart.witness);
   IntersectionAtEnd end;
   if (m_atStart.meeting == Meeting::Piercing && m_atStart.witness &&
       meetingOf(meshes, false, *m_atStart.witness, counts) == Meeting::Piercing)

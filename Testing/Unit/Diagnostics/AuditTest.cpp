@@ -34,42 +34,62 @@ TriangleMesh movingMesh(Random& random, const Mesh& mesh) {
   return {MeshTopology(mesh.positions.size(), mesh.triangles), now, mesh.positions};
 }
 
+/// Two geometries, and their pair as a frame leaves it.
+struct AuditedPair {
+  Geometry a{GeometryId{0}}, b{GeometryId{1}};
+  PairRecord record;
+
+  AuditedPair(const CollisionPair& pair, PairKind kind) {
+    record.pair = pair;
+    record.a = &a;
+    record.b = pair.a == pair.b ? &a : &b;
+    record.plan.kind = kind;
+    record.plan.method = pair.settings.method;
+  }
+  std::vector<AuditFailure> failures(const CollisionData::Contents& contents,
+                                     const AuditSettings& settings = kEverything,
+                                     std::uint64_t frame = 1) const {
+    std::vector<AuditFailure> out;
+    audit(record, CollisionData(contents), settings, frame, out);
+    return out;
+  }
+};
+
 /// Two meshes in contact, their contacts, and the internal function that audits other contacts than
 /// these.
 struct Scene {
   Mesh first, second;
-  TriangleMesh a, b;
   PairSettings settings;
   bool self;
   CollisionPair pair{GeometryId{0}, GeometryId{self ? 0u : 1u}, settings};
+  AuditedPair audited{pair, PairKind::Meshes};
   OctreeBasedCD detection{Settings{.threads = 1}};
 
   Scene(Random& random, const PairSettings& pairSettings, bool withItself)
       : first(testing::soup(random, 30, 0.3)),
         second(testing::soup(random, 30, 0.3)),
-        a(movingMesh(random, first)),
-        b(movingMesh(random, second)),
         settings(pairSettings),
         self(withItself) {
+    audited.a.body.mesh = movingMesh(random, first);
+    audited.b.body.mesh = movingMesh(random, second);
     detection.addTriangleMesh(first.positions, first.triangles);
     detection.addTriangleMesh(second.positions, second.triangles);
-    detection.setPositions(GeometryId{0}, a.before.all(), a.now.all());
-    detection.setPositions(GeometryId{1}, b.before.all(), b.now.all());
+    detection.setPositions(GeometryId{0}, a().before.all(), a().now.all());
+    detection.setPositions(GeometryId{1}, b().before.all(), b().now.all());
     detection.addCollisionPair(pair.a, pair.b, settings);
     detection.detectCollision();
     detection.advance();
   }
 
-  MeshPair meshes() const { return {a, self ? a : b, settings}; }
+  const TriangleMesh& a() const { return audited.a.body.mesh; }
+  const TriangleMesh& b() const { return audited.b.body.mesh; }
   CollisionData::Contents found() const {
     return CollisionData(detection.collisionData(pair.a, pair.b)).contents();
   }
   std::vector<AuditFailure> failures(const CollisionData::Contents& contents,
                                      const AuditSettings& auditSettings = kEverything,
                                      std::uint64_t frame = 1) const {
-    std::vector<AuditFailure> out;
-    audit(meshes(), pair, CollisionData(contents), auditSettings, frame, false, out);
-    return out;
+    return audited.failures(contents, auditSettings, frame);
   }
 };
 
@@ -79,7 +99,8 @@ void forEachScene(F&& f) {
   for (const PairSettings& settings : kPairSettings)
     for (const bool self : {false, true}) {
       SCOPED_TRACE(static_cast<int>(settings.method) * 10 + self);
-      f(Scene(random, settings, self));
+      Scene scene(random, settings, self);
+      f(scene);
     }
 }
 
@@ -137,16 +158,11 @@ void expectEachFault(const Scene& scene, List list,
 }
 
 TEST(Audit, FindsFaultsBetweenTwoShapes) {
-  const TriangleMesh none;
-  const PlacedShape a(Box{{0, 0, 0}, {1, 1, 1}}), b(Box{{0, 0, 2.5}, {1, 1, 1}});
   const PairSettings settings{.method = Method::Proximity, .thickness = 1};
   const CollisionPair pair{GeometryId{0}, GeometryId{1}, settings};
-  const auto audited = [&](const CollisionData::Contents& contents) {
-    std::vector<AuditFailure> out;
-    audit({.a = none, .b = none, .settings = settings, .shapeOfA = &a, .shapeOfB = &b}, pair,
-          CollisionData(contents), kEverything, 1, false, out);
-    return out;
-  };
+  AuditedPair audited(pair, PairKind::Shapes);
+  audited.a.body.shape.emplace(Box{{0, 0, 0}, {1, 1, 1}});
+  audited.b.body.shape.emplace(Box{{0, 0, 2.5}, {1, 1, 1}});
   OctreeBasedCD detection;
   detection.addAnalyticalGeometry(Box{{0, 0, 0}, {1, 1, 1}});
   detection.addAnalyticalGeometry(Box{{0, 0, 2.5}, {1, 1, 1}});
@@ -154,9 +170,9 @@ TEST(Audit, FindsFaultsBetweenTwoShapes) {
   detection.detectCollision();
   const auto good = CollisionData(detection.collisionData(pair.a, pair.b)).contents();
   ASSERT_EQ(good.shapeShape.size(), 1u);
-  EXPECT_TRUE(audited(good).empty());
+  EXPECT_TRUE(audited.failures(good).empty());
   const auto expectFault = [&](const CollisionData::Contents& faulty, Fault fault) {
-    const std::vector<AuditFailure> failures = audited(faulty);
+    const std::vector<AuditFailure> failures = audited.failures(faulty);
     ASSERT_EQ(failures.size(), 1u);
     EXPECT_EQ(failures[0].fault, fault);
     EXPECT_EQ(failures[0].list, List::ShapeShape);
@@ -243,8 +259,8 @@ std::array<std::set<std::uint32_t>, 2> intersectingVertices(const Scene& scene) 
     OctreeBasedCD detection{Settings{.threads = 1}};
     const GeometryId a = detection.addTriangleMesh(scene.first.positions, scene.first.triangles),
                      b = detection.addTriangleMesh(scene.second.positions, scene.second.triangles);
-    detection.setPositions(a, (atStart ? scene.a.before : scene.a.now).all());
-    detection.setPositions(b, (atStart ? scene.b.before : scene.b.now).all());
+    detection.setPositions(a, (atStart ? scene.a().before : scene.a().now).all());
+    detection.setPositions(b, (atStart ? scene.b().before : scene.b().now).all());
     detection.addCollisionPair(a, b, {.method = Method::Intersection});
     detection.detectCollision();
     for (const auto& [s, t] : detection.collisionData(a, b).intersectingTriangles()) {
@@ -259,14 +275,12 @@ std::array<std::set<std::uint32_t>, 2> intersectingVertices(const Scene& scene) 
 /// knows.
 TEST(Audit, ComparesWithAutoWhatKnownSidesDoNotConcern) {
   Random random(7);
-  const Scene scene(random, {.method = Method::Proximity, .thickness = 0.05}, false);
-  CollisionPair pair = scene.pair;
-  pair.settings.method = Method::Auto;
+  Scene scene(random, {.method = Method::Proximity, .thickness = 0.05}, false);
+  PairRecord& record = scene.audited.record;
+  record.pair.settings.method = Method::Auto;
   const auto missing = [&](bool sidesAreKnown) {
-    std::vector<AuditFailure> out;
-    audit(scene.meshes(), pair, CollisionData(CollisionData::Contents()), kEverything, 1,
-          sidesAreKnown, out);
-    return out;
+    record.sidesAreKnown = sidesAreKnown;
+    return scene.failures({});
   };
   const auto intersecting = intersectingVertices(scene);
   const auto &ofA = intersecting[0], &ofB = intersecting[1];
@@ -300,8 +314,8 @@ std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
 }
 
 TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
-  forEachScene([&](const Scene& scene) {
-    const FeatureLists every = everyFeature(scene.meshes());
+  forEachScene([&](Scene& scene) {
+    const FeatureLists every = everyFeature(scene.audited.record);
     std::size_t all = 0;
     for (const std::size_t size : sizesOf(every)) all += size;
     const auto listsOf = [](const FeatureLists& lists) {
@@ -313,7 +327,7 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
     for (const int features : {1, 2, 7, most / 2, most - 1, most, most + 1}) {
       for (std::uint64_t frame = 1; frame <= 50; ++frame) {
         const AuditSettings settings{.features = features, .seed = 9};
-        const FeatureLists drawn = drawFeatures(scene.meshes(), scene.pair, settings, frame);
+        const FeatureLists drawn = drawFeatures(scene.audited.record, settings, frame);
         std::size_t total = 0;
         for (std::size_t list = 0; list < 4; ++list) {
           const std::vector<std::uint32_t> ids = listsOf(drawn)[list];
@@ -325,8 +339,7 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
           if (features == most / 2) times[list].insert(ids.begin(), ids.end());
         }
         EXPECT_EQ(total, std::min<std::size_t>(all, static_cast<std::size_t>(features)));
-        EXPECT_EQ(listsOf(drawn),
-                  listsOf(drawFeatures(scene.meshes(), scene.pair, settings, frame)));
+        EXPECT_EQ(listsOf(drawn), listsOf(drawFeatures(scene.audited.record, settings, frame)));
       }
     }
     // A sample is half of all, in each of 50 frames: 25 times each on average. 8 is more than 4
@@ -335,8 +348,8 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
       for (const std::uint32_t id : allLists[list]) EXPECT_GT(times[list].count(id), 7u);
 
     const auto draw = [&](std::uint64_t seed, std::uint64_t frame, std::uint32_t b) {
-      const CollisionPair pair{GeometryId{0}, GeometryId{b}, scene.settings};
-      return listsOf(drawFeatures(scene.meshes(), pair, {.features = 8, .seed = seed}, frame));
+      scene.audited.record.pair.b = GeometryId{b};
+      return listsOf(drawFeatures(scene.audited.record, {.features = 8, .seed = seed}, frame));
     };
     EXPECT_NE(draw(1, 1, 1), draw(2, 1, 1));
     EXPECT_NE(draw(1, 1, 1), draw(std::uint64_t{1} << 32, 1, 1));
