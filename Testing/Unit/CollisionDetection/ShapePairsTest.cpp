@@ -4,6 +4,7 @@
 #include "Common/PairRun.h"
 #include "Common/Replayed.h"
 #include "Common/ShapeTruth.h"
+#include "Common/SupportedMethods.h"
 
 #include <gtest/gtest.h>
 
@@ -291,7 +292,7 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
                      ball = collisions.addAnalyticalGeometry(Sphere{{0, 0, 2}, 0.25}),
                      other = collisions.addAnalyticalGeometry(
                          Capsule{{-length, 0, 0}, {length, 0, 0}, 0.25});
-    for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous}) {
+    for (const Method method : supportedMethods(GeometryType::Shape, GeometryType::Shape)) {
       try {
         collisions.addCollisionPair(box, rod, {method, 1});
         ADD_FAILURE() << "accepted";

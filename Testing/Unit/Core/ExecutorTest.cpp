@@ -7,6 +7,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
+#include "Common/SupportedMethods.h"
 
 #include <gtest/gtest.h>
 
@@ -82,7 +83,7 @@ std::vector<Named> executors() {
 std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed, int frames = 4) {
   std::vector<std::uint64_t> hashes;
   for (const Method method :
-       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto}) {
+       testing::supportedMethods(GeometryType::Triangles, GeometryType::Triangles)) {
     testing::Random random(seed);
     testing::Mesh a = testing::soup(random, 400, 0.05);
     const testing::Mesh b = testing::sheet(24, 0.5, 0.3);

@@ -4,6 +4,7 @@
 
 #include "Common/DegenerateCases.h"
 #include "Common/PairRun.h"
+#include "Common/SupportedMethods.h"
 #include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/ProximityFilter.h"
 #include "NarrowPhase/SharedVertex.h"
@@ -65,8 +66,7 @@ std::vector<Vector3d> scaled(std::vector<Vector3d> positions, double factor) {
 /// before the step. Returns the octrees' exact decisions.
 std::size_t compare(const Mesh& a, const Mesh& b, double thickness, double scale = 1.001) {
   std::size_t exact = 0;
-  for (const Method method :
-       {Method::Intersection, Method::Proximity, Method::Continuous, Method::Auto})
+  for (const Method method : supportedMethods(GeometryType::Triangles, GeometryType::Triangles))
     for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
       SCOPED_TRACE(static_cast<int>(method));
       PairSettings settings{method, thickness};

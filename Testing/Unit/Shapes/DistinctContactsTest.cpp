@@ -8,6 +8,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/SupportedMethods.h"
 
 #include <gtest/gtest.h>
 
@@ -301,7 +302,7 @@ TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
     const Mesh floor = flatFloor(random, irregular, floorTurn);
     for (const AnalyticalGeometry& shape : bodies(random))
       for (const bool lies : {false, true})
-        for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
+        for (const Method method : supportedMethods(GeometryType::Shape, GeometryType::Triangles))
           for (const double depth : {0.0, 0.2}) {
             const bool isRound = shape.index() < 2,
                        isThin = depthOf(shape, floorTurn, floorTurn.col(2)) < 0.3;
