@@ -1,3 +1,4 @@
+// Part of DistanceField/FieldCells.h: FieldLookup::values().
 #include "DistanceField/FieldCells.h"
 
 #include <bit>

@@ -1,3 +1,4 @@
+// Part of Math/ClosestPoint.h: the distance of two edges.
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
 #include "Math/Foot.h"

@@ -1,3 +1,4 @@
+// Part of Math/ImpactQuery.h: findApproach().
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"

@@ -1,3 +1,4 @@
+// Part of Math/Nearing.h: the times at which features come nearer.
 #include "Math/Nearing.h"
 
 #include "Math/ClosestPoint.h"

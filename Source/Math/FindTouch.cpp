@@ -1,3 +1,4 @@
+// Part of Math/ImpactQuery.h: findTouch().
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"

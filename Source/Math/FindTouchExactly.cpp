@@ -1,3 +1,4 @@
+// Part of Math/ImpactQuery.h: findTouchExactly().
 #include "Math/ImpactQuery.h"
 #include "Exact/AlgebraicTime.h"
 #include "Core/Assert.h"

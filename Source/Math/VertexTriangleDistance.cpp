@@ -1,3 +1,4 @@
+// Part of Math/ClosestPoint.h: the distance of a vertex and a triangle.
 #include "Math/ClosestPoint.h"
 #include "Math/ExactClosestPoint.h"
 #include "Math/Foot.h"

@@ -1,3 +1,4 @@
+// Part of <palpate/Types.h>: weld().
 #include <palpate/Error.h>
 #include <palpate/Types.h>
 

@@ -1,3 +1,4 @@
+// Part of Octree/Forest.h: the invariants of an octree.
 #include "Octree/Forest.h"
 
 #include <algorithm>

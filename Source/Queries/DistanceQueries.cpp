@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: distances and penetrations of two geometries.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

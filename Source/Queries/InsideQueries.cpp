@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: points inside of bodies.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: elements near points.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: elements that overlap a shape.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: intervals along a path.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

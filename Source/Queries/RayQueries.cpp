@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: rays.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>

@@ -1,3 +1,4 @@
+// Part of <palpate/SpatialQueries.h>: contacts of a mesh at a pose of its own.
 #include <palpate/SpatialQueries.h>
 
 #include <palpate/Error.h>
@@ -15,7 +16,6 @@
 #include <memory>
 #include <utility>
 
-// SpatialQueries::contacts(): contacts of a mesh at a pose of its own.
 namespace palpate {
 
 struct RigidMesh::Implementation {

@@ -68,8 +68,9 @@ checkPlaces() {
     while read -r include; do
       case $include in
         "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
-        "<tbb/"* | "<oneapi/"* | "<thread" | "<condition_variable" | "<future" | "<execution" | "<pthread.h")
+        "<tbb/"* | "<oneapi/"* | "<thread" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
+        "<condition_variable") place=Source/Core/ ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<meshoptimizer.h") place=Source/Simplify/Meshoptimizer/Simplify.cpp ;;
         "<gmp"*) place=Source/Exact/Exact.h ;;
@@ -172,6 +173,17 @@ checkFormat() {
   while read -r marker; do fault "conflict marker: $marker"; done < <(
     grep -rnE '^(<<<<<<<|>>>>>>>) ' --exclude-dir=build --exclude-dir=out --exclude-dir=.git .)
   find Source Examples Testing -name '*.h' -o -name '*.cpp' | xargs "$tool" --dry-run -Werror --style=file || faults=1
+}
+
+# Each source file has a header of its name, beside it or public, or its first line says of which header it is a part.
+checkParts() {
+  local file name header
+  while read -r file; do
+    name=$(basename "$file" .cpp).h
+    [[ -e ${file%.cpp}.h || -n $(find Source -path "*Public/*/$name") ]] && continue
+    header=$(sed -nE '1s|^// Part of <?([A-Za-z/]+\.h)>?: .*|\1|p' "$file")
+    [[ -n $header && -n $(find Source -path "*/$header") ]] || fault "$file: the first line names no header"
+  done < <(sourceFiles | grep '\.cpp$')
 }
 
 # Names that say nothing. The size of Source is printed, and not judged.
