@@ -1,3 +1,5 @@
+// Part of MeshFiles/Formats.h: legacy VTK files.
+
 #include "MeshFiles/Formats.h"
 #include "MeshFiles/Output.h"
 #include "MeshFiles/VtkCells.h"

@@ -1,3 +1,5 @@
+// Part of MeshFiles/Formats.h: MEDIT files.
+
 #include "MeshFiles/Formats.h"
 #include "MeshFiles/Output.h"
 

@@ -1,3 +1,5 @@
+// Part of MeshFiles/Formats.h: VTP files.
+
 #include "MeshFiles/Formats.h"
 #include "MeshFiles/XmlArrays.h"
 

@@ -1,3 +1,5 @@
+// Part of MeshFiles/Formats.h: VTU files.
+
 #include "MeshFiles/Formats.h"
 #include "MeshFiles/XmlArrays.h"
 
