@@ -126,7 +126,7 @@ void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
 
 void World::place(BodyId id, const Eigen::Matrix3d& rotation, const Vector3d& translation) {
   Body& body = m_bodies[id];
-  m_detection.setTransform(body.id, rotation, translation);
+  m_detection.setTransform(body.id, {rotation, translation});
   body.rotation = rotation;
   body.translation = translation;
   for (std::size_t i = 0; i < body.rest.size(); ++i)

@@ -80,7 +80,7 @@ void VirtualTool::addRows(const Snapshot& snapshot, double share) {
   const auto at = [&](const std::array<std::uint32_t, 3>& vertices, const Vector3d& weights,
                       double when) { return pointOf(snapshot, m_organ, vertices, weights, when); };
   const Vector3d ahead = at(m_nearest, m_weights, 1) - at(m_nearest, m_weights, share);
-  snapshot.queries().contacts(m_organ, m_blade, m_proxy.rotation, m_proxy.position + ahead,
+  snapshot.queries().contacts(m_organ, m_blade, {m_proxy.rotation, m_proxy.position + ahead},
                               kSkin + 2 * kMostMove, m_contacts);
   m_rows.clear();
   m_speed = 0;

@@ -101,7 +101,7 @@ class RobotArms : public LiveScene {
     const auto& bodies = m_world.bodies();
     for (std::size_t i = 0; i < bodies.size(); ++i)
       for (const GeometryId id : {m_meshes[i], m_firsts[i]})
-        m_check.setTransform(id, bodies[i].rotation, bodies[i].translation);
+        m_check.setTransform(id, {bodies[i].rotation, bodies[i].translation});
     m_check.detectCollision();
     m_check.advance();
     for (const auto& [a, b, gap] : m_world.pairs()) {

@@ -72,7 +72,7 @@ void forEachBodyEnd(const Body& a, const Body& b, double thickness, bool wholeSt
   const double sizes =
       2.0 * (largest(from.origin) + a.tree.reach() + largest(to.origin) + b.tree.reach());
   const Matrix3d inverse = inverseOf(b.mesh.now.transform().rotation);
-  const auto add = [&](const RigidTransform& ofA, const RigidTransform& ofB) {
+  const auto add = [&](const Pose& ofA, const Pose& ofB) {
     const double size = sizes + largest(ofA.translation) + largest(ofB.translation);
     f(MapEnd(inverse * ofA.rotation,
              (inverse * (ofA(from.origin) - ofB.translation) - to.origin) * to.scale,
@@ -124,7 +124,7 @@ float OctreeFrame::slackAt(const FloatPoint& position) const {
 BoxMap OctreeFrame::toWorld(const Vector3d& origin, double thickness, bool wholeStep) const {
   BoxMap map;
   if (!m_pose) return map;
-  const auto add = [&](const RigidTransform& transform) {
+  const auto add = [&](const Pose& transform) {
     const double error =
         kPlacedError * m_frame.scale *
         (2.0 * largest(m_frame.origin) + largest(transform.translation) + largest(origin));
@@ -133,7 +133,7 @@ BoxMap OctreeFrame::toWorld(const Vector3d& origin, double thickness, bool whole
         .addTo(map);
   };
   add(*m_pose);
-  const RigidTransform& before = m_body.mesh.before.transform();
+  const Pose& before = m_body.mesh.before.transform();
   if (wholeStep && !(*m_pose == before)) add(before);
   return map;
 }

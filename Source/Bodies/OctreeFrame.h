@@ -59,7 +59,7 @@ class OctreeFrame {
  private:
   const Body& m_body;
   const FloatFrame& m_frame;
-  const RigidTransform* const m_pose;  ///< null: not placed
+  const Pose* const m_pose;  ///< null: not placed
   const Eigen::Vector3d m_origin;
 };
 

@@ -1,7 +1,8 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
-#include "CollisionDetection/ShapePointMotion.h"
+#include "Mesh/PointMotion.h"
+#include "Mesh/Rotation.h"
 #include "Core/FloatingPoint.h"
 
 #include <string>
@@ -23,9 +24,10 @@ double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
-                std::vector<ConstraintRow>& rows, const ShapeMotion& shape) {
+                std::vector<ConstraintRow>& rows, const RigidMotion& body) {
   const StandardFloatingPoint standard;
   const std::size_t initialSize = rows.size();
+  const RigidMotion motion = withExactRotations(body);
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
     throw Error(ErrorCode::WrongPositionCount,
@@ -64,7 +66,8 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
       for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
       const std::uint32_t first = mesh.first;
       const double time = contact.timeOfImpact;
-      const Eigen::Vector3d rest = (1 - time) * displacementAt(shape, contact.pointOnShape, time);
+      const Eigen::Vector3d rest =
+          (1 - time) * displacementAt(motion.before, motion.now, contact.pointOnShape, time);
       rows.push_back({{first + i, first + j, first + k, first + i},
                       {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
                       contact.normal,

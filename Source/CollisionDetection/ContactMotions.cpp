@@ -2,7 +2,8 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
-#include "CollisionDetection/ShapePointMotion.h"
+#include "Mesh/PointMotion.h"
+#include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
 #include "Core/FloatingPoint.h"
 
@@ -67,6 +68,7 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
   const StandardFloatingPoint standard;
   const auto nameOf = [&](const ContactSide& side) { return &side == &a ? "a" : "b"; };
   const std::size_t initialSize = motions.size();
+  const RigidMotion motionA = withExactRotations(a.motion), motionB = withExactRotations(b.motion);
 
   // firstCount: how many of the stencil's vertices are on the side that the normal points to.
   const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
@@ -94,20 +96,22 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
                   "appendMotions(): both sides have positions, but one of them is a shape, or a "
                   "body whose distance field answered; leave that one empty");
     const ContactSide& mesh = a.vertices.now.empty() ? b : a;
-    const ContactSide& shape = &mesh == &a ? b : a;
+    const RigidMotion& body = &mesh == &a ? motionB : motionA;
     for (const ShapeContact& contact : contacts.shape()) {
       SideSum sum;
       for (int i = 0; i < 3; ++i)
         sum.add(contact.weights[i],
                 motionOf(mesh, nameOf(mesh), contact.vertices[i], contact.timeOfImpact));
-      motions.push_back({contact.point - sum.radius * contact.normal, contact.pointOnShape,
-                         sum.displacement - displacementAt(shape.shape, contact.pointOnShape,
-                                                           contact.timeOfImpact)});
+      motions.push_back(
+          {contact.point - sum.radius * contact.normal, contact.pointOnShape,
+           sum.displacement -
+               displacementAt(body.before, body.now, contact.pointOnShape, contact.timeOfImpact)});
     }
     for (const ShapeShapeContact& contact : contacts.shapeShape())
-      motions.push_back({contact.pointA, contact.pointB,
-                         displacementAt(a.shape, contact.pointA, contact.timeOfImpact) -
-                             displacementAt(b.shape, contact.pointB, contact.timeOfImpact)});
+      motions.push_back(
+          {contact.pointA, contact.pointB,
+           displacementAt(motionA.before, motionA.now, contact.pointA, contact.timeOfImpact) -
+               displacementAt(motionB.before, motionB.now, contact.pointB, contact.timeOfImpact)});
   } catch (...) {
     motions.erase(motions.begin() + static_cast<std::ptrdiff_t>(initialSize), motions.end());
     throw;

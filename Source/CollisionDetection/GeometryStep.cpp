@@ -82,25 +82,24 @@ void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
   if (measures) *moved = motion;
 }
 
-void GeometryStep::place(TriangleMesh& mesh, Positions& end,
-                         const RigidTransform& transform) noexcept {
+void GeometryStep::place(TriangleMesh& mesh, Positions& end, const Pose& transform) noexcept {
   for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
                                  &std::as_const(m_detected), &std::as_const(mesh.before)})
-    if (other->isPlaced() && other->transform().hasBitsOf(transform)) return end.placeAs(*other);
+    if (other->isPlaced() && haveSameBits(other->transform(), transform))
+      return end.placeAs(*other);
   end.place(transform, m_revisions.next());
 }
 
 void GeometryStep::setTransform(const GeometryLabel& label, TriangleMesh& mesh, PlacedShape* shape,
-                                const std::optional<RigidTransform>& givenBefore,
-                                const RigidTransform& givenNow) {
-  const auto checked = [&](const RigidTransform& transform, const char* which) {
+                                const std::optional<Pose>& givenBefore, const Pose& givenNow) {
+  const auto checked = [&](const Pose& transform, const char* which) {
     if (const std::string fault = faultOf(transform); !fault.empty())
       throw Error(ErrorCode::InvalidTransform, nameOf(label) + ": " + which + fault, label.id);
     return withExactRotation(transform);
   };
-  std::optional<RigidTransform> before;
+  std::optional<Pose> before;
   if (givenBefore) before = checked(*givenBefore, "before: ");
-  const RigidTransform now = checked(givenNow, before ? "now: " : "");
+  const Pose now = checked(givenNow, before ? "now: " : "");
   const bool followsNow = m_isNew && !m_transformGiven && !before;
   if (shape) {
     m_spare->place(shape->analytical, now);

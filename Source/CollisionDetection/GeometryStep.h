@@ -43,7 +43,7 @@ class GeometryStep {
                     std::optional<MotionRange>* moved);
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
-                    const std::optional<RigidTransform>& before, const RigidTransform& now);
+                    const std::optional<Pose>& before, const Pose& now);
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
@@ -63,7 +63,7 @@ class GeometryStep {
                               const char* which, const Threads&,
                               const Eigen::Vector3d* from = nullptr, MotionRange* moved = nullptr);
   void setBody(TriangleMesh&, Positions& end, Positions::Body) noexcept;
-  void place(TriangleMesh&, Positions& end, const RigidTransform&) noexcept;
+  void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
 
   Positions m_detected;
   bool m_isNew = true;

@@ -163,8 +163,8 @@ void GeometryTable::attach(GeometryId id, const std::optional<SurfaceProxySettin
   ++m_state;
 }
 
-void GeometryTable::setTransform(GeometryId id, const std::optional<RigidTransform>& before,
-                                 const RigidTransform& now) {
+void GeometryTable::setTransform(GeometryId id, const std::optional<Pose>& before,
+                                 const Pose& now) {
   Geometry& geometry = at(id);
   // The positions in the body's frame, and the octree, stay as they are.
   geometry.step.setTransform(geometry, geometry.body.mesh, shapeOf(geometry), before, now);

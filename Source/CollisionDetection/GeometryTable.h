@@ -44,8 +44,7 @@ class GeometryTable {
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
 
-  void setTransform(GeometryId, const std::optional<RigidTransform>& before,
-                    const RigidTransform& now);
+  void setTransform(GeometryId, const std::optional<Pose>& before, const Pose& now);
   /// Puts the positions and the transform now back to those of earlier in this step.
   void restoreNow(Geometry&, const Positions& now) noexcept;
   void advance() noexcept;

@@ -36,10 +36,10 @@ Vector3d between(const Vector3d& before, const Vector3d& now, double fraction) {
 }
 
 /// The rotation is the normalised interpolation of the quaternions along the shorter way.
-RigidTransform between(const RigidTransform& before, const RigidTransform& now, double fraction) {
+Pose between(const Pose& before, const Pose& now, double fraction) {
   if (fraction == 0.0) return before;
   if (fraction == 1.0) return now;
-  RigidTransform pose{before.rotation, between(before.translation, now.translation, fraction)};
+  Pose pose{before.rotation, between(before.translation, now.translation, fraction)};
   if (before.rotation == now.rotation) return pose;
   const Eigen::Quaterniond from(before.rotation), to(now.rotation);
   const double side = from.coeffs().dot(to.coeffs()) < 0 ? -1.0 : 1.0;

@@ -46,8 +46,8 @@ ImpactQuery queryOf(const Placed<EdgeEdgeContact>& placed) {
 
 /// How a point of a placed geometry moves in the step as it is now.
 Vector3d displacementOf(const Geometry& geometry, const Vector3d& point) {
-  const RigidTransform &before = geometry.body.mesh.before.transform(),
-                       &now = geometry.body.mesh.now.transform();
+  const Pose &before = geometry.body.mesh.before.transform(),
+             &now = geometry.body.mesh.now.transform();
   const Vector3d inBody = before.rotation.transpose() * (point - before.translation);
   return now(inBody) - before(inBody);
 }

@@ -145,21 +145,16 @@ void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vec
   all->withinLimit([&] { all->geometries.setPositions(geometry, before, now, all->threads); });
 }
 
-void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotation,
-                                 const Eigen::Vector3d& translation) {
+void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& now) {
   const Implementation::ChangeGuard all(m_implementation);
   all->pairs.checkRigid(all->geometries.at(geometry));
-  all->geometries.setTransform(geometry, {}, {rotation, translation});
+  all->geometries.setTransform(geometry, {}, now);
 }
 
-void OctreeBasedCD::setTransform(GeometryId geometry, const Eigen::Matrix3d& rotationBefore,
-                                 const Eigen::Vector3d& translationBefore,
-                                 const Eigen::Matrix3d& rotation,
-                                 const Eigen::Vector3d& translation) {
+void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& before, const Pose& now) {
   const Implementation::ChangeGuard all(m_implementation);
   all->pairs.checkRigid(all->geometries.at(geometry));
-  all->geometries.setTransform(geometry, RigidTransform{rotationBefore, translationBefore},
-                               {rotation, translation});
+  all->geometries.setTransform(geometry, before, now);
 }
 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
@@ -195,8 +190,7 @@ TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
 }
 
 Pose OctreeBasedCD::transform(GeometryId geometry) const {
-  const RigidTransform& now = read().geometries.at(geometry).body.mesh.now.transform();
-  return {now.rotation, now.translation};
+  return read().geometries.at(geometry).body.mesh.now.transform();
 }
 
 std::shared_ptr<StepSource> OctreeBasedCD::stepSource() {

@@ -41,8 +41,8 @@ class RigidSearch::Step {
                               m_now.translation.cwiseAbs().maxCoeff());
   }
 
-  const RigidTransform& before() const { return m_before; }
-  const RigidTransform& now() const { return m_now; }
+  const Pose& before() const { return m_before; }
+  const Pose& now() const { return m_now; }
   const Matrix3d& matrix() const { return m_matrix; }
 
   /// An upper bound of size(displacement) over all vertices: the largest value plus twice the slack
@@ -82,7 +82,7 @@ class RigidSearch::Step {
 
  private:
   const Geometry& m_geometry;
-  const RigidTransform &m_before, &m_now;
+  const Pose &m_before, &m_now;
   Matrix3d m_matrix;  ///< a position x in the body's frame is displaced by m_matrix x + m_vector
   Vector3d m_vector;
   double m_slack;

@@ -253,18 +253,15 @@ void shapeOf(File& file, MeshType& mesh, int version) {
     if constexpr (requires { field.capacity(); }) sizeOf(file, field, kPointText);
     fieldOf(file, field);
   });
-  const auto transform = [&](auto& rotation, auto& translation) {
+  const auto poseOf = [&](auto& pose) {
     for (int k = 0; k < 3; ++k) {
-      for (int i = 0; i < 3; ++i) fieldOf(file, rotation(k, i));
-      fieldOf(file, translation[k]);
+      for (int i = 0; i < 3; ++i) fieldOf(file, pose.rotation(k, i));
+      fieldOf(file, pose.translation[k]);
     }
   };
-  transform(mesh.rotation, mesh.translation);
-  if (version >= 7) return transform(mesh.rotationBefore, mesh.translationBefore);
-  if constexpr (kReads<File>) {
-    mesh.rotationBefore = mesh.rotation;
-    mesh.translationBefore = mesh.translation;
-  }
+  poseOf(mesh.motion.now);
+  if (version >= 7) return poseOf(mesh.motion.before);
+  if constexpr (kReads<File>) mesh.motion.before = mesh.motion.now;
 }
 
 /// A shape of the type with this index.
@@ -372,8 +369,7 @@ void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
     const bool isField = mesh.type == GeometryType::Field;
     if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
     if (mesh.analytical || mesh.field || mesh.proxy)
-      detection.setTransform(id, mesh.rotationBefore, mesh.translationBefore, mesh.rotation,
-                             mesh.translation);
+      detection.setTransform(id, mesh.motion.before, mesh.motion.now);
     detection.setName(id, mesh.name);
     detection.setCollisionFilter(id, mesh.filter);
     detection.setDisabledElements(id, mesh.disabled);

@@ -31,9 +31,7 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
     copyTo(copy.now, mesh.now.body());
   } else if (!geometry.body.shape)
     copy.before = mesh.before.all(), copy.now = mesh.now.all();
-  const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
-  copy.rotation = now.rotation, copy.translation = now.translation;
-  copy.rotationBefore = before.rotation, copy.translationBefore = before.translation;
+  copy.motion = {mesh.before.transform(), mesh.now.transform()};
   if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.triangles);
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
   if (geometry.body.solid) {

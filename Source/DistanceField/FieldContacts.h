@@ -39,8 +39,8 @@ class PlacedField {
  private:
   const DistanceField& m_field;
   const FieldLookup& m_lookup;
-  RigidTransform m_pose;  ///< with an orthonormal rotation
-  double m_turned = 0;    ///< the norm of its difference from the rotation of the mesh
+  Pose m_pose;          ///< with an orthonormal rotation
+  double m_turned = 0;  ///< the norm of its difference from the rotation of the mesh
 };
 
 /// L: distances above this are beyond the band, or may be.

@@ -17,8 +17,7 @@ Vector3d solve(const Matrix3d& matrix, const Vector3d& right) {
 
 }  // namespace
 
-Vector3d displacementAt(const RigidTransform& before, const RigidTransform& now,
-                        const Vector3d& point, double time) {
+Vector3d displacementAt(const Pose& before, const Pose& now, const Vector3d& point, double time) {
   const Matrix3d rotation = (1 - time) * before.rotation + time * now.rotation;
   const Vector3d translation = (1 - time) * before.translation + time * now.translation;
   const Vector3d body = solve(rotation, point - translation);

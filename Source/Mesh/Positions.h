@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/CountedVector.h>
+#include <palpate/Types.h>
 
 #include "Mesh/Revision.h"
 #include "Core/Assert.h"
@@ -16,28 +17,11 @@
 
 namespace palpate {
 
-/// A rotation and then a translation.
-struct RigidTransform {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-
-  /// Rounded as it is written: ((r0 x + r1 y) + r2 z) + t. Everything that places a body in the
-  /// world uses this, so that all of it has the same rounding.
-  Eigen::Vector3d operator()(const Eigen::Vector3d& p) const {
-    const auto row = [&](int k) {
-      return rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
-    };
-    return {row(0), row(1), row(2)};
-  }
-  /// Also of zeros, whose signs can reach positions.
-  bool hasBitsOf(const RigidTransform& other) const {
-    return std::memcmp(rotation.data(), other.rotation.data(), sizeof rotation) == 0 &&
-           std::memcmp(translation.data(), other.translation.data(), sizeof translation) == 0;
-  }
-  friend bool operator==(const RigidTransform& l, const RigidTransform& r) {
-    return l.rotation == r.rotation && l.translation == r.translation;
-  }
-};
+/// Whether poses are equal, also in the signs of zeros, which can reach positions.
+inline bool haveSameBits(const Pose& l, const Pose& r) {
+  return std::memcmp(l.rotation.data(), r.rotation.data(), sizeof l.rotation) == 0 &&
+         std::memcmp(l.translation.data(), r.translation.data(), sizeof l.translation) == 0;
+}
 
 /// The positions of a geometry's vertices at one end of a step. A rigid body's positions are stored
 /// in its own frame, shared by both ends, and are transformed to the world when they are read.
@@ -75,8 +59,8 @@ class Positions {
   }
   void setBodyOf(const Positions& other) noexcept { setBody(other.m_body, other.m_bodyRevision); }
   bool isPlaced() const { return m_placed; }
-  const RigidTransform& transform() const { return m_transform; }
-  void place(const RigidTransform& transform, Revision revision) noexcept {
+  const Pose& transform() const { return m_transform; }
+  void place(const Pose& transform, Revision revision) noexcept {
     PALPATE_ASSERT(transform.rotation.allFinite() && transform.translation.allFinite());
     m_transform = transform;
     m_placed = true;
@@ -97,7 +81,7 @@ class Positions {
  private:
   Body m_body;
   const Eigen::Vector3d* m_data;
-  RigidTransform m_transform;
+  Pose m_transform;
   bool m_placed = false;
   Revision m_bodyRevision, m_transformRevision;
 };

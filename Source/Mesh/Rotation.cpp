@@ -30,10 +30,10 @@ double deviationFromRotation(const Matrix3d& r) {
   return most;
 }
 
-RigidTransform withExactRotation(const RigidTransform& pose) {
+Pose withExactRotation(const Pose& pose) {
   const double deviation = deviationFromRotation(pose.rotation);
   if (!(deviation > kOrthonormal && deviation <= kRoughRotation)) return pose;
-  RigidTransform exact = pose;
+  Pose exact = pose;
   for (int round = 0; round < 3; ++round) {
     const Matrix3d square = product(exact.rotation.transpose(), exact.rotation);
     exact.rotation = 0.5 * product(exact.rotation, 3.0 * Matrix3d::Identity() - square);

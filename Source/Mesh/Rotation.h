@@ -17,6 +17,9 @@ double deviationFromRotation(const Eigen::Matrix3d&);
 ///          as it is.
 /// Source   Newton's iteration for the polar decomposition without inverses: Higham, Functions of
 ///          Matrices (2008), 8.3. The error is squared in each of three rounds.
-RigidTransform withExactRotation(const RigidTransform&);
+Pose withExactRotation(const Pose&);
+inline RigidMotion withExactRotations(const RigidMotion& motion) {
+  return {withExactRotation(motion.before), withExactRotation(motion.now)};
+}
 
 }  // namespace palpate

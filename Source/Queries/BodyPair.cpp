@@ -74,7 +74,7 @@ BodyPair::BodyPair(const Body& a, const Body& b, Engine engine, BodyPairScratch&
 Vector3d BodyPair::moved(std::uint32_t vertex, const Vector3d& shift) const {
   if (!m_movesTransform) return m_scratch.a.positions[vertex] + shift;
   const Positions& now = m_a.mesh.now;
-  RigidTransform transform = now.transform();
+  Pose transform = now.transform();
   transform.translation += shift;
   return transform(now.body()[vertex]);
 }

@@ -17,22 +17,20 @@ namespace palpate {
 namespace {
 
 /// Throws InvalidShape or InvalidTransform.
-RigidTransform poseOfQuery(const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
-                           const Eigen::Vector3d& translation) {
+Pose poseOfQuery(const AnalyticalGeometry& shape, const Pose& pose) {
   std::optional<std::size_t> element;
   if (const std::string fault = faultOf(shape, element); !fault.empty())
     throw Error(ErrorCode::InvalidShape, "the query's shape: " + fault, {}, element);
-  return checkedPose({rotation, translation}, "the query's shape");
+  return checkedPose(pose, "the query's shape");
 }
 
 }  // namespace
 
 void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
-                                 const Eigen::Matrix3d& rotation,
-                                 const Eigen::Vector3d& translation,
+                                 const Pose& placement,
                                  std::vector<std::uint32_t>& elements) const {
   const Source::Call source(*this);
-  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
+  const Pose pose = poseOfQuery(shape, placement);
   const Body& geometry = source->at(id);
   checkHasElements(geometry);
   const Source::Loan scratch(*source);
@@ -44,11 +42,10 @@ void SpatialQueries::overlapping(GeometryId id, const AnalyticalGeometry& shape,
   scratch->giveSorted(elements);
 }
 
-void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape,
-                              const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
+void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape, const Pose& placement,
                               double thickness, std::vector<ShapeContact>& out) const {
   const Source::Call source(*this);
-  const RigidTransform pose = poseOfQuery(shape, rotation, translation);
+  const Pose pose = poseOfQuery(shape, placement);
   checkLength(thickness, "thickness", true);
   const Body& geometry = source->at(id);
   checkHasElements(geometry);

@@ -159,7 +159,7 @@ void checkHasElements(const Body& geometry) {
                 geometry.id);
 }
 
-RigidTransform checkedPose(const RigidTransform& pose, const char* what) {
+Pose checkedPose(const Pose& pose, const char* what) {
   if (const std::string fault = faultOf(pose); !fault.empty())
     throw Error(ErrorCode::InvalidTransform, std::string(what) + ": " + fault);
   return withExactRotation(pose);

@@ -177,6 +177,6 @@ void checkLength(double length, const char* name, bool finite);
 void checkHasElements(const Body&);
 /// The pose that is used for one that a user passes (withExactRotation()). Throws InvalidTransform.
 /// what: the start of the message.
-RigidTransform checkedPose(const RigidTransform&, const char* what);
+Pose checkedPose(const Pose&, const char* what);
 
 }  // namespace palpate

@@ -33,8 +33,7 @@ struct RigidMesh::Implementation {
     }
   };
 
-  const Body& place(const RigidTransform& pose, const Body& beside,
-                    const OctreeSettings& settings) {
+  const Body& place(const Pose& pose, const Body& beside, const OctreeSettings& settings) {
     body.mesh.now.place(pose, body.revisions.counter.next());
     body.mesh.before.placeAs(body.mesh.now);
     const double scale = beside.tree.frame().scale;
@@ -89,13 +88,12 @@ RigidMesh::RigidMesh(RigidMesh&&) noexcept = default;
 RigidMesh& RigidMesh::operator=(RigidMesh&&) noexcept = default;
 RigidMesh::~RigidMesh() = default;
 
-void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
-                              const Eigen::Vector3d& translation, double thickness,
-                              CollisionData& out) const {
+void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Pose& placement,
+                              double thickness, CollisionData& out) const {
   const Source::Call source(*this);
   if (!mesh.m_implementation)
     throw Error(ErrorCode::InvalidCall, "this RigidMesh object was moved from");
-  const RigidTransform pose = checkedPose({rotation, translation}, "the query's mesh");
+  const Pose pose = checkedPose(placement, "the query's mesh");
   checkLength(thickness, "thickness", true);
   const Body& a = source->at(id);
   checkHasElements(a);

@@ -95,7 +95,7 @@ struct Convex {
   double magnitude = 0;  ///< L: about the largest distance of its points from p
 };
 
-Convex convexOf(const Box& box, const RigidTransform& pose) {
+Convex convexOf(const Box& box, const Pose& pose) {
   Convex convex;
   convex.p = convex.q = pose(box.centre);
   const Eigen::Matrix3d axes = orthonormal(pose.rotation);
@@ -240,9 +240,9 @@ void findWithin(const Body& geometry, const Vector3d& point, double distance, bo
       out.push_back(at.element);
 }
 
-void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
-                     const RigidTransform& pose, bool bruteForce, KeptShapes& kept,
-                     Buffer<std::uint32_t>& near, std::vector<std::uint32_t>& out) {
+void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical, const Pose& pose,
+                     bool bruteForce, KeptShapes& kept, Buffer<std::uint32_t>& near,
+                     std::vector<std::uint32_t>& out) {
   const TriangleMesh& mesh = geometry.mesh;
   const Shape* shape = nullptr;  // placed where needed, because a hull is costly
   const auto build = [&] {

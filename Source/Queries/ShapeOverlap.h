@@ -25,7 +25,7 @@ void findWithin(const Body&, const Eigen::Vector3d& point, double distance, bool
 /// Method   floats decide most nodes and elements for balls, capsules, boxes and hulls. Polygons
 ///          clipped in double decide most others.
 /// kept: memory of shapes.
-void findOverlapping(const Body&, const AnalyticalGeometry&, const RigidTransform&, bool bruteForce,
+void findOverlapping(const Body&, const AnalyticalGeometry&, const Pose&, bool bruteForce,
                      KeptShapes& kept, Buffer<std::uint32_t>& near,
                      std::vector<std::uint32_t>& out);
 

@@ -262,10 +262,9 @@ std::span<const Eigen::Vector3d> Snapshot::positionsBefore(GeometryId id) const 
   return positionsOf(geometry, geometry.mesh.before);
 }
 
-ShapeMotion Snapshot::motion(GeometryId id) const {
+RigidMotion Snapshot::motion(GeometryId id) const {
   const TriangleMesh& mesh = m_contents.at(id).mesh;
-  const RigidTransform &before = mesh.before.transform(), &now = mesh.now.transform();
-  return {before.rotation, before.translation, now.rotation, now.translation};
+  return {mesh.before.transform(), mesh.now.transform()};
 }
 
 Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double time) const {

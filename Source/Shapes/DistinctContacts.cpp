@@ -23,7 +23,7 @@ bool isFirst(const ShapeContact& a, const ShapeContact& b) {
 }
 
 /// L: the largest extent of the shape along an axis of its own frame, which does not turn with it.
-double sizeOf(const Shape& shape, const RigidTransform& pose) {
+double sizeOf(const Shape& shape, const Pose& pose) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : shape.corners()) box.extend(pose.rotation.transpose() * p);
   return box.sizes().maxCoeff() + 2.0 * shape.radius();
@@ -34,8 +34,8 @@ double sizeOf(const Shape& shape, const RigidTransform& pose) {
 /// One pair's mesh, and its shape at the step's end.
 class DistinctContacts::Step {
  public:
-  Step(const TriangleMesh& mesh, const Shape& shape, const RigidTransform& before,
-       const RigidTransform& now, const PairSettings& settings)
+  Step(const TriangleMesh& mesh, const Shape& shape, const Pose& before, const Pose& now,
+       const PairSettings& settings)
       : m_mesh(mesh),
         m_shape(shape),
         m_before(before),
@@ -140,7 +140,7 @@ class DistinctContacts::Step {
 
   const TriangleMesh& m_mesh;
   const Shape& m_shape;
-  const RigidTransform &m_before, &m_now;
+  const Pose &m_before, &m_now;
   const PairSettings& m_settings;
   const double m_size;  ///< L: of the shape
 };
@@ -191,9 +191,9 @@ void DistinctContacts::dropAlongFlatParts(const Step& step,
   }
 }
 
-std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
-                                   const RigidTransform& before, const RigidTransform& now,
-                                   const PairSettings& settings, std::span<ShapeContact> contacts) {
+std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape, const Pose& before,
+                                   const Pose& now, const PairSettings& settings,
+                                   std::span<ShapeContact> contacts) {
   if (settings.contacts == Contacts::All || shape.isPlane()) return contacts.size();
   const Step step(mesh, shape, before, now, settings);
   m_states.resize(contacts.size());

@@ -49,9 +49,8 @@ class DistinctContacts {
   /// contacts: all of one pair, in the order of CollisionData::shape(). before, now: poses of the
   /// shape, which is at the step's end. Returns how many of them stay, at the front and in the same
   /// order.
-  std::size_t keep(const TriangleMesh&, const Shape&, const RigidTransform& before,
-                   const RigidTransform& now, const PairSettings&,
-                   std::span<ShapeContact> contacts);
+  std::size_t keep(const TriangleMesh&, const Shape&, const Pose& before, const Pose& now,
+                   const PairSettings&, std::span<ShapeContact> contacts);
 
  private:
   /// Proper: not excluded. OnPlane: the same, and its tangent plane has been used.

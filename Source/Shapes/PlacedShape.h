@@ -22,8 +22,8 @@ using KeptShapes = std::array<std::optional<PlacedShape>, std::variant_size_v<An
 
 /// The shape at rest at a pose, in memory that is kept from call to call. Only a box or hull that
 /// differs from the last one, or the first shape of a type, allocates.
-inline const PlacedShape& placeAtRest(const AnalyticalGeometry& geometry,
-                                      const RigidTransform& pose, KeptShapes& shapes) {
+inline const PlacedShape& placeAtRest(const AnalyticalGeometry& geometry, const Pose& pose,
+                                      KeptShapes& shapes) {
   std::optional<PlacedShape>& kept = shapes[geometry.index()];
   const bool hasHull =
       std::holds_alternative<Box>(geometry) || std::holds_alternative<ConvexHull>(geometry);

@@ -52,7 +52,7 @@ Eigen::Matrix3d orthonormal(const Eigen::Matrix3d& rotation) {
   return axes;
 }
 
-Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+Shape::Shape(const AnalyticalGeometry& geometry, const Pose& transform) {
   if (const std::vector<Vector3d> corners = cornersOf(geometry); !corners.empty()) {
     m_span = spanOf(corners);
     if (m_span.size() > 2) m_hull = std::make_shared<Polytope>(corners);
@@ -71,7 +71,7 @@ Shape::Shape(const AnalyticalGeometry& geometry, const RigidTransform& transform
   place(geometry, transform);
 }
 
-void Shape::place(const AnalyticalGeometry& geometry, const RigidTransform& transform) {
+void Shape::place(const AnalyticalGeometry& geometry, const Pose& transform) {
   PALPATE_ASSERT(deviationFromRotation(transform.rotation) <= kRoughRotation);
   PALPATE_ASSERT(!m_span.empty() ==
                  (std::get_if<Box>(&geometry) || std::get_if<ConvexHull>(&geometry)));
@@ -453,7 +453,7 @@ std::string faultOf(const AnalyticalGeometry& geometry, std::optional<std::size_
   return fault;
 }
 
-std::string faultOf(const RigidTransform& transform) {
+std::string faultOf(const Pose& transform) {
   const Eigen::Matrix3d& r = transform.rotation;
   const double off = deviationFromRotation(r);
   if (!r.allFinite()) return "rotation has an entry that is not finite";

@@ -56,10 +56,10 @@ struct ShapePairScratch;
 /// else the middle.
 class Shape {
  public:
-  Shape(const AnalyticalGeometry&, const RigidTransform&);
+  Shape(const AnalyticalGeometry&, const Pose&);
   /// Places the shape elsewhere. A box or a hull must be the constructor's; another shape must have
   /// the type of the constructor's.
-  void place(const AnalyticalGeometry&, const RigidTransform&);
+  void place(const AnalyticalGeometry&, const Pose&);
   /// Moves the shape by a translation, L.
   void translate(const Eigen::Vector3d& shift);
   /// Places a cylinder at a time of a step: a right cylinder between its end centres, which move
@@ -211,6 +211,6 @@ void forEachField(Geometry& geometry, F&& f) {
 /// a hull's invalid point.
 std::string faultOf(const AnalyticalGeometry&, std::optional<std::size_t>& element);
 /// The same for a transform, whose matrix must be a rotation within kRoughRotation.
-std::string faultOf(const RigidTransform&);
+std::string faultOf(const Pose&);
 
 }  // namespace palpate

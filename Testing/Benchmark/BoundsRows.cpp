@@ -227,7 +227,7 @@ class BoundsRun {
         m_detection->setPositions(m_ids[0], m_positions);
       } else {
         const Placement at = m_scene.place(body, phase);
-        m_detection->setTransform(m_ids[body], at.rotation, at.translation);
+        m_detection->setTransform(m_ids[body], {at.rotation, at.translation});
       }
     }
     m_detection->detectCollision();

@@ -67,7 +67,7 @@ class Scene {
         const PairSettings& pair, int threads)
       : m_detection(settingsOf(threads)),
         m_body(m_detection.addTriangleMesh(positions, triangles)) {
-    m_detection.setTransform(m_body, Eigen::Matrix3d::Identity(), Vector3d::Zero());
+    m_detection.setTransform(m_body, {Eigen::Matrix3d::Identity(), Vector3d::Zero()});
     for (const InstrumentArm::Link& link : InstrumentArm::makeLinks()) {
       m_links.push_back(m_detection.addTriangleMesh(link.drawn.positions, link.drawn.triangles));
       m_detection.addCollisionPair(m_body, m_links.back(), pair);
@@ -79,8 +79,9 @@ class Scene {
     const double begin = now();
     for (int i = 0; i < InstrumentArm::kLinks; ++i) {
       const Eigen::Isometry3d &from = before.link(i), &to = arm.link(i);
-      m_detection.setTransform(m_links[static_cast<std::size_t>(i)], from.linear(),
-                               from.translation(), to.linear(), to.translation());
+      m_detection.setTransform(m_links[static_cast<std::size_t>(i)],
+                               {from.linear(), from.translation()},
+                               {to.linear(), to.translation()});
     }
     m_detection.detectCollision();
     m_detection.advance();

@@ -40,7 +40,7 @@ class PalpateQueries : public SpatialEngine {
     };
     const auto list = [&](const AnalyticalGeometry& shape) {
       all([&](const SpatialCase& c) {
-        queries.overlapping(m_mesh, shape, c.rotation, c.point, m_elements);
+        queries.overlapping(m_mesh, shape, {c.rotation, c.point}, m_elements);
         addElements(out);
       });
     };

@@ -58,7 +58,7 @@ struct Run {
   void step(const std::vector<Eigen::Vector3d>& world, const Placement& at, bool isCounted) {
     const double begin = now();
     detection.setPositions(smoke, world);
-    detection.setTransform(body, at.rotation, at.translation);
+    detection.setTransform(body, {at.rotation, at.translation});
     detection.detectCollision();
     detection.advance();
     (isCounted ? samples : first).push_back(now() - begin);

@@ -69,7 +69,7 @@ Moved move(const testing::Mesh& body, const PairSettings& pair, int threads, boo
     const double begin = now();
     detection.setPositions(organ, positions);
     if (byTransform)
-      detection.setTransform(id, at.rotation, at.translation);
+      detection.setTransform(id, {at.rotation, at.translation});
     else
       detection.setPositions(id, world);
     detection.detectCollision();
@@ -159,7 +159,7 @@ class FieldRace {
     const Placement at = placement(frame);
     const double begin = now();
     detection.setPositions(m_organ, positions);
-    detection.setTransform(m_bone, at.rotation, at.translation);
+    detection.setTransform(m_bone, {at.rotation, at.translation});
     detection.detectCollision();
     detection.advance();
     if (frame > 1) result.samples.push_back(now() - begin);

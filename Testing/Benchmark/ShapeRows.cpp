@@ -56,7 +56,7 @@ Placement placement(int frame) {
 double pairTime(OctreeBasedCD& detection, GeometryId mesh, GeometryId tool, int frame) {
   detection.setPositions(mesh, waves(frame));
   const Placement at = placement(frame);
-  detection.setTransform(tool, at.rotation, at.translation);
+  detection.setTransform(tool, {at.rotation, at.translation});
   detection.update();
   const double start = now();
   detection.detectCollision();

@@ -354,8 +354,8 @@ void distanceRow(Report& report, const SpatialBody& body, bool placed, const Row
   const GeometryId a = collisions.addTriangleMesh(body.frames[0], body.triangles),
                    b = collisions.addTriangleMesh(others[0], body.triangles);
   if (placed) {
-    collisions.setTransform(a, poseA.linear(), poseA.translation());
-    collisions.setTransform(b, poseB.linear(), poseB.translation());
+    collisions.setTransform(a, {poseA.linear(), poseA.translation()});
+    collisions.setTransform(b, {poseB.linear(), poseB.translation()});
   }
   FclDistance fcl(body.triangles, body.frames[0], others[0]);
   std::array<std::vector<double>, 2> updates, queries;

@@ -218,13 +218,14 @@ void RandomHistory::setTransform(GeometryId id) {
     const Vector3d translationBefore =
         body.translationBefore + m_unit * randomPoint(m_random, -0.1, 0.1);
     if (!accepts([&] {
-          m_collisions.setTransform(id, rotationBefore, translationBefore, rotation, translation);
+          m_collisions.setTransform(id, {rotationBefore, translationBefore},
+                                    {rotation, translation});
         }))
       return;
     body.rotationBefore = rotationBefore;
     body.translationBefore = translationBefore;
     body.transformGiven = true;
-  } else if (!accepts([&] { m_collisions.setTransform(id, rotation, translation); })) {
+  } else if (!accepts([&] { m_collisions.setTransform(id, {rotation, translation}); })) {
     return;
   }
   body.rotation = rotation;
@@ -384,8 +385,8 @@ void RandomHistory::act() {
 void RandomHistory::setEnds(OctreeBasedCD& collisions, GeometryId id, const Body& body) {
   if (!body.shape) collisions.setPositions(id, body.before, body.now);
   if (body.placed)
-    collisions.setTransform(id, body.rotationBefore, body.translationBefore, body.rotation,
-                            body.translation);
+    collisions.setTransform(id, {body.rotationBefore, body.translationBefore},
+                            {body.rotation, body.translation});
 }
 
 OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryId>& ids) const {
@@ -413,7 +414,7 @@ bool RandomHistory::startsApart(const Pair& pair) const {
     const GeometryId own = addTo(collisions, body);
     collisions.setPositions(own, body.before, body.before);
     if (body.placed && pair.a != pair.b)
-      collisions.setTransform(own, body.rotationBefore, body.translationBefore);
+      collisions.setTransform(own, {body.rotationBefore, body.translationBefore});
     collisions.setDisabledElements(own, body.disabled);
     return own;
   };
@@ -509,10 +510,10 @@ void RandomHistory::compareWhatLasts() {
     else if (!body.shape)
       m_committed.setPositions(id, body.now);
     if (body.placed && body.transformGiven)
-      m_committed.setTransform(id, body.rotationBefore, body.translationBefore, body.rotation,
-                               body.translation);
+      m_committed.setTransform(id, {body.rotationBefore, body.translationBefore},
+                               {body.rotation, body.translation});
     else if (body.placed)
-      m_committed.setTransform(id, body.rotation, body.translation);
+      m_committed.setTransform(id, {body.rotation, body.translation});
   }
   const CollisionProblem running = m_collisions.problem(), committed = m_committed.problem();
   ASSERT_EQ(running.geometries.size(), m_bodies.size());

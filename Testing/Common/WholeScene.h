@@ -76,9 +76,9 @@ class WholeScene {
     detection.setPositions(block, deformed(m_input.block.positions, time, height));
     const Eigen::Matrix3d turn =
         Eigen::AngleAxisd(0.3 * std::sin(time), Vector3d::UnitX()).matrix();
-    detection.setTransform(tool, turn, {0.4, 0.5, 0.1 * std::sin(time)});
-    detection.setTransform(field, turn, {0, 0, 0});
-    detection.setTransform(bone, turn, {0, 0, 0});
+    detection.setTransform(tool, {turn, {0.4, 0.5, 0.1 * std::sin(time)}});
+    detection.setTransform(field, {turn, {0, 0, 0}});
+    detection.setTransform(bone, {turn, {0, 0, 0}});
   }
 
   /// The hash of all results.

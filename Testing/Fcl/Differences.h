@@ -21,8 +21,8 @@ class ShapePair {
     m_engine.addCollisionPair(m_a, m_b, {Method::Proximity, thickness});
   }
   std::optional<ShapeShapeContact> at(const PlacedShape& a, const PlacedShape& b) {
-    m_engine.setTransform(m_a, a.rotation, a.translation);
-    m_engine.setTransform(m_b, b.rotation, b.translation);
+    m_engine.setTransform(m_a, {a.rotation, a.translation});
+    m_engine.setTransform(m_b, {b.rotation, b.translation});
     m_engine.detectCollision();
     const auto contacts = m_engine.collisionData(m_a, m_b).shapeShape();
     if (contacts.empty()) return {};

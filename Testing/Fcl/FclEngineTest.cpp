@@ -54,7 +54,7 @@ TEST(FclEngine, MeshIntersectionsMatchOctreeBasedCD) {
   for (int frame = 0; frame < 10; ++frame) {
     const Matrix3d turn = randomTurn(random);
     const Vector3d shift = randomPoint(random, -0.3, 0.3);
-    both.each([&](auto& engine) { engine.setTransform(a, turn, shift); });
+    both.each([&](auto& engine) { engine.setTransform(a, {turn, shift}); });
     found += both.expectSame(a, b);
   }
   const Mesh other = soup(random, 80, 0.2);
@@ -83,7 +83,7 @@ TEST(FclEngine, ShapesMatchHandComputedValues) {
     FclEngine engine;
     const GeometryId first = engine.addAnalyticalGeometry(a),
                      second = engine.addAnalyticalGeometry(b);
-    engine.setTransform(second, Matrix3d::Identity(), {0, 0, -1});
+    engine.setTransform(second, {Matrix3d::Identity(), {0, 0, -1}});
     engine.addCollisionPair(first, second, {Method::Proximity, thickness});
     engine.detectCollision();
     const auto contacts = engine.collisionData(first, second).shapeShape();
@@ -172,7 +172,7 @@ TEST(FclEngine, BadInputThrowsTheErrorsOfOctreeBasedCD) {
             }),
             ErrorCode::InvalidShape);
   EXPECT_EQ(refusal([&] {
-              engine.setTransform(ball, 2 * Matrix3d::Identity(), {0, 0, 0});
+              engine.setTransform(ball, {2 * Matrix3d::Identity(), {0, 0, 0}});
             }),
             ErrorCode::InvalidTransform);
   EXPECT_NE(refusal([&] { engine.setPositions(ball, positions); }), ErrorCode::File);

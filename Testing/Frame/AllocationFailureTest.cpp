@@ -51,10 +51,10 @@ Words stateOf(const OctreeBasedCD& detection) {
     words.insert(words.end(), mesh.disabled.begin(), mesh.disabled.end());
     words.push_back(mesh.filter.mask);
     words.push_back(static_cast<std::uint64_t>(mesh.filter.sidedness));
-    for (const auto& m : {mesh.rotationBefore, mesh.rotation})
-      for (const double x : m.reshaped()) append(words, x);
-    for (const auto& v : {mesh.translationBefore, mesh.translation})
-      for (const double x : v) append(words, x);
+    for (const Pose& pose : {mesh.motion.before, mesh.motion.now}) {
+      for (const double x : pose.rotation.reshaped()) append(words, x);
+      for (const double x : pose.translation) append(words, x);
+    }
   }
   for (const CollisionProblem::Pair& pair : problem.pairs) {
     words.insert(words.end(), {pair.a, pair.b, pair.predicate});
@@ -105,7 +105,7 @@ struct Scene {
   void move() {
     Random random(5);
     detection.setPositions(organ, moved(random, organRest, 0.05));
-    detection.setTransform(tool, Eigen::AngleAxisd(0.1, Vector3d::UnitX()).matrix(), {0.4, 0, 0});
+    detection.setTransform(tool, {Eigen::AngleAxisd(0.1, Vector3d::UnitX()).matrix(), {0.4, 0, 0}});
   }
   /// A frame's contacts, candidates and queries.
   Words answer() {
@@ -181,15 +181,15 @@ std::vector<Call> calls() {
       {"setPositions, both", [=](Scene& s) { s.detection.setPositions(s.organ, body, body); }},
       {"setTransform of a mesh",
        [=](Scene& s) {
-         s.detection.setTransform(s.drops, unit, {0.1, 0, 0});
+         s.detection.setTransform(s.drops, {unit, {0.1, 0, 0}});
        }},
       {"setTransform of a shape",
        [=](Scene& s) {
-         s.detection.setTransform(s.block, unit, {0.1, 0, 0});
+         s.detection.setTransform(s.block, {unit, {0.1, 0, 0}});
        }},
       {"setTransform, both",
        [=](Scene& s) {
-         s.detection.setTransform(s.block, unit, {0, 0, 0}, unit, {0.1, 0, 0});
+         s.detection.setTransform(s.block, {unit, {0, 0, 0}}, {unit, {0.1, 0, 0}});
        }},
       {"setTriangles", [=](Scene& s) { s.detection.setTriangles(s.sheetId, three, one); }},
       {"setTetrahedra", [=](Scene& s) { s.detection.setTetrahedra(s.solid, four, first); }},

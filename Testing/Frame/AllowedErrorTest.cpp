@@ -98,7 +98,7 @@ class BodyScene {
     }
     m_body = m_detection.addTriangleMesh(body.mesh.positions, body.mesh.triangles);
     m_detection.attachDistanceField(m_body, body.field);
-    m_detection.setTransform(m_body, start.rotation, start.translation);
+    m_detection.setTransform(m_body, {start.rotation, start.translation});
     if (isBodyFirst)
       m_detection.addCollisionPair(m_body, other, pair);
     else
@@ -109,8 +109,8 @@ class BodyScene {
 
   const CollisionData& step(const End& before, const End& now) {
     m_detection.setPositions(other, before.other, now.other);
-    m_detection.setTransform(m_body, before.rotation, before.translation, now.rotation,
-                             now.translation);
+    m_detection.setTransform(m_body, {before.rotation, before.translation},
+                             {now.rotation, now.translation});
     m_detection.detectCollision();
     m_detection.advance();
     return data();
@@ -392,7 +392,7 @@ TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
         PairSettings pair = pairOf(kErrorBound);
         pair.motionTolerance = 0.06;
         detection.addCollisionPair(triangle, body, pair);
-        detection.setTransform(body, rotation, Vector3d::Zero(), rotation, Vector3d::Zero());
+        detection.setTransform(body, {rotation, Vector3d::Zero()}, {rotation, Vector3d::Zero()});
         detection.setPositions(triangle, before.other, now.other);
         detection.detectCollision();
         const Validity& validity = detection.collisionData(triangle, body).validity();
@@ -566,15 +566,15 @@ struct CloudScene {
     detection.attachSurfaceProxy(
         body,
         SurfaceProxySettings{.reach = 0.1, .errorBound = kProxyError, .widestNormalCone = 0.6});
-    detection.setTransform(body, cloud.now().rotation, cloud.now().translation);
+    detection.setTransform(body, {cloud.now().rotation, cloud.now().translation});
     detection.addCollisionPair(smoke, body, pair);
     detection.advance();
   }
   const CollisionData& step(const Cloud& cloud) {
     const End &before = cloud.before(), &now = cloud.now();
     detection.setPositions(smoke, before.other, now.other);
-    detection.setTransform(body, before.rotation, before.translation, now.rotation,
-                           now.translation);
+    detection.setTransform(body, {before.rotation, before.translation},
+                           {now.rotation, now.translation});
     detection.detectCollision();
     detection.advance();
     return data();

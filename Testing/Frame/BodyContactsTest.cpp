@@ -189,7 +189,7 @@ TEST(BodyContacts, TheDeepestFeatureHasAContact) {
         if (!areTurned)
           for (Vector3d& p : positions) p = poses[i] * p;
         ids[i] = collisions.addTriangleMesh(positions, unit.triangles);
-        if (areTurned) collisions.setTransform(ids[i], poses[i].linear(), poses[i].translation());
+        if (areTurned) collisions.setTransform(ids[i], {poses[i].linear(), poses[i].translation()});
       }
       collisions.addCollisionPair(ids[0], ids[1], {.thickness = 0.05});
       collisions.detectCollision();

@@ -306,7 +306,7 @@ PlacedBody placed(std::string name, const TestGeometry& geometry, double angle,
   return {std::move(name),
           [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); }, side,
           [=](OctreeBasedCD& collisions, GeometryId id) {
-            collisions.setTransform(id, turns[0], shifts[0], turns[1], shifts[1]);
+            collisions.setTransform(id, {turns[0], shifts[0]}, {turns[1], shifts[1]});
           }};
 }
 
@@ -316,7 +316,7 @@ PlacedBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Vect
           {},
           [=](OctreeBasedCD& collisions, GeometryId id) {
             const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
-            collisions.setTransform(id, none, Vector3d::Zero(), none, motion);
+            collisions.setTransform(id, {none, Vector3d::Zero()}, {none, motion});
           }};
 }
 

@@ -147,7 +147,7 @@ struct Detection {
       : detection(settings) {
     smoke = detection.addPointSet(points, radii);
     body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
-    if (scene.isPlaced) detection.setTransform(body, scene.rotation, scene.translation);
+    if (scene.isPlaced) detection.setTransform(body, {scene.rotation, scene.translation});
     detection.addCollisionPair(smoke, body, pairOf(scene));
     detection.detectCollision();
   }
@@ -273,8 +273,8 @@ TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
   const std::vector<ShapeContact> before(detection.collisionData(smoke, body).shape().begin(),
                                          detection.collisionData(smoke, body).shape().end());
   ASSERT_GT(before.size(), 100u);
-  detection.setTransform(smoke, turn, shift);
-  detection.setTransform(body, turn, shift);
+  detection.setTransform(smoke, {turn, shift});
+  detection.setTransform(body, {turn, shift});
   detection.detectCollision();
   const auto after = detection.collisionData(smoke, body).shape();
   const double error = detection.collisionData(smoke, body).errorBound();
@@ -376,7 +376,7 @@ TEST(Proxy, SteadyFramesAllocateNothingAndBuildNoOctreeOfTheParticles) {
       for (std::size_t i = 0; i < points.size(); ++i)
         points[i] = start[i] + 0.01 * (frame % 4) * Vector3d(1, 1, 1);
       run.detection.setPositions(run.smoke, points);
-      run.detection.setTransform(run.body, scene.rotation, Vector3d(0.01 * (frame % 4), 0, 0));
+      run.detection.setTransform(run.body, {scene.rotation, Vector3d(0.01 * (frame % 4), 0, 0)});
       run.detection.detectCollision();
       run.detection.advance();
       contacts += run.data().shape().size();

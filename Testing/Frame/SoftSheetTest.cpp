@@ -36,7 +36,8 @@ class Press {
 
   /// L: the distance after the step. At most eight rounds meet all rows.
   double step(const Vector3d& at) {
-    const ShapeMotion motion{.translationBefore = m_at, .translation = at};
+    const RigidMotion motion{{Eigen::Matrix3d::Identity(), m_at},
+                             {Eigen::Matrix3d::Identity(), at}};
     m_at = at;
     for (int round = 0; round < 8; ++round) {
       set();
@@ -58,7 +59,7 @@ class Press {
     m_collisions.advance();
     m_before = m_sheet.positions;
     m_truth.setPositions(m_truthBody, m_sheet.positions);
-    m_truth.setTransform(m_truthTool, Eigen::Matrix3d::Identity(), at);
+    m_truth.setTransform(m_truthTool, {Eigen::Matrix3d::Identity(), at});
     m_truth.detectCollision();
     double least = 5 * kPressThickness;
     for (const ShapeContact& c : m_truth.collisionData(m_truthBody, m_truthTool).shape())
@@ -71,7 +72,7 @@ class Press {
 
   void set() {
     m_collisions.setPositions(m_body, m_sheet.positions);
-    m_collisions.setTransform(m_tool, Eigen::Matrix3d::Identity(), m_at);
+    m_collisions.setTransform(m_tool, {Eigen::Matrix3d::Identity(), m_at});
   }
   bool isFixed(std::uint32_t v) const {
     const Vector3d& p = m_rest[v];

@@ -52,7 +52,7 @@ struct Body {
   void placeAt(double s, OctreeBasedCD& collisions, GeometryId id) const {
     if (placed) {
       const Pose at = poseAt(s);
-      collisions.setTransform(id, at.rotation, at.translation);
+      collisions.setTransform(id, {at.rotation, at.translation});
       return;
     }
     Positions positions = before;
@@ -274,8 +274,8 @@ void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tall
       if (onGrid) snap(*body);
       if (body->placed) {
         const Pose end = body->poseAt(1);
-        collisions.setTransform(id, body->pose.rotation, body->pose.translation, end.rotation,
-                                end.translation);
+        collisions.setTransform(id, {body->pose.rotation, body->pose.translation},
+                                {end.rotation, end.translation});
       } else {
         collisions.setPositions(id, body->before, body->now);
       }
@@ -365,7 +365,7 @@ struct TurningTip {
     const Positions ends{at - Vector3d::UnitY(), at + Vector3d::UnitY()};
     wire = collisions.addLineMesh(ends, std::vector<Segment>{{0, 1}});
     collisions.addCollisionPair(tip, wire, {.thickness = thickness});
-    collisions.setTransform(tip, turned(0), Vector3d::Zero());
+    collisions.setTransform(tip, {turned(0), Vector3d::Zero()});
     collisions.advance();
   }
   static Matrix3d turned(double degrees) {
@@ -374,7 +374,7 @@ struct TurningTip {
   }
   /// Contacts, and whether they are trusted.
   std::pair<std::size_t, bool> turnTo(double degrees) {
-    collisions.setTransform(tip, turned(degrees), Vector3d::Zero());
+    collisions.setTransform(tip, {turned(degrees), Vector3d::Zero()});
     collisions.detectCollision();
     const CollisionData& data = collisions.collisionData(tip, wire);
     const std::pair answer(data.vertexTriangle().size(), data.validity().trusted);
@@ -420,10 +420,10 @@ TEST(TrustOfTypes, ACapsuleInAClothIsSeenInEachStep) {
                 ? collisions.addAnalyticalGeometry(Capsule{p, q, kRadius})
                 : collisions.addLineMesh(Positions{p, q}, std::vector<Segment>{{0, 1}}, kRadius);
         collisions.addCollisionPair(sheet, tool, {.method = method});
-        collisions.setTransform(tool, Matrix3d::Identity(), {0, 0, height});
+        collisions.setTransform(tool, {Matrix3d::Identity(), {0, 0, height}});
         collisions.advance();
         for (int step = 1; step <= 3; ++step) {
-          collisions.setTransform(tool, Matrix3d::Identity(), {0, 0, height - 0.001 * step});
+          collisions.setTransform(tool, {Matrix3d::Identity(), {0, 0, height - 0.001 * step}});
           collisions.detectCollision();
           const CollisionData& data = collisions.collisionData(sheet, tool);
           const bool apart = height > kRadius;

@@ -197,11 +197,11 @@ void types(int threads, Hashes& out) {
                                 detection.addTetrahedralMesh(solid.positions, solid.tetrahedra)};
     for (const AnalyticalGeometry& shape : shapes)
       ids.push_back(detection.addAnalyticalGeometry(shape));
-    detection.setTransform(ids[0], rotation(false), {0.45, 0.5, 0.5}, rotation(true),
-                           {0.5, 0.5, 0.55});
+    detection.setTransform(ids[0], {rotation(false), {0.45, 0.5, 0.5}},
+                           {rotation(true), {0.5, 0.5, 0.55}});
     for (std::size_t i = 4; i < ids.size(); ++i)
-      detection.setTransform(ids[i], rotation(false), {0.2, 0.2, 0.2}, rotation(true),
-                             {0.25, 0.2, 0.2});
+      detection.setTransform(ids[i], {rotation(false), {0.2, 0.2, 0.2}},
+                             {rotation(true), {0.25, 0.2, 0.2}});
     const PairSettings pair = pairOf(method, 0.01);
     for (std::size_t i = 0; i < ids.size(); ++i)
       for (std::size_t j = i + 1; j < ids.size(); ++j)
@@ -265,7 +265,7 @@ void fields(int threads, Hashes& out) {
   PairSettings proxy = pairOf(Method::Proxy, 0.02);
   proxy.allowedError = 0.004;
   detection.addCollisionPair(particles, rigid, proxy);
-  detection.setTransform(rigid, rotation(true), {0.05, 0, 0});
+  detection.setTransform(rigid, {rotation(true), {0.05, 0, 0}});
   detection.detectCollision();
   out["field contacts"] = Hash().add(detection.collisionData(soft, rigid)).value();
   out["proxy contacts"] = Hash().add(detection.collisionData(particles, rigid)).value();

@@ -210,7 +210,7 @@ TEST(Window, PickNamesTheElementUnderTheCursor) {
     EXPECT_EQ(window.pick(2, 2), "");
   }
   const GeometryId tool = detection.addAnalyticalGeometry(Sphere{Vector3d::Zero(), 1.2});
-  detection.setTransform(tool, Eigen::Matrix3d::Identity(), Vector3d::Zero());
+  detection.setTransform(tool, {Eigen::Matrix3d::Identity(), Vector3d::Zero()});
   Window window(detection, false, 300, 300);
   window.setView(kCentred);
   window.show();
@@ -231,7 +231,7 @@ TEST(Window, DrawsEveryGeometryTypeAtItsPlace) {
     OctreeBasedCD detection;
     detection.addPointSet(frame, 0.01);
     const GeometryId id = detection.addAnalyticalGeometry(shape);
-    detection.setTransform(id, Eigen::Matrix3d::Identity(), {-5, 0, 0});
+    detection.setTransform(id, {Eigen::Matrix3d::Identity(), {-5, 0, 0}});
     Window window(detection, false, 200, 200);
     window.setView(kCentred);
     window.show();

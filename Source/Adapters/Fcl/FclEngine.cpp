@@ -187,9 +187,8 @@ void FclEngine::setTriangles(GeometryId id, std::span<const Vector3d> positions,
   m_implementation->bodies[id].geometry = modelOf(positions, triangles);
 }
 
-void FclEngine::setTransform(GeometryId id, const Eigen::Matrix3d& rotation,
-                             const Vector3d& translation) {
-  m_implementation->input.setTransform(id, rotation, translation);
+void FclEngine::setTransform(GeometryId id, const Pose& given) {
+  m_implementation->input.setTransform(id, given);
   fcl::Transform3d& frame = m_implementation->bodies[id].frame;
   const Pose pose = m_implementation->input.transform(id);
   frame.linear() = pose.rotation;

@@ -31,13 +31,10 @@ struct CollisionProblem {
     std::vector<Eigen::Vector3d> rest{};
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};           ///< disabled elements
-    std::optional<AnalyticalGeometry> analytical{};  ///< a shape; the poses below place it
-    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();  ///< for a shape only
-    Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();
+    std::optional<AnalyticalGeometry> analytical{};  ///< a shape; `motion` places it
+    RigidMotion motion{};                            ///< of setTransform()
     std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
-    /// The field of an added distance field, or of a mesh that has one; the poses above place it.
+    /// The field of an added distance field, or of a mesh that has one; `motion` places it.
     std::shared_ptr<const DistanceField> field{};
     std::optional<SurfaceProxySettings> proxy{};  ///< of the leaves that are attached to a mesh
     std::string name{};                           ///< OctreeBasedCD::setName(); not in a file

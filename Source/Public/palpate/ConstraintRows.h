@@ -2,6 +2,7 @@
 
 #include <palpate/CollisionData.h>
 #include <palpate/Export.h>
+#include <palpate/Types.h>
 
 #include <Eigen/Core>
 
@@ -56,20 +57,12 @@ struct SolverVertices {
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
 };
 
-/// The poses of an analytical shape at both ends of the step, as you passed them to setTransform().
-/// The default is a shape that setTransform() never placed.
-struct ShapeMotion {
-  Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translationBefore = Eigen::Vector3d::Zero();  ///< L
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< L
-};
-
 /// Appends a row for each contact of a pair (a, b), linearised at its timeOfImpact, whatever method
 /// found it. For a pair with a shape or a distance field, leave the SolverVertices of the shape or
 /// of the field's body empty. The motion of that body is passed as that of a shape.
 ///
-/// shape    the motion of the pair's shape. Its rows then refer to the shape at the step's end: the
+/// body     the motion of the pair's shape or field's body, as you passed it to setTransform(). Its
+/// rows then refer to the shape at the step's end: the
 ///          point of the shape that the contact touches moves on to there. Without it, the shape
 ///          counts as at rest from timeOfImpact on, so that gap(now) does not see where it went.
 /// Needs    a shape that turns by less than 90 degrees in the step.
@@ -81,7 +74,7 @@ struct ShapeMotion {
 /// Cost     linear in the contacts.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
                                const SolverVertices& b, std::vector<ConstraintRow>& rows,
-                               const ShapeMotion& shape = {});
+                               const RigidMotion& body = {});
 
 /// Calls entry(context, row, column, value) for each entry that is not 0 of the rows' Jacobian,
 /// that is of the gaps' derivatives by the positions. column: 3 vertex + axis. If a row has one
@@ -107,7 +100,7 @@ void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& t
 struct ContactSide {
   SolverVertices vertices{};           ///< of a mesh, lines or points; empty for a shape
   std::span<const double> radii = {};  ///< L: none, one for all vertices, or one per vertex
-  ShapeMotion shape{};                 ///< for a shape only
+  RigidMotion motion{};                ///< of a shape or a field's body, as setTransform() has it
 };
 
 /// The place of a contact and how its two sides slide along each other, for friction and haptics.

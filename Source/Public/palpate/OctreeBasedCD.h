@@ -120,7 +120,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
   ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
   ///   detection.addCollisionPair(organ, tool, {.thickness = 0.5});
-  ///   detection.setTransform(tool, rotationBefore, tipBefore, rotation, tip);  // in each step
+  ///   detection.setTransform(tool, {rotationBefore, tipBefore}, {rotation, tip});  // in each step
   ///
   /// Docs/HowTo/RigidTools.md has the whole loop, with the rows of a solver.
   ///
@@ -217,17 +217,14 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A rotation may come from floats. If an entry of R^T R is off the identity by more than 1e-9,
   /// the nearest rotation counts instead; transform() returns it.
   ///
-  /// Errors   InvalidTransform if `rotation` is no rotation: an entry of R^T R is off the identity
+  /// Errors   InvalidTransform if the rotation is none: an entry of R^T R is off the identity
   ///          by more than 1e-5, or the determinant is not positive. InvalidTransform also if an
   ///          entry is not finite, or if the translation is beyond kLargestMeasure.
   ///          UnsupportedMethod if the geometry has a pair with itself.
   /// Cost     does not grow with the size of the geometry, with one exception: each call
   ///          for a ConvexHull turns its corners.
-  void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
-                    const Eigen::Vector3d& translation);
-  void setTransform(GeometryId, const Eigen::Matrix3d& rotationBefore,
-                    const Eigen::Vector3d& translationBefore, const Eigen::Matrix3d& rotation,
-                    const Eigen::Vector3d& translation);
+  void setTransform(GeometryId, const Pose& now);
+  void setTransform(GeometryId, const Pose& before, const Pose& now);
   /// The pose now, with the rotation that counts; the identity if setTransform() has not placed the
   /// geometry.
   Pose transform(GeometryId) const;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <palpate/ConstraintRows.h>
 #include <palpate/Export.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/Types.h>
@@ -44,7 +43,7 @@ class PALPATE_EXPORT Snapshot {
   std::span<const Eigen::Vector3d> positions(GeometryId) const;
   std::span<const Eigen::Vector3d> positionsBefore(GeometryId) const;
   /// The poses at both ends of the step, as setTransform() set them.
-  ShapeMotion motion(GeometryId) const;
+  RigidMotion motion(GeometryId) const;
   /// L, in the world: where a vertex is on the straight line of its step. time: 0 for the start of
   /// the step, 1 for its end; other times extrapolate.
   ///

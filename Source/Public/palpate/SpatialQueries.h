@@ -234,8 +234,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          shape's corners as they are rounded when it is placed. Otherwise elements are found
   ///          up to rounding errors of the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
-  void overlapping(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
-                   const Eigen::Vector3d& translation, std::vector<std::uint32_t>& elements) const;
+  void overlapping(GeometryId, const AnalyticalGeometry& shape, const Pose&,
+                   std::vector<std::uint32_t>& elements) const;
   /// Finds the contacts that a pair of the geometry and the shape would have with Method::Proximity
   /// and Contacts::Distinct, with the shape at this pose. All have the time 1.
   ///
@@ -243,8 +243,7 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
   /// Cost     follows the elements near the shape. A repeated call allocates nothing, unless a box or
   ///          a hull differs from the last one.
-  void contacts(GeometryId, const AnalyticalGeometry& shape, const Eigen::Matrix3d& rotation,
-                const Eigen::Vector3d& translation, double thickness,
+  void contacts(GeometryId, const AnalyticalGeometry& shape, const Pose&, double thickness,
                 std::vector<ShapeContact>& out) const;
   /// Finds the contacts that a pair (a, b) of the geometry and the mesh would have with
   /// Method::Proximity and Contacts::Distinct, with the mesh at this pose. A thickness of 0 finds
@@ -260,8 +259,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          thickness is not in [0, kLargestMeasure]; InvalidCall if the mesh was moved from.
   /// Cost     follows the elements near the mesh. The first call for a geometry of another size may
   ///          build the mesh's octree again. A repeated call allocates nothing.
-  void contacts(GeometryId, RigidMesh& mesh, const Eigen::Matrix3d& rotation,
-                const Eigen::Vector3d& translation, double thickness, CollisionData& out) const;
+  void contacts(GeometryId, RigidMesh& mesh, const Pose&, double thickness,
+                CollisionData& out) const;
 
   /// The least distance of two geometries. Meshes count as surfaces: a mesh inside another one has
   /// the distance of their surfaces. Lines and points with radii, and shapes, are solid. Of equally

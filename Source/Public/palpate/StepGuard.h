@@ -39,7 +39,7 @@ struct HeldVertex {
 ///   StepGuard guard(collisions);
 ///   // after the solver's last correction of a step:
 ///   collisions.setPositions(organ, corrected);
-///   collisions.setTransform(tool, rotation, translation);
+///   collisions.setTransform(tool, {rotation, translation});
 ///   guard.hold();
 ///   // collisions.positions(organ) and collisions.transform(tool) are to be used from here on
 ///   collisions.advance();

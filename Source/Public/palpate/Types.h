@@ -44,6 +44,22 @@ struct ElementPair {
 struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< L
+
+  /// The point in the world, rounded as it is written: ((r0 x + r1 y) + r2 z) + t.
+  Eigen::Vector3d operator()(const Eigen::Vector3d& p) const {
+    const auto row = [&](int k) {
+      return rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
+    };
+    return {row(0), row(1), row(2)};
+  }
+  friend bool operator==(const Pose& l, const Pose& r) {
+    return l.rotation == r.rotation && l.translation == r.translation;
+  }
+};
+
+/// The motion of a rigid body in a step. The default is a body that setTransform() never placed.
+struct RigidMotion {
+  Pose before, now;
 };
 
 /// A triangle mesh that stays in the caller's memory. A call that takes a view reads it and keeps

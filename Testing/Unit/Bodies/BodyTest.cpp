@@ -107,7 +107,7 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
     const auto pose = [&] {
       Vector3d by = away * randomPoint(random, -0.3, 1.3);
       if (round % 8 == 0) by = away * Vector3d::Unit(static_cast<int>(random() % 3));
-      return RigidTransform{randomTurn(random), offset + by};
+      return Pose{randomTurn(random), offset + by};
     };
     const Shape now(geometry, pose()), start(geometry, pose());
     const bool wholeStep = random() % 2;

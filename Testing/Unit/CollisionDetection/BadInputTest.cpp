@@ -234,12 +234,13 @@ TEST(BadInput, IsReportedWithTheNameOfTheGeometry) {
   expectRefused(ErrorCode::WrongPositionCount, name,
                 [&] { detection.setPositions(liver, std::span(bad).first(3)); });
   expectRefused(ErrorCode::InvalidTransform, name, [&] {
-    detection.setTransform(liver, 2.0 * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+    detection.setTransform(liver, {2.0 * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()});
   });
   Eigen::Matrix3d withNan = Eigen::Matrix3d::Identity();
   withNan(1, 2) = bad[3][1];
-  expectRefused(ErrorCode::InvalidTransform, "rotation has an entry that is not finite",
-                [&] { detection.setTransform(liver, withNan, Eigen::Vector3d::Zero()); });
+  expectRefused(ErrorCode::InvalidTransform, "rotation has an entry that is not finite", [&] {
+    detection.setTransform(liver, {withNan, Eigen::Vector3d::Zero()});
+  });
   expectRefused(ErrorCode::UnknownPair, pair, [&] { detection.collisionData(liver, tool); });
   detection.addCollisionPair(liver, tool);
   expectRefused(ErrorCode::NotAvailable, pair, [&] { detection.collisionData(liver, tool); });

@@ -377,17 +377,17 @@ TEST(ConstraintRows, RowsOfAMovingShapeFollowItToTheEndOfTheStep) {
   const Positions before = triangles.positions, now = moved(random, before, 0.05);
   std::size_t impacts = 0;
   for (const double turn : {0.0, 0.7}) {
-    ShapeMotion motion;
-    motion.translationBefore = {-0.4, 0.1, 0};
-    motion.translation = {0.9, 0, 0.2};
-    motion.rotation = Eigen::AngleAxisd(turn, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    RigidMotion motion;
+    motion.before.translation = {-0.4, 0.1, 0};
+    motion.now.translation = {0.9, 0, 0.2};
+    motion.now.rotation =
+        Eigen::AngleAxisd(turn, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
     const GeometryId mesh = triangles.addTo(collisions),
                      tool = collisions.addAnalyticalGeometry(Sphere{{0.1, 0.4, 0.5}, 0.2});
     collisions.addCollisionPair(mesh, tool, {Method::Continuous, 0.02, Contacts::All});
     collisions.setPositions(mesh, before, now);
-    collisions.setTransform(tool, motion.rotationBefore, motion.translationBefore, motion.rotation,
-                            motion.translation);
+    collisions.setTransform(tool, motion.before, motion.now);
     collisions.detectCollision();
     const CollisionData& contacts = collisions.collisionData(mesh, tool);
     std::vector<ConstraintRow> rows, rowsAtRest;
@@ -401,11 +401,11 @@ TEST(ConstraintRows, RowsOfAMovingShapeFollowItToTheEndOfTheStep) {
       Vector3d point = Vector3d::Zero();  // of the element, at the end
       for (int i = 0; i < 3; ++i) point += c.weights[i] * now[c.vertices[i]];
       // The point of the shape that the contact touches, at the end.
-      const Eigen::Matrix3d then = (1 - time) * motion.rotationBefore + time * motion.rotation;
+      const Eigen::Matrix3d then = (1 - time) * motion.before.rotation + time * motion.now.rotation;
       const Vector3d body =
           then.inverse() *
-          (c.pointOnShape - (1 - time) * motion.translationBefore - time * motion.translation);
-      const Vector3d opposite = motion.rotation * body + motion.translation;
+          (c.pointOnShape - (1 - time) * motion.before.translation - time * motion.now.translation);
+      const Vector3d opposite = motion.now.rotation * body + motion.now.translation;
       EXPECT_NEAR(rows[r].gap(now), c.normal.dot(point - opposite), 1e-12);
       EXPECT_NEAR(rowsAtRest[r].gap(now), c.normal.dot(point - c.pointOnShape), 1e-12);
     }

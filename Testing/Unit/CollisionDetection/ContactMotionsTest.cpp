@@ -124,7 +124,8 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
       for (const bool shapeFirst : {true, false}) {
         const Vector3d middle(0.5, 0.5, 0.5), spin(0.3, -0.7, 0.5), slide(-0.6, 0.2, 0.4);
         const Eigen::Matrix3d tilt = turn({0.4, 0.3, -0.2});
-        const ShapeMotion motion{tilt, middle, turn(kStep * spin) * tilt, middle + kStep * slide};
+        const RigidMotion motion{{tilt, middle},
+                                 {turn(kStep * spin) * tilt, middle + kStep * slide}};
         const Positions now = moved(random, elements->positions, kStep);
         OctreeBasedCD detection;
         const GeometryId soft = elements->addTo(detection),
@@ -134,12 +135,12 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
         const auto detect = [&](const Positions& at, const Eigen::Matrix3d& rotation,
                                 const Vector3d& translation) {
           detection.setPositions(soft, at);
-          detection.setTransform(shape, rotation, translation);
+          detection.setTransform(shape, {rotation, translation});
           detection.detectCollision();
           return detection.collisionData(a, b);
         };
         const CollisionData start = detect(elements->positions, tilt, middle),
-                            end = detect(now, motion.rotation, motion.translation);
+                            end = detect(now, motion.now.rotation, motion.now.translation);
         std::vector<ContactMotion> motions;
         const ContactSide mesh{{0, elements->positions, now}, elements->radii},
             tool{{}, {}, motion};
@@ -175,26 +176,24 @@ TEST(ContactMotions, AreDerivativesOfDistancesToShapes) {
 TEST(ContactMotions, AreDerivativesOfDistancesBetweenShapes) {
   constexpr double kStep = 0x1p-16;
   const Eigen::Matrix3d tilt = turn({0.4, 0.3, -0.2}), other = turn({-0.1, 0.5, 0.6});
-  const ShapeMotion first{tilt,
-                          {0, 0, 0},
-                          turn(kStep * Vector3d(0.3, -0.7, 0.5)) * tilt,
-                          kStep * Vector3d(0.1, 0.9, -0.3)},
-      second{other,
-             {0.5, 0.6, 0.7},
-             turn(kStep * Vector3d(-0.8, 0.2, 0.1)) * other,
-             Vector3d(0.5, 0.6, 0.7) + kStep * Vector3d(-0.5, 0.1, 0.7)};
+  const RigidMotion first{
+      {tilt, {0, 0, 0}},
+      {turn(kStep * Vector3d(0.3, -0.7, 0.5)) * tilt, kStep * Vector3d(0.1, 0.9, -0.3)}},
+      second{{other, {0.5, 0.6, 0.7}},
+             {turn(kStep * Vector3d(-0.8, 0.2, 0.1)) * other,
+              Vector3d(0.5, 0.6, 0.7) + kStep * Vector3d(-0.5, 0.1, 0.7)}};
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j) {
       OctreeBasedCD detection;
       const GeometryId a = detection.addAnalyticalGeometry(kShapes[i]),
                        b = detection.addAnalyticalGeometry(kShapes[j]);
       detection.addCollisionPair(a, b, {Method::Proximity, 10});
-      detection.setTransform(a, first.rotationBefore, first.translationBefore);
-      detection.setTransform(b, second.rotationBefore, second.translationBefore);
+      detection.setTransform(a, first.before);
+      detection.setTransform(b, second.before);
       detection.detectCollision();
       const double before = detection.collisionData(a, b).shapeShape()[0].distance;
-      detection.setTransform(a, first.rotation, first.translation);
-      detection.setTransform(b, second.rotation, second.translation);
+      detection.setTransform(a, first.now);
+      detection.setTransform(b, second.now);
       detection.detectCollision();
       const CollisionData& contacts = detection.collisionData(a, b);
       const ShapeShapeContact& contact = contacts.shapeShape()[0];
@@ -211,15 +210,14 @@ TEST(ContactMotions, AreDerivativesOfDistancesBetweenShapes) {
 TEST(ContactMotions, UseThePoseAtTheImpactWithAShape) {
   Random random(194);
   const TestGeometry drops = particles(random, 300, 0.02);
-  const ShapeMotion motion{
-      turn({0.4, 0.3, -0.2}), {0.5, 0.5, 0.2}, turn({0.1, 0.6, 0.3}), {0.5, 0.5, 0.9}};
+  const RigidMotion motion{{turn({0.4, 0.3, -0.2}), {0.5, 0.5, 0.2}},
+                           {turn({0.1, 0.6, 0.3}), {0.5, 0.5, 0.9}}};
   for (std::size_t s = 0; s < 3; ++s) {
     OctreeBasedCD detection;
     const GeometryId points = drops.addTo(detection),
                      shape = detection.addAnalyticalGeometry(kShapes[s]);
     detection.addCollisionPair(points, shape, {Method::Continuous, 0.01});
-    detection.setTransform(shape, motion.rotationBefore, motion.translationBefore, motion.rotation,
-                           motion.translation);
+    detection.setTransform(shape, motion.before, motion.now);
     detection.detectCollision();
     const CollisionData& contacts = detection.collisionData(points, shape);
     std::vector<ContactMotion> motions;
@@ -234,8 +232,8 @@ TEST(ContactMotions, UseThePoseAtTheImpactWithAShape) {
       const Vector3d way = -motions[i].relativeDisplacement,
                      start = motions[i].opposite - time * way, end = start + way;
       const Vector3d bodyBefore =
-          motion.rotationBefore.transpose() * (start - motion.translationBefore);
-      const Vector3d bodyNow = motion.rotation.transpose() * (end - motion.translation);
+          motion.before.rotation.transpose() * (start - motion.before.translation);
+      const Vector3d bodyNow = motion.now.rotation.transpose() * (end - motion.now.translation);
       EXPECT_LT((bodyBefore - bodyNow).norm(), 1e-14);
     }
   }

@@ -49,7 +49,7 @@ TEST(GeometryAccess, PositionsAreTheCurrentOnes) {
   collisions.setPositions(id, next, mesh.positions);
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   // Positions of a placed body are in its own frame.
-  collisions.setTransform(id, Eigen::Matrix3d::Identity(), {1, 2, 3});
+  collisions.setTransform(id, {Eigen::Matrix3d::Identity(), {1, 2, 3}});
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   EXPECT_EQ(collisions.vertexCount(id), mesh.positions.size());
   const Positions two{{0, 0, 0}, {1, 0, 0}};
@@ -73,7 +73,7 @@ TEST(GeometryAccess, BoundsEncloseVerticesWithTheirRadii) {
     for (const bool placed : {false, true}) {
       const Eigen::AngleAxisd turn(0.7, Vector3d(1, 2, 3).normalized());
       const Vector3d shift(0.3, -2, 5);
-      if (placed) collisions.setTransform(id, turn.toRotationMatrix(), shift);
+      if (placed) collisions.setTransform(id, {turn.toRotationMatrix(), shift});
       Eigen::AlignedBox3d truth;
       for (std::uint32_t v = 0; v < now.size(); ++v) {
         const Vector3d at = placed ? Vector3d(turn * now[v] + shift) : now[v];
@@ -97,7 +97,7 @@ TEST(GeometryAccess, BoundsOfShapesAreTight) {
   const auto boundsOf = [&](const AnalyticalGeometry& shape) {
     OctreeBasedCD collisions;
     const GeometryId id = collisions.addAnalyticalGeometry(shape);
-    collisions.setTransform(id, turn, shift);
+    collisions.setTransform(id, {turn, shift});
     return collisions.bounds(id);
   };
   const auto expectBounds = [](const Eigen::AlignedBox3d& found, const Eigen::AlignedBox3d& truth) {

@@ -102,13 +102,13 @@ TEST(Range, OfRadiiTransformsAndSettings) {
   expectLimit(
       InvalidTransform, "geometry 0: translation is",
       [&](double x) {
-        collisions.setTransform(placed, one, {0, x, 0});
+        collisions.setTransform(placed, {one, {0, x, 0}});
       },
       true);
   expectLimit(
       InvalidTransform, "geometry 0: before: translation is",
       [&](double x) {
-        collisions.setTransform(placed, one, {x, 0, 0}, one, {0, 0, 0});
+        collisions.setTransform(placed, {one, {x, 0, 0}}, {one, {0, 0, 0}});
       },
       true);
   collisions.addCollisionPair(placed, other);
@@ -158,11 +158,11 @@ TEST(Range, OfQueries) {
   expectLimit(
       InvalidTransform, "the query's shape: translation is",
       [&](double x) {
-        queries.overlapping(mesh, Sphere{{0, 0, 0}, 1}, one, {0, 0, x}, elements);
+        queries.overlapping(mesh, Sphere{{0, 0, 0}, 1}, {one, {0, 0, x}}, elements);
       },
       true);
   expectLimit(InvalidSettings, "thickness is", [&](double x) {
-    queries.contacts(mesh, Sphere{{0, 0, 0}, 1}, one, {0, 0, 0}, x, contacts);
+    queries.contacts(mesh, Sphere{{0, 0, 0}, 1}, {one, {0, 0, 0}}, x, contacts);
   });
   expectLimit(
       NonFinitePosition, "point 1 of the path is",

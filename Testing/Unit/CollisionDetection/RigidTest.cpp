@@ -100,7 +100,7 @@ class RigidRun {
  private:
   void move(GeometryId id, const Place& place, const Positions& positions) {
     if (m_byTransform)
-      m_collisions.setTransform(id, place.rotation, place.translation);
+      m_collisions.setTransform(id, {place.rotation, place.translation});
     else
       m_collisions.setPositions(id, place(positions));
   }
@@ -365,7 +365,7 @@ TEST(Rigid, FlatBodiesTouchInOneFrame) {
           const GeometryId a = body.addTo(collisions), b = body.addTo(collisions);
           collisions.addCollisionPair(a, b, {method, 0.0});
           for (const GeometryId id : {a, b})
-            collisions.setTransform(id, place.rotation, 0 * place.translation);
+            collisions.setTransform(id, {place.rotation, 0 * place.translation});
           collisions.detectCollision();
           rows.emplace_back(collisions.collisionData(a, b));
         }
@@ -397,8 +397,8 @@ TEST(Rigid, NearMissesMatchBruteForce) {
                     atEnd[] = {secondMoves ? still : now, secondMoves ? now : still};
         for (const GeometryId id : {a, b}) {
           const std::size_t i = id == b;
-          collisions.setTransform(id, atStart[i].rotation, atStart[i].translation,
-                                  atEnd[i].rotation, atEnd[i].translation);
+          collisions.setTransform(id, {atStart[i].rotation, atStart[i].translation},
+                                  {atEnd[i].rotation, atEnd[i].translation});
         }
         collisions.detectCollision();
         rows.emplace_back(collisions.collisionData(a, b));
@@ -455,8 +455,8 @@ TEST(Rigid, BoundsDoNotChangeContacts) {
               const GeometryId ids[] = {one.a->addTo(collisions), one.b->addTo(collisions)};
               collisions.addCollisionPair(ids[0], ids[1], pair);
               for (int i : {0, 1})
-                collisions.setTransform(ids[i], before[i].rotation, before[i].translation,
-                                        now[i].rotation, now[i].translation);
+                collisions.setTransform(ids[i], {before[i].rotation, before[i].translation},
+                                        {now[i].rotation, now[i].translation});
               collisions.detectCollision();
               EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
               rows.emplace_back(collisions.collisionData(ids[0], ids[1]));
@@ -490,8 +490,8 @@ TEST(Rigid, BoundsReduceCandidates) {
       collisions.addCollisionPair(a, b, {Method::Proximity, 0.05});
       // The octrees exist before the bodies are placed.
       collisions.detectCollision();
-      collisions.setTransform(a, Matrix3d::Identity(), Vector3d::Zero());
-      collisions.setTransform(b, Matrix3d::Identity(), skew * Vector3d(2.01, 0, 0.3));
+      collisions.setTransform(a, {Matrix3d::Identity(), Vector3d::Zero()});
+      collisions.setTransform(b, {Matrix3d::Identity(), skew * Vector3d(2.01, 0, 0.3)});
       collisions.detectCollision();
       rows.emplace_back(collisions.collisionData(a, b));
       candidates.push_back(collisions.statistics().candidatePairs);
@@ -527,9 +527,9 @@ TEST(Rigid, BoundsDoNotChangeContactsOfQueries) {
     for (const Settings& settings : boundsSettings()) {
       OctreeBasedCD collisions(settings);
       const GeometryId id = leaf.addTo(collisions);
-      collisions.setTransform(id, place.rotation, place.translation);
+      collisions.setTransform(id, {place.rotation, place.translation});
       CollisionData found;
-      collisions.queries().contacts(id, probe, pose.rotation, pose.translation, 0.03, found);
+      collisions.queries().contacts(id, probe, {pose.rotation, pose.translation}, 0.03, found);
       rows.emplace_back(found);
     }
     EXPECT_GT(rows[0].contacts(), 0u);
@@ -544,7 +544,7 @@ TEST(Rigid, OctreeIsNotUpdated) {
   OctreeBasedCD collisions(settingsOf(Engine::Octree, 1, OctreeUpdate::Rebuild));
   const GeometryId body = bone.addTo(collisions), other = organ.addTo(collisions);
   collisions.addCollisionPair(body, other, {Method::Continuous, 0.0});
-  collisions.setTransform(body, Matrix3d::Identity(), {0, 0, 0});
+  collisions.setTransform(body, {Matrix3d::Identity(), {0, 0, 0}});
   collisions.detectCollision();
   const auto boxes = [&] {
     std::vector<Vector3d> all;
@@ -556,7 +556,7 @@ TEST(Rigid, OctreeIsNotUpdated) {
   for (int frame = 0; frame < 5; ++frame) {
     const Place place = somewhere(random);
     collisions.advance();
-    collisions.setTransform(body, place.rotation, place.translation);
+    collisions.setTransform(body, {place.rotation, place.translation});
     collisions.detectCollision();
     EXPECT_EQ(collisions.statistics().rebuiltOctrees + collisions.statistics().refittedOctrees, 0u);
     EXPECT_EQ(collisions.statistics().unchangedOctrees, 2u);
@@ -572,7 +572,7 @@ TEST(Rigid, OctreeIsNotUpdated) {
 class RigidStep : public ::testing::Test {
  protected:
   static Positions at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
-  void moveTo(double z) { m_collisions.setTransform(m_id, Matrix3d::Identity(), {0, 0, z}); }
+  void moveTo(double z) { m_collisions.setTransform(m_id, {Matrix3d::Identity(), {0, 0, z}}); }
   void expect(double before, double now) {
     const CollisionProblem problem = m_collisions.problem();
     EXPECT_EQ(problem.geometries[0].before, at(before));
@@ -585,8 +585,8 @@ class RigidStep : public ::testing::Test {
     expect(now, now);
   }
   void moveFrom(double before, double now) {
-    m_collisions.setTransform(m_id, Matrix3d::Identity(), {0, 0, before}, Matrix3d::Identity(),
-                              {0, 0, now});
+    m_collisions.setTransform(m_id, {Matrix3d::Identity(), {0, 0, before}},
+                              {Matrix3d::Identity(), {0, 0, now}});
   }
   OctreeBasedCD m_collisions;
   GeometryId m_id = m_collisions.addTriangleMesh(at(0), std::vector<Triangle>{{0, 1, 2}});
@@ -658,7 +658,7 @@ TEST_F(RigidStep, DoesNotDependOnTheOrderOfCalls) {
   moveTo(10);
   expect(15, 16);
   const GeometryId other = m_collisions.addTriangleMesh(at(0), std::vector<Triangle>{{0, 1, 2}});
-  m_collisions.setTransform(other, Matrix3d::Identity(), {0, 0, 10});
+  m_collisions.setTransform(other, {Matrix3d::Identity(), {0, 0, 10}});
   m_collisions.setPositions(other, at(5), at(6));
   const CollisionProblem problem = m_collisions.problem();
   EXPECT_EQ(problem.geometries[1].before, problem.geometries[0].before);
@@ -702,7 +702,7 @@ TEST(Rigid, PositionsMayChangeBetweenTransforms) {
       if (what != 1) place = place.then({1, 1, 0}, 0.1, {0.5, 0.5, 0.5}, {0.01, 0, 0});
       if (what != 0) own = moved(random, own, 0.02);
       for (OctreeBasedCD& one : rigid) {
-        if (what != 1) one.setTransform(GeometryId{0}, place.rotation, place.translation);
+        if (what != 1) one.setTransform(GeometryId{0}, {place.rotation, place.translation});
         if (what == 3) one.setPositions(GeometryId{0}, start);  // the last call counts
         if (what != 0) one.setPositions(GeometryId{0}, own);
         one.detectCollision();
@@ -736,8 +736,8 @@ TEST(Rigid, InsideVerticesMatchSetPositions) {
         OctreeBasedCD collisions(settingsOf(engine));
         const GeometryId id = body.addTo(collisions), points = smoke.addTo(collisions);
         if (byTransform) {
-          collisions.setTransform(id, place.rotation, place.translation);
-          collisions.setTransform(points, ofSmoke.rotation, ofSmoke.translation);
+          collisions.setTransform(id, {place.rotation, place.translation});
+          collisions.setTransform(points, {ofSmoke.rotation, ofSmoke.translation});
         } else {
           collisions.setPositions(id, place(body.positions));
           collisions.setPositions(points, ofSmoke(smoke.positions));
@@ -787,9 +787,9 @@ TEST(Rigid, SignsOfZerosMatchSetPositions) {
   OctreeBasedCD collisions;
   const GeometryId id = collisions.addPointSet(Positions{minus}, 0.0);
   const Matrix3d same = Matrix3d::Identity();
-  collisions.setTransform(id, same, minus, same, plus);
+  collisions.setTransform(id, {same, minus}, {same, plus});
   EXPECT_FALSE(std::signbit(collisions.transform(id).translation[0]));
-  collisions.setTransform(id, same, plus, same, minus);
+  collisions.setTransform(id, {same, plus}, {same, minus});
   EXPECT_TRUE(std::signbit(collisions.transform(id).translation[0]));
 }
 
@@ -810,7 +810,7 @@ TEST(Rigid, ContactsWithShapesMatchSetPositions) {
                            tool = collisions.addAnalyticalGeometry(shape);
           collisions.addCollisionPair(id, tool, {Method::Proximity, 0.02});
           if (byTransform)
-            collisions.setTransform(id, place.rotation, place.translation);
+            collisions.setTransform(id, {place.rotation, place.translation});
           else
             collisions.setPositions(id, place(body.positions));
           collisions.detectCollision();
@@ -911,7 +911,7 @@ TEST(Rigid, RotationsFromFloatsAreMadeExact) {
     const auto place = [&](OctreeBasedCD& each, const Matrix3d& r) {
       const GeometryId a = body.addTo(each), b = other.addTo(each);
       each.addCollisionPair(a, b, {Method::Proximity, 0.05});
-      each.setTransform(a, r, at);
+      each.setTransform(a, {r, at});
       each.detectCollision();
       return each.collisionData(a, b).hash();
     };
@@ -928,7 +928,7 @@ TEST(Rigid, RotationsFromFloatsAreMadeExact) {
 
     const auto overlapping = [&](const Matrix3d& r) {
       std::vector<std::uint32_t> elements;
-      collisions.queries().overlapping(GeometryId{1}, Box{{0, 0, 0}, {0.4, 0.1, 0.2}}, r, at,
+      collisions.queries().overlapping(GeometryId{1}, Box{{0, 0, 0}, {0.4, 0.1, 0.2}}, {r, at},
                                        elements);
       return elements;
     };
@@ -936,7 +936,7 @@ TEST(Rigid, RotationsFromFloatsAreMadeExact) {
     const auto contactsOf = [&](const Matrix3d& r) {
       RigidMesh mesh(body.positions, body.triangles);
       CollisionData data;
-      collisions.queries().contacts(GeometryId{1}, mesh, r, at, 0.05, data);
+      collisions.queries().contacts(GeometryId{1}, mesh, {r, at}, 0.05, data);
       return data.hash();
     };
     EXPECT_EQ(contactsOf(rotation), contactsOf(pose.rotation));
@@ -966,19 +966,19 @@ TEST(Rigid, BadTransformsAreRefused) {
   const Positions given = collisions.problem().geometries[0].now;
   for (const Matrix3d& bad : {skewed, Matrix3d(-one), Matrix3d(NAN * one), Matrix3d(2 * one)})
     expectRefused(Code::InvalidTransform, "geometry 0: ", [&] {
-      collisions.setTransform(id, bad, {0, 0, 0});
+      collisions.setTransform(id, {bad, {0, 0, 0}});
     });
   for (const double bad : {double(NAN), double(INFINITY), 1e308})
     expectRefused(Code::InvalidTransform, "geometry 0: ", [&] {
-      collisions.setTransform(id, one, {0, bad, 0});
+      collisions.setTransform(id, {one, {0, bad, 0}});
     });
   Positions wide = body.positions;
   wide[4] = {0, 1e308, 0};
   expectRefused(Code::UnknownGeometry, "geometry 9", [&] {
-    collisions.setTransform(GeometryId{9}, one, {0, 0, 0});
+    collisions.setTransform(GeometryId{9}, {one, {0, 0, 0}});
   });
   EXPECT_EQ(collisions.problem().geometries[0].now, given);
-  collisions.setTransform(id, one, {0, 0, 0});
+  collisions.setTransform(id, {one, {0, 0, 0}});
   expectRefused(Code::NonFinitePosition,
                 "geometry 0, vertex 4: ", [&] { collisions.setPositions(id, wide); });
   expectRefused(Code::UnsupportedMethod, "cannot be tested against itself", [&] {
@@ -987,10 +987,10 @@ TEST(Rigid, BadTransformsAreRefused) {
   collisions.addCollisionPair(huge, huge, {Method::Intersection, 0.0});
   collisions.setPositions(huge, body.positions);
   expectRefused(Code::UnsupportedMethod, "cannot be tested against itself", [&] {
-    collisions.setTransform(huge, one, {0, 0, 0});
+    collisions.setTransform(huge, {one, {0, 0, 0}});
   });
   collisions.removeCollisionPair(huge, huge);
-  collisions.setTransform(huge, one, {1, 0, 0});
+  collisions.setTransform(huge, {one, {1, 0, 0}});
   collisions.detectCollision();
 }
 

@@ -141,7 +141,8 @@ PairSettings continuousPair(double thickness, double timeTolerance = 1e-6) {
 
 void place(OctreeBasedCD& collisions, GeometryId id, const MovingShape& tool) {
   const auto& [before, now] = tool.ends;
-  collisions.setTransform(id, before.rotation, before.translation, now.rotation, now.translation);
+  collisions.setTransform(id, {before.rotation, before.translation},
+                          {now.rotation, now.translation});
 }
 
 CollisionData answer(const MovingShape& a, const MovingShape& b, const PairSettings& pair,
@@ -405,7 +406,7 @@ TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   std::vector<GeometryId> ids;
   for (const AnalyticalGeometry& shape : kindsOfShape(random)) {
     ids.push_back(collisions.addAnalyticalGeometry(shape));
-    collisions.setTransform(ids.back(), randomTurn(random), 2 * randomPoint(random, -1, 1));
+    collisions.setTransform(ids.back(), {randomTurn(random), 2 * randomPoint(random, -1, 1)});
     for (const GeometryId id : ids)
       if (id != ids.back() && !std::holds_alternative<Plane>(shape))
         collisions.addCollisionPair(id, ids.back(), continuousPair(0.05));
@@ -413,7 +414,7 @@ TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   collisions.detectCollision();
   collisions.advance();
   for (const GeometryId id : ids)
-    collisions.setTransform(id, randomTurn(random), 2 * randomPoint(random, -1, 1));
+    collisions.setTransform(id, {randomTurn(random), 2 * randomPoint(random, -1, 1)});
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());
   EXPECT_GT(collisions.statistics().contacts, 20u);

@@ -28,8 +28,8 @@ std::optional<ShapeShapeContact> answer(const PlacedShape& a, const PlacedShape&
   OctreeBasedCD collisions(settingsOf(engine));
   const GeometryId first = collisions.addAnalyticalGeometry(a.geometry),
                    second = collisions.addAnalyticalGeometry(b.geometry);
-  collisions.setTransform(first, a.rotation, a.translation);
-  collisions.setTransform(second, b.rotation, b.translation);
+  collisions.setTransform(first, {a.rotation, a.translation});
+  collisions.setTransform(second, {b.rotation, b.translation});
   collisions.addCollisionPair(first, second, {Method::Proximity, thickness});
   collisions.detectCollision();
   const CollisionData& data = collisions.collisionData(first, second);
@@ -273,7 +273,7 @@ TEST(ShapePairs, CapturesIncludeThem) {
   for (const AnalyticalGeometry& shape : kinds(random)) {
     if (std::holds_alternative<Plane>(shape)) continue;
     ids.push_back(collisions.addAnalyticalGeometry(shape));
-    collisions.setTransform(ids.back(), randomTurn(random), randomPoint(random, -0.3, 0.3));
+    collisions.setTransform(ids.back(), {randomTurn(random), randomPoint(random, -0.3, 0.3)});
     for (const GeometryId id : ids)
       if (id != ids.back()) collisions.addCollisionPair(id, ids.back(), {Method::Proximity, 0.5});
   }

@@ -179,7 +179,7 @@ CollisionData answer(const Settings& settings, const Body& body, const Placed& s
   OctreeBasedCD collisions(settings);
   const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry),
                    mesh = body.addTo(collisions);
-  collisions.setTransform(tool, shape.rotation, shape.translation);
+  collisions.setTransform(tool, {shape.rotation, shape.translation});
   collisions.addCollisionPair(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool, pair);
   collisions.detectCollision();
   EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
@@ -693,16 +693,16 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
   Matrix3d turned = one;
   turned(0, 1) = 2e-5;
   expectRefused(Code::InvalidTransform, "geometry 0: rotation is not a rotation", [&] {
-    collisions.setTransform(tool, turned, {0, 0, 0});
+    collisions.setTransform(tool, {turned, {0, 0, 0}});
   });
   expectRefused(Code::InvalidTransform, "its determinant is -1", [&] {
-    collisions.setTransform(tool, -one, {0, 0, 0});
+    collisions.setTransform(tool, {-one, {0, 0, 0}});
   });
   expectRefused(Code::InvalidTransform, "rotation", [&] {
-    collisions.setTransform(tool, kNan * one, {0, 0, 0});
+    collisions.setTransform(tool, {kNan * one, {0, 0, 0}});
   });
   expectRefused(Code::InvalidTransform, "translation is (0, 0, nan)", [&] {
-    collisions.setTransform(tool, one, {0, 0, kNan});
+    collisions.setTransform(tool, {one, {0, 0, kNan}});
   });
   expectRefused(Code::WrongPositionCount, "is a shape, which has no positions",
                 [&] { collisions.setPositions(tool, Positions{}); });
@@ -719,7 +719,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
     collisions.setContactPredicate(tool, points, [](const ContactFeatures&) { return true; });
   });
   turned(0, 1) = 1e-10;
-  collisions.setTransform(tool, turned, {0, 0, 4});
+  collisions.setTransform(tool, {turned, {0, 0, 4}});
   collisions.collectCandidates();
   collisions.detectCollision();
   EXPECT_TRUE(collisions.collisionData(tool, points).shape().empty());
@@ -739,7 +739,7 @@ TEST(Shapes, CapturesAndAuditIncludeThem) {
     const GeometryId mesh = body.addTo(collisions);
     for (const Placed& shape : shapes(random)) {
       const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
-      collisions.setTransform(tool, shape.rotation, shape.translation);
+      collisions.setTransform(tool, {shape.rotation, shape.translation});
       collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.03});
     }
     collisions.detectCollision();

@@ -178,8 +178,8 @@ TEST(SteadyFrame, AllocatesNothingWithShapes) {
   for (int frame = 0; frame < 20; ++frame) {
     if (frame == 10) before = allocations;
     for (const GeometryId tool : tools)
-      detection.setTransform(tool, turns[static_cast<std::size_t>(tool) % 2],
-                             {0.02 * (frame % 10), 0, 0.05});
+      detection.setTransform(
+          tool, {turns[static_cast<std::size_t>(tool) % 2], {0.02 * (frame % 10), 0, 0.05}});
     detection.detectCollision();
     detection.advance();
     contacts += detection.statistics().contacts;
@@ -202,7 +202,7 @@ TEST(SteadyFrame, AllocatesNothingWithDistanceFields) {
     if (frame == 10) before = allocations;
     for (Eigen::Vector3d& p : sheet.positions) p.z() += frame % 10 == 0 ? -0.09 : 0.01;
     detection.setPositions(tissue, sheet.positions);
-    detection.setTransform(bone, Eigen::Matrix3d::Identity(), {0.02 * (frame % 10), 0, 0.05});
+    detection.setTransform(bone, {Eigen::Matrix3d::Identity(), {0.02 * (frame % 10), 0, 0.05}});
     detection.detectCollision();
     detection.advance();
     contacts += detection.statistics().contacts;
@@ -234,8 +234,8 @@ TEST(SteadyFrame, AllocatesNothingWithSnapshots) {
     for (std::size_t v = 0; v < positions.size(); ++v)
       positions[v] = (1 + 0.01 * (frame % 10)) * ball.positions[v];
     collisions.setPositions(organ, positions);
-    collisions.setTransform(rigid, unit, {0.01 * (frame % 10), 0, 3});
-    collisions.setTransform(shape, unit, {0.01 * (frame % 10), 0, 2});
+    collisions.setTransform(rigid, {unit, {0.01 * (frame % 10), 0, 3}});
+    collisions.setTransform(shape, {unit, {0.01 * (frame % 10), 0, 2}});
     collisions.publish(frame);
     collisions.advance();
     held[frame % 3] = collisions.latestSnapshot();
@@ -243,8 +243,8 @@ TEST(SteadyFrame, AllocatesNothingWithSnapshots) {
     contacts += queries.contains(organ, {0, 0, 0});
     contacts += queries.contains(organ, {0, 0, 0}, {.rule = InsideRule::WindingNumber});
     contacts += queries.firstHit({{0, 0, -9}, {0.1, 0, 1}}).has_value();
-    queries.contacts(organ, Sphere{{0, 0, 0}, 0.2}, unit, {0, 0, 1}, 0.1, shapeContacts);
-    queries.contacts(organ, tool, unit, {0, 0, 1}, 0.1, meshContacts);
+    queries.contacts(organ, Sphere{{0, 0, 0}, 0.2}, {unit, {0, 0, 1}}, 0.1, shapeContacts);
+    queries.contacts(organ, tool, {unit, {0, 0, 1}}, 0.1, meshContacts);
     contacts += shapeContacts.size() + meshContacts.validity().atEnd;
     EXPECT_TRUE(queries.closestPoint(still, {2, 0, 0}));
   }
@@ -284,7 +284,7 @@ TEST(SteadyFrame, AllocatesNothingWithStepsOfShapes) {
     if (pass == 2) before = allocations;
     for (int frame = 0; frame < 12; ++frame) {
       for (const GeometryId tool : tools)
-        collisions.setTransform(tool, randomTurn(same), randomPoint(same, 0, 1));
+        collisions.setTransform(tool, {randomTurn(same), randomPoint(same, 0, 1)});
       collisions.detectCollision();
       if (pass == 2) contacts += collisions.statistics().contacts;
     }
@@ -311,9 +311,9 @@ TEST(SteadyFrame, CountsExactDecisionsBetweenShapes) {
   for (const bool parallel : {false, true})
     for (int frame = 0; frame < 20; ++frame) {
       for (std::size_t i = 0; i < tools.size(); ++i)
-        detection.setTransform(
-            tools[i], parallel || i % 2 ? Eigen::Matrix3d::Identity() : turn,
-            0.1 * static_cast<double>(i + 1) * Eigen::Vector3d(1, 0.5, 0.01 * (frame % 10)));
+        detection.setTransform(tools[i], {parallel || i % 2 ? Eigen::Matrix3d::Identity() : turn,
+                                          0.1 * static_cast<double>(i + 1) *
+                                              Eigen::Vector3d(1, 0.5, 0.01 * (frame % 10))});
       const IntegersApart apart;
       const std::size_t before = allocations;
       detection.detectCollision();
@@ -339,7 +339,7 @@ TEST(SteadyFrame, AllocatesNothingWithRigidBodies) {
       Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();
       turned(0, 0) = turned(1, 1) = std::cos(angle);
       turned(0, 1) = -(turned(1, 0) = std::sin(angle));
-      detection.setTransform(plate, turned, {0, 0, 0.015});
+      detection.setTransform(plate, {turned, {0, 0, 0.015}});
       if (frame % 10 == 5) detection.setPositions(plate, sheet.positions);
       detection.detectCollision();
       detection.advance();

@@ -300,8 +300,8 @@ TEST(StepGuard, PlacedBodiesStayRigidAndTouchNothing) {
     Guarded guarded(all);
     const Pose start{turned(0.3 * scene), {0.5, 0.5, 1.2}},
         end{turned(0.3 * scene + 0.4), {0.55, 0.45, 0.2 + 0.05 * scene}};
-    guarded.collisions.setTransform(GeometryId{1}, start.rotation, start.translation, end.rotation,
-                                    end.translation);
+    guarded.collisions.setTransform(GeometryId{1}, {start.rotation, start.translation},
+                                    {end.rotation, end.translation});
     all.now[0] = moved(random, all.before[0], 0.02);
     guarded.collisions.setPositions(GeometryId{0}, all.before[0], all.now[0]);
     EXPECT_GT(guarded.guard.hold(), 0u);
@@ -344,7 +344,7 @@ TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
   collisions.addCollisionPair(cloth, tool, {.thickness = 2 * kGap});
   StepGuard guard(collisions);
   Vector3d at(0.35, 0.5, 0.72);
-  collisions.setTransform(tool, Eigen::Matrix3d::Identity(), at);
+  collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), at});
   collisions.advance();
   const Positions rest = all.bodies[0].positions;
   Positions now = rest;
@@ -361,7 +361,7 @@ TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
     const Vector3d way = target - at,
                    wanted = at + way * std::min(1.0, 2 * kRate / std::max(way.norm(), 1e-300));
     collisions.setPositions(cloth, now);
-    collisions.setTransform(tool, Eigen::Matrix3d::Identity(), wanted);
+    collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), wanted});
     collisions.detectCollision();
     std::vector<ConstraintRow> rows;
     const auto first = static_cast<std::uint32_t>(now.size());
@@ -684,7 +684,7 @@ TEST(StepGuard, ShapesDoNotSinkIntoAMesh) {
         const GeometryId mesh = each->addTriangleMesh(cloth.positions, cloth.triangles),
                          tool = each->addAnalyticalGeometry(shape);
         each->addCollisionPair(mesh, tool);
-        each->setTransform(tool, turned(0.2), {0.5, 0.5, 0.95});
+        each->setTransform(tool, {turned(0.2), {0.5, 0.5, 0.95}});
         each->advance();
       }
       const GeometryId mesh{0}, tool{1};
@@ -692,8 +692,8 @@ TEST(StepGuard, ShapesDoNotSinkIntoAMesh) {
       for (int step = 0; step < 12; ++step) {
         // Sinks until it is stopped, and slides.
         for (OctreeBasedCD* each : {&collisions, &reference})
-          each->setTransform(tool, turned(angle + turn * 0.1),
-                             {0.5 + 0.01 * step, 0.5, height - 0.1});
+          each->setTransform(tool,
+                             {turned(angle + turn * 0.1), {0.5 + 0.01 * step, 0.5, height - 0.1}});
         guard.hold();
         other.hold();
         const Pose pose = collisions.transform(tool);
@@ -702,14 +702,14 @@ TEST(StepGuard, ShapesDoNotSinkIntoAMesh) {
         EXPECT_GT(collisions.queries().distance(mesh, tool).distance, 0.0);
         if (turn == 0.0) height = pose.translation.z();
         if (turn != 0.0) height = pose.translation.z(), angle += turn * 0.1;
-        collisions.setTransform(tool, pose.rotation, pose.translation);
+        collisions.setTransform(tool, {pose.rotation, pose.translation});
         collisions.advance();
         reference.advance();
       }
       EXPECT_LT(collisions.queries().distance(mesh, tool).distance, 0.01) << "it came near";
       // It may leave, also from where the guard stopped it again and again.
       const Vector3d away = collisions.transform(tool).translation + Vector3d(0.1, 0, 0.3);
-      collisions.setTransform(tool, collisions.transform(tool).rotation, away);
+      collisions.setTransform(tool, {collisions.transform(tool).rotation, away});
       EXPECT_EQ(guard.hold(), 0u);
     }
 }
@@ -727,12 +727,12 @@ TEST(StepGuard, ShapesDoNotSinkIntoEachOtherNorThroughPlanes) {
   collisions.addCollisionPair(line, ball);
   StepGuard guard(collisions);
   const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
-  collisions.setTransform(box, still, {0, 0, 1});
-  collisions.setTransform(ball, still, {0, 0, 3});
+  collisions.setTransform(box, {still, {0, 0, 1}});
+  collisions.setTransform(ball, {still, {0, 0, 3}});
   collisions.advance();
   // The box falls 2 with 0.5 of room, and the ball falls after it by 4.
-  collisions.setTransform(box, still, {0, 0, -1});
-  collisions.setTransform(ball, still, {0, 0, -1});
+  collisions.setTransform(box, {still, {0, 0, -1}});
+  collisions.setTransform(ball, {still, {0, 0, -1}});
   collisions.setPositions(line, Positions{{5, 0, -1}, {6, 0, 2}});
   guard.hold();
   const double ofBox = collisions.transform(box).translation.z(),
@@ -743,11 +743,11 @@ TEST(StepGuard, ShapesDoNotSinkIntoEachOtherNorThroughPlanes) {
   EXPECT_NEAR(ofLine, 0.25 + 0.125 * 0.75, 1e-9);
   // A shape that begins inside another one.
   collisions.advance();
-  collisions.setTransform(box, still, {0, 0, 0.25}, still, {0, 0, 0.25});
+  collisions.setTransform(box, {still, {0, 0, 0.25}}, {still, {0, 0, 0.25}});
   EXPECT_EQ(guard.hold(), 0u) << "on a plane that does not turn it comes no deeper";
-  collisions.setTransform(box, still, {0, 0, 0.25}, still, {0, 0, 0.3});
+  collisions.setTransform(box, {still, {0, 0, 0.25}}, {still, {0, 0, 0.3}});
   EXPECT_EQ(guard.hold(), 0u);
-  collisions.setTransform(ball, still, {0, 0, 0.3});
+  collisions.setTransform(ball, {still, {0, 0, 0.3}});
   collisions.advance();
   try {
     guard.hold();

@@ -311,7 +311,7 @@ TEST(PairStatistics, AddUpToThoseOfTheFrame) {
     // The answer of the mesh, which does not move, still holds.
     collisions.advance();
     collisions.detectCollision();
-    collisions.setTransform(tool, Eigen::Matrix3d::Identity(), {0.1, 0, 0});
+    collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), {0.1, 0, 0}});
     collisions.detectCollision();
     EXPECT_EQ(collisions.pairStatistics(a, b).milliseconds, 0.0);
     EXPECT_EQ(collisions.pairStatistics(a, b).contacts, first.contacts);

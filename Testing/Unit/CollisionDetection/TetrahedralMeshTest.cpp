@@ -168,8 +168,8 @@ std::vector<Rows> contactsOver(const Settings& settings, const Solid& solid, con
   asTriangles ? detection.setTriangles(body, cut.positions, after.triangles)
               : detection.setTetrahedra(body, cut.positions, cut.tetrahedra);
   frame();
-  detection.setTransform(body, Eigen::AngleAxisd(0.1, Vector3d::UnitX()).toRotationMatrix(),
-                         {0.01, 0, 0});
+  detection.setTransform(
+      body, {Eigen::AngleAxisd(0.1, Vector3d::UnitX()).toRotationMatrix(), {0.01, 0, 0}});
   frame();
   return rows;
 }

@@ -117,9 +117,9 @@ FieldScene sceneOf(std::uint64_t seed, Kind kind, bool attached, const Settings&
     scene.body = detection.addDistanceField(bodyField());
   }
   if (seed % 3 > 0)
-    detection.setTransform(scene.body, turn(random), randomPoint(random, -0.3, 0.3));
+    detection.setTransform(scene.body, {turn(random), randomPoint(random, -0.3, 0.3)});
   if (seed % 4 == 3)
-    detection.setTransform(scene.other, turn(random), randomPoint(random, -0.1, 0.1));
+    detection.setTransform(scene.other, {turn(random), randomPoint(random, -0.1, 0.1)});
   if (seed % 5 == 4) detection.setDisabledElements(scene.other, std::array{3u, 7u});
   detection.addCollisionPair(scene.other, scene.body, byField(contacts));
   detection.detectCollision();
@@ -183,7 +183,7 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
     detection.attachDistanceField(body, bodyField());
     const Eigen::Matrix3d rotation = turn(random);
     const Vector3d translation = randomPoint(random, -0.2, 0.2);
-    detection.setTransform(body, rotation, translation);
+    detection.setTransform(body, {rotation, translation});
     detection.addCollisionPair(other, body, byField());
     detection.detectCollision();
     const CollisionData& data = detection.collisionData(other, body);
@@ -283,7 +283,7 @@ TEST(FieldContacts, FollowTheBody) {
   detection.detectCollision();
   const CollisionData before = detection.collisionData(other, field);
   detection.advance();
-  detection.setTransform(field, rotation, translation);
+  detection.setTransform(field, {rotation, translation});
   detection.setPositions(other, moved);
   detection.detectCollision();
   const auto now = detection.collisionData(other, field).shape();
@@ -298,7 +298,7 @@ TEST(FieldContacts, FollowTheBody) {
     }
   }
   detection.advance();
-  detection.setTransform(field, Eigen::Matrix3d::Identity(), {100, 0, 0});
+  detection.setTransform(field, {Eigen::Matrix3d::Identity(), {100, 0, 0}});
   detection.detectCollision();
   EXPECT_TRUE(detection.collisionData(other, field).shape().empty());
 }
@@ -336,7 +336,7 @@ TEST(FieldContacts, HaveTheLastAxisWhereTheFieldIsConstant) {
                    point = detection.addPointSet(std::array{Vector3d(0.1, 0.2, 0.3)});
   Eigen::Matrix3d rotation;
   rotation << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  detection.setTransform(field, rotation, Vector3d::Zero());
+  detection.setTransform(field, {rotation, Vector3d::Zero()});
   detection.addCollisionPair(point, field, byField());
   detection.detectCollision();
   const CollisionData& data = detection.collisionData(point, field);

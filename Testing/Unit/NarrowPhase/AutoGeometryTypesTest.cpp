@@ -34,10 +34,10 @@ struct Body {
   void place(OctreeBasedCD& collisions, GeometryId id, bool moves) const {
     if (isShape()) {
       const Matrix3d one = Matrix3d::Identity();
-      collisions.setTransform(id, one, Vector3d::Zero());
+      collisions.setTransform(id, {one, Vector3d::Zero()});
       if (!moves) return;
       collisions.advance();
-      collisions.setTransform(id, turnedBy, movedBy);
+      collisions.setTransform(id, {turnedBy, movedBy});
     } else {
       collisions.setPositions(id, before, moves ? now : before);
     }
@@ -106,7 +106,7 @@ class Pair {
       for (const auto& [body, id] : both()) {
         if (!moves) continue;
         if (body->isShape())
-          m_collisions.setTransform(id, body->turnedBy, body->movedBy);
+          m_collisions.setTransform(id, {body->turnedBy, body->movedBy});
         else
           m_collisions.setPositions(id, body->before, body->now);
       }

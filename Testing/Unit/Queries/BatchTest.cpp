@@ -67,7 +67,7 @@ void forLargeGeometries(F&& f) {
     for (const int threads : {1, 3}) {
       OctreeBasedCD collisions(settingsOf(Engine::Octree, threads));
       const GeometryId id = geometry.addTo(collisions);
-      if (threads == 3) collisions.setTransform(id, turn, {0.1, -0.2, 0.1});
+      if (threads == 3) collisions.setTransform(id, {turn, {0.1, -0.2, 0.1}});
       for (const std::string& path : simdPaths()) {
         SCOPED_TRACE(path);
         useSimdPath(path);

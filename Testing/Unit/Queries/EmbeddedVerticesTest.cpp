@@ -141,11 +141,12 @@ TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
       }
       if (frame == 6)
         detection.setTransform(
-            body, Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
-            {0.1 * scale, 0, 0});
+            body, {Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+                   {0.1 * scale, 0, 0}});
       if (frame == 7)
-        detection.setTransform(points, Eigen::AngleAxisd(0.1, Vector3d::UnitZ()).toRotationMatrix(),
-                               Vector3d::Zero());
+        detection.setTransform(
+            points,
+            {Eigen::AngleAxisd(0.1, Vector3d::UnitZ()).toRotationMatrix(), Vector3d::Zero()});
       const auto found = testing::embeddedVertices(detection, points, body);
       all.emplace_back(found.begin(), found.end());
       if (frame % 2) detection.detectCollision();

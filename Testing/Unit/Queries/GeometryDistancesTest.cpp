@@ -43,7 +43,7 @@ struct TwoBodies {
     for (Vector3d& p : now) p = turn * p + shift;
     change([&](OctreeBasedCD& each) {
       if (isPlaced)
-        each.setTransform(id, turn, shift);
+        each.setTransform(id, {turn, shift});
       else
         each.setPositions(id, now);
     });
@@ -530,7 +530,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForEveryShape) {
       for (const double most : {3.0, 1.2, 0.5}) {
         const Matrix3d turn = randomTurn(random);
         const Vector3d shift = Vector3d(0.5, 0.5, 0.5) + randomPoint(random, -most, most);
-        both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, turn, shift); });
+        both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, {turn, shift}); });
         const GeometryDistance found = expectSameAnswers(both, largestRadius(geometry), 5.0);
         ASSERT_FALSE(::testing::Test::HasFailure())
             << shape.index() << ' ' << static_cast<int>(geometry.type) << ' ' << most;
@@ -598,7 +598,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForParallelPlates) {
           AnalyticalGeometry(Capsule{{0, 0.5, -0.5}, {1, 0.5, -0.5}, 0.2})}) {
       TwoBodies both(a, shape);
       both.put(both.a, a, turn, far, round % 3 == 0);
-      both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, turn, far); });
+      both.change([&](OctreeBasedCD& each) { each.setTransform(both.b, {turn, far}); });
       expectSameAnswers(both, 0.0, size);
     }
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
@@ -637,8 +637,8 @@ TEST(GeometryDistances, TwoShapes) {
         const PlacedShape placedA{a, randomTurn(random), randomPoint(random, -most, most)},
             placedB{b, randomTurn(random), randomPoint(random, -most, most)};
         both.change([&](OctreeBasedCD& each) {
-          each.setTransform(both.a, placedA.rotation, placedA.translation);
-          each.setTransform(both.b, placedB.rotation, placedB.translation);
+          each.setTransform(both.a, {placedA.rotation, placedA.translation});
+          each.setTransform(both.b, {placedB.rotation, placedB.translation});
         });
         const GeometryDistance found = expectSameAnswers(both, 0.0, 5.0);
         const SpatialQueries queries = both.octree.queries();

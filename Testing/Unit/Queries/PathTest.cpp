@@ -309,7 +309,7 @@ TEST(Path, AgreesWithSamplesForPlacedBodiesAndFarFromTheOrigin) {
       const bool isPlaced = round % 2;
       scene.change([&](OctreeBasedCD& each) {
         if (isPlaced)
-          each.setTransform(body, turn, shift);
+          each.setTransform(body, {turn, shift});
         else
           each.setPositions(body, now);
       });
@@ -339,7 +339,7 @@ TEST(Path, AgreesWithSamplesForEveryShape) {
           scene.addBy([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = randomPoint(random, 0, 1);
-      scene.change([&](OctreeBasedCD& each) { each.setTransform(body, turn, shift); });
+      scene.change([&](OctreeBasedCD& each) { each.setTransform(body, {turn, shift}); });
       const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.2);
       const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
       const Answer found = expectSamples(scene, body, false, path, radius);

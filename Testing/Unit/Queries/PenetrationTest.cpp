@@ -179,8 +179,8 @@ TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
     const Eigen::Matrix3d turn = anyTurn(random);
     const Vector3d shift = randomPoint(random, 100, 101), place = shift + Vector3d(0.6, 0.3, 0.2);
     Bodies bodies(a, b);
-    bodies.collisions.setTransform(bodies.a, turn, shift);
-    bodies.collisions.setTransform(bodies.b, Eigen::Matrix3d::Identity(), place);
+    bodies.collisions.setTransform(bodies.a, {turn, shift});
+    bodies.collisions.setTransform(bodies.b, {Eigen::Matrix3d::Identity(), place});
     const Penetration p = bodies.penetration();
     ASSERT_TRUE(p.intersecting);
     const auto at = [](const Mesh& mesh, const Eigen::Matrix3d& r, const Vector3d& t) {

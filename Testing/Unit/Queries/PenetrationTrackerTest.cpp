@@ -275,8 +275,8 @@ TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
     const Eigen::Matrix3d rotation =
         Eigen::AngleAxisd(0.4 * frame, Vector3d(1, 1, 0).normalized()).toRotationMatrix();
     const Vector3d away(0.5 * frame, -1.0 * frame, 0);
-    detection.setTransform(body, rotation, away);
-    detection.setTransform(probes, rotation, away);
+    detection.setTransform(body, {rotation, away});
+    detection.setTransform(probes, {rotation, away});
     const auto found = tracker.update(detection.queries());
     if (frame == 0) first.assign(found.begin(), found.end());
     ASSERT_EQ(found.size(), first.size());

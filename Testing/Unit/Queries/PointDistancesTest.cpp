@@ -209,7 +209,7 @@ TEST(PointDistances, PlacedBodiesNearAndFar) {
     Both both(ball);
     const Matrix3d turn = randomTurn(random);
     const Vector3d shift(far, -2 * far, 0.3);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
     const Positions world = placed(ball.positions, turn, shift);
     Positions points = pointsAround(random, world, casesOf(100));
     for (Vector3d& p : points)
@@ -229,7 +229,7 @@ TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
   for (const double stretch : {1 - 4e-10, 1 + 4e-10}) {
     Both both(soupFarAway);
     const Matrix3d turn = stretch * randomTurn(random);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, -(turn * far)); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, -(turn * far)}); });
     const Positions world = placed(soupFarAway.positions, turn, -(turn * far));
     expectSameAnswers(both, pointsAround(random, world, casesOf(300)));
   }
@@ -371,7 +371,7 @@ TEST(PointDistances, SegmentsWithoutLengthHaveTheirLargerRadius) {
            {AnalyticalGeometry(Sphere{{0, 0, 1.5}, 0.1}),
             AnalyticalGeometry(Box{{0, 0, 1.5}, {0.1, 0.1, 0.1}}),
             AnalyticalGeometry(Capsule{{0, 0, 1.5}, {0, 1, 1.5}, 0.1})}) {
-        queries.overlapping(both.id, shape, Matrix3d::Identity(), {0, 0, 0}, elements);
+        queries.overlapping(both.id, shape, {Matrix3d::Identity(), {0, 0, 0}}, elements);
         EXPECT_EQ(elements.size(), 1u) << shape.index();
       }
     }
@@ -393,7 +393,7 @@ TEST(PointDistances, ShapesHaveTheirClosestPoints) {
     const PlacedShape shape{geometry, randomTurn(random), randomPoint(random, -1, 1)};
     const Both both([&](OctreeBasedCD& each) {
       const GeometryId id = each.addAnalyticalGeometry(geometry);
-      each.setTransform(id, shape.rotation, shape.translation);
+      each.setTransform(id, {shape.rotation, shape.translation});
       return id;
     });
     const SpatialQueries queries = both.octree.queries();

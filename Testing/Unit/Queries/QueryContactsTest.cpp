@@ -15,7 +15,7 @@ std::vector<ShapeContact> frameContacts(const Both::Add& add, const PlacedShape&
                                         double thickness, Engine engine) {
   OctreeBasedCD collisions(settingsOf(engine));
   const GeometryId body = add(collisions), tool = collisions.addAnalyticalGeometry(shape.geometry);
-  collisions.setTransform(tool, shape.rotation, shape.translation);
+  collisions.setTransform(tool, {shape.rotation, shape.translation});
   collisions.addCollisionPair(body, tool, {Method::Proximity, thickness, Contacts::Distinct});
   collisions.detectCollision();
   const auto contacts = collisions.collisionData(body, tool).shape();
@@ -43,8 +43,8 @@ void expectFrame(const Both::Add& add, const Both& both, Random& random, std::si
   std::vector<ShapeContact> found(1), expected;
   for (const PlacedShape& shape : shapes(random))
     for (const double thickness : {0.0, 0.04}) {
-      fast.contacts(both.id, shape.geometry, shape.rotation, shape.translation, thickness, found);
-      truth.contacts(both.id, shape.geometry, shape.rotation, shape.translation, thickness,
+      fast.contacts(both.id, shape.geometry, {shape.rotation, shape.translation}, thickness, found);
+      truth.contacts(both.id, shape.geometry, {shape.rotation, shape.translation}, thickness,
                      expected);
       EXPECT_TRUE(found == expected) << shape.geometry.index();
       EXPECT_TRUE(found == frameContacts(add, shape, thickness, Engine::Octree));
@@ -77,7 +77,7 @@ TEST(QueryContacts, AreThoseOfTheFrame) {
                         },
                     turned = [&](OctreeBasedCD&each) {
                       const GeometryId id = deformed(each);
-                      each.setTransform(id, turn, shift);
+                      each.setTransform(id, {turn, shift});
                       return id;
                     };
     for (const Both::Add& add : {still, deformed, turned})
@@ -105,7 +105,7 @@ TEST(QueryContacts, EmptyGeometriesHaveNone) {
     empty.type = type;
     const Both both(empty);
     std::vector<ShapeContact> found(1);
-    both.octree.queries().contacts(both.id, Sphere{{0, 0, 0}, 1}, Matrix3d::Identity(), {0, 0, 0},
+    both.octree.queries().contacts(both.id, Sphere{{0, 0, 0}, 1}, {Matrix3d::Identity(), {0, 0, 0}},
                                    1.0, found);
     EXPECT_TRUE(found.empty());
   }
@@ -138,8 +138,8 @@ TEST(QueryContacts, RigidMeshesAtThicknessZeroTouch) {
     RigidMesh mesh(tool.positions, tool.triangles);
     const Matrix3d turn = i % 2 ? quarter : Matrix3d(Matrix3d::Identity());
     const Vector3d shift = onLattice(random, 3) - onLattice(random, 3);
-    both.octree.queries().contacts(both.id, mesh, turn, shift, 0.0, found);
-    both.bruteForce.queries().contacts(both.id, mesh, turn, shift, 0.0, truth);
+    both.octree.queries().contacts(both.id, mesh, {turn, shift}, 0.0, found);
+    both.bruteForce.queries().contacts(both.id, mesh, {turn, shift}, 0.0, truth);
     EXPECT_EQ(found.hash(), truth.hash());
     const bool touch = featuresTouch(body.positions, placed(tool.positions, turn, shift));
     EXPECT_EQ(found.validity().atEnd > 0, touch) << i;

@@ -73,11 +73,11 @@ class AllQueries {
         {"overlapping", false,
          [=](Queries q, GeometryId id) {
            std::vector<std::uint32_t> out{7, 8};
-           kept(out, [&] { q.overlapping(id, ball, unit, p, out); });
+           kept(out, [&] { q.overlapping(id, ball, {unit, p}, out); });
          }},
         {"contacts", false, [=](Queries q, GeometryId id) {
            std::vector<ShapeContact> out(2);
-           kept(out, [&] { q.contacts(id, ball, unit, p, 0.1, out); });
+           kept(out, [&] { q.contacts(id, ball, {unit, p}, 0.1, out); });
          }}};
   }
   const std::vector<Call>& calls() const { return m_calls; }
@@ -277,8 +277,8 @@ TEST(QueryErrors, Shapes) {
   const Vector3d zero(0, 0, 0);
   const auto refused = [&](ErrorCode code, const std::string& words, const AnalyticalGeometry& s,
                            const Matrix3d& r, const Vector3d& t) {
-    expectRefused(code, words, [&] { queries.overlapping(scene.ball, s, r, t, elements); });
-    expectRefused(code, words, [&] { queries.contacts(scene.ball, s, r, t, 0.1, contacts); });
+    expectRefused(code, words, [&] { queries.overlapping(scene.ball, s, {r, t}, elements); });
+    expectRefused(code, words, [&] { queries.contacts(scene.ball, s, {r, t}, 0.1, contacts); });
   };
   const std::string place = "the query's shape: ";
   const Sphere ball{zero, 1};
@@ -292,8 +292,9 @@ TEST(QueryErrors, Shapes) {
   refused(InvalidTransform, place + "rotation", ball, -unit, zero);
   refused(InvalidTransform, place + "translation", ball, unit, {0, 0, kInfinity});
   for (const double thickness : {-1.0, kNan, kInfinity})
-    expectRefused(InvalidSettings, "thickness is",
-                  [&] { queries.contacts(scene.ball, ball, unit, zero, thickness, contacts); });
+    expectRefused(InvalidSettings, "thickness is", [&] {
+      queries.contacts(scene.ball, ball, {unit, zero}, thickness, contacts);
+    });
   EXPECT_TRUE(elements == std::vector<std::uint32_t>{7} && contacts.size() == 1);
 }
 

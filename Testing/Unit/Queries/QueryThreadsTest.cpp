@@ -29,7 +29,7 @@ struct SharedScene {
     line = thread(random, 100, 0.1, 0.02, false).addTo(collisions);
     points = tapered(random, particles(random, 100, 0.0), 0.05).addTo(collisions);
     shape = collisions.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.2, 0.1, 0.3}});
-    collisions.setTransform(line, randomTurn(random), {0.1, 0, 0});
+    collisions.setTransform(line, {randomTurn(random), {0.1, 0, 0}});
     for (int i = 0; i < casesOf(60); ++i) probes.push_back(randomPoint(random, 0, 1));
     for (const Vector3d& p : probes) rays.push_back({p, randomPoint(random, -1, 1)});
   }
@@ -81,10 +81,10 @@ Answers ask(const SharedScene& scene, const SpatialQueries& queries) {
       append(all.points, points);
       queries.elementsWithin(id, p, 0.1, elements);
       append(all.elements, elements);
-      queries.overlapping(id, Capsule{p, {0.5, 0.5, 0.5}, 0.05}, Matrix3d::Identity(), {0, 0, 0},
+      queries.overlapping(id, Capsule{p, {0.5, 0.5, 0.5}, 0.05}, {Matrix3d::Identity(), {0, 0, 0}},
                           elements);
       append(all.elements, elements);
-      queries.contacts(id, Box{p, {0.1, 0.2, 0.1}}, Matrix3d::Identity(), {0, 0, 0}, 0.01,
+      queries.contacts(id, Box{p, {0.1, 0.2, 0.1}}, {Matrix3d::Identity(), {0, 0, 0}}, 0.01,
                        contacts);
       append(all.contacts, contacts);
     }
@@ -174,8 +174,8 @@ TEST(QueryAllocations, RepeatedSingleCallsAllocateNothing) {
       {"contacts and overlapping of shapes in turn",
        [&](auto id, auto& p, auto&) {
          for (const AnalyticalGeometry& shape : shapes) {
-           queries.contacts(id, shape, Eigen::Matrix3d::Identity(), p, 0.05, contacts);
-           queries.overlapping(id, shape, Eigen::Matrix3d::Identity(), p, elements);
+           queries.contacts(id, shape, {Eigen::Matrix3d::Identity(), p}, 0.05, contacts);
+           queries.overlapping(id, shape, {Eigen::Matrix3d::Identity(), p}, elements);
          }
        }},
       {"contains",

@@ -184,7 +184,7 @@ TEST(RayHits, AreThoseOfRationalArithmeticForEveryGeometryType) {
     test(now, casesOf(4));
     const Matrix3d turn = Eigen::AngleAxisd(1.1, Vector3d(1, -2, 3).normalized()).matrix();
     const Vector3d t(0.3, 0.2, -0.7);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, t); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, t}); });
     test(placed(now, turn, t), casesOf(4));
     EXPECT_GE(hits, leastOf(50));
   }
@@ -476,7 +476,7 @@ TEST(RayHits, RotationsThatStretch) {
   const Matrix3d turn = Eigen::AngleAxisd(1.3, Vector3d(1, 2, 2) / 3).matrix() *
                         (Matrix3d::Identity() + 1.4e-10 * stretch);
   const Vector3d shift = -turn * far;
-  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
   std::size_t hits = 0;
   for (int i = 0; i < casesOf(2000); ++i)
     hits +=
@@ -496,7 +496,7 @@ TEST(RayHits, AscendAtAnyMagnitude) {
       Both both(mesh);
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = scale * randomPoint(random, -1, 1);
-      both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+      both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
       for (int k = 0; k < 40; ++k) {
         const Vector3d origin = scale * randomPoint(random, -3, 7);
         const Positions now = placed(mesh.positions, turn, shift);

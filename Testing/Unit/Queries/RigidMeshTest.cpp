@@ -26,8 +26,9 @@ struct Scene {
     bodies.push_back(collisions.addTriangleMesh(ball.positions, ball.triangles));
     bodies.push_back(collisions.addTriangleMesh(plain.positions, plain.triangles));
     bodies.push_back(collisions.addTriangleMesh(plain.positions, plain.triangles));
-    collisions.setTransform(bodies[2], Eigen::AngleAxisd(0.5, Vector3d::UnitX()).toRotationMatrix(),
-                            {0.1, 0.2, -0.1});
+    collisions.setTransform(
+        bodies[2],
+        {Eigen::AngleAxisd(0.5, Vector3d::UnitX()).toRotationMatrix(), {0.1, 0.2, -0.1}});
     std::vector<Segment> segments;
     for (std::uint32_t i = 0; i < 40; ++i) segments.push_back({i, i + 1});
     bodies.push_back(collisions.addLineMesh(plain.positions, segments, 0.02));
@@ -56,17 +57,18 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
     for (int i = 0; i < (engine == Engine::Octree ? 100 : 20); ++i) {
       const Matrix3d rotation = randomTurn(random);
       const Vector3d translation = randomPoint(random, 0.1, 0.9);
-      collisions.setTransform(tool, rotation, translation);
+      collisions.setTransform(tool, {rotation, translation});
       collisions.detectCollision();
       collisions.publish();
       const auto snapshot = collisions.latestSnapshot();
       for (const GeometryId body : scene.bodies) {
         const CollisionData& expected = collisions.collisionData(body, tool);
-        collisions.queries().contacts(body, scene.tool, rotation, translation, kThickness,
+        collisions.queries().contacts(body, scene.tool, {rotation, translation}, kThickness,
                                       contacts);
         EXPECT_TRUE(sameContacts(contacts, expected));
         EXPECT_EQ(contacts.validity().atEnd, expected.validity().atEnd);
-        snapshot->queries().contacts(body, scene.tool, rotation, translation, kThickness, contacts);
+        snapshot->queries().contacts(body, scene.tool, {rotation, translation}, kThickness,
+                                     contacts);
         EXPECT_TRUE(sameContacts(contacts, expected));
         found += contacts.validity().atEnd;
       }
@@ -83,18 +85,18 @@ TEST(RigidMesh, HeedsSidedness) {
   scene.collisions.setCollisionFilter(body, {.sidedness = Sidedness::Outer});
   scene.collisions.addCollisionPair(body, tool, {Method::Proximity, 0.05});
   const Vector3d inside(0.5, 0.5, 0.68);
-  scene.collisions.setTransform(tool, Matrix3d::Identity(), inside);
+  scene.collisions.setTransform(tool, {Matrix3d::Identity(), inside});
   scene.collisions.detectCollision();
   scene.collisions.publish();
   const CollisionData& expected = scene.collisions.collisionData(body, tool);
   CollisionData contacts;
-  scene.collisions.latestSnapshot()->queries().contacts(body, scene.tool, Matrix3d::Identity(),
-                                                        inside, 0.05, contacts);
+  scene.collisions.latestSnapshot()->queries().contacts(
+      body, scene.tool, {Matrix3d::Identity(), inside}, 0.05, contacts);
   EXPECT_TRUE(sameContacts(contacts, expected));
   scene.collisions.setCollisionFilter(body, {});
   scene.collisions.publish();
-  scene.collisions.latestSnapshot()->queries().contacts(body, scene.tool, Matrix3d::Identity(),
-                                                        inside, 0.05, contacts);
+  scene.collisions.latestSnapshot()->queries().contacts(
+      body, scene.tool, {Matrix3d::Identity(), inside}, 0.05, contacts);
   EXPECT_GT(contacts.validity().atEnd, expected.validity().atEnd);
 }
 
@@ -103,7 +105,7 @@ TEST(RigidMesh, RefusesInvalidInput) {
   const SpatialQueries queries = scene.collisions.queries();
   CollisionData out;
   const auto contacts = [&](GeometryId id, const Matrix3d& rotation, double thickness) {
-    queries.contacts(id, scene.tool, rotation, {0, 0, 0}, thickness, out);
+    queries.contacts(id, scene.tool, {rotation, {0, 0, 0}}, thickness, out);
   };
   const Matrix3d unit = Matrix3d::Identity();
   expectRefused(ErrorCode::InvalidTransform, "the query's mesh",
@@ -123,7 +125,7 @@ TEST(RigidMesh, RefusesInvalidInput) {
   const GeometryId shape = scene.collisions.addAnalyticalGeometry(Sphere{});
   scene.tool = RigidMesh(scene.toolMesh.positions, scene.toolMesh.triangles);
   expectRefused(ErrorCode::UnsupportedMethod, "is a shape", [&] {
-    scene.collisions.queries().contacts(shape, scene.tool, unit, {0, 0, 0}, 0.1, out);
+    scene.collisions.queries().contacts(shape, scene.tool, {unit, {0, 0, 0}}, 0.1, out);
   });
 }
 
@@ -134,10 +136,10 @@ TEST(RigidMesh, WithoutTrianglesOrFarAwayHasNoContacts) {
   CollisionData out;
   for (const Vector3d& at : {Vector3d(0.5, 0.5, 0.5), Vector3d(1e9, 0, 0)})
     for (const GeometryId body : scene.bodies) {
-      queries.contacts(body, empty, Matrix3d::Identity(), at, 0.1, out);
+      queries.contacts(body, empty, {Matrix3d::Identity(), at}, 0.1, out);
       EXPECT_EQ(out.validity().atEnd, 0u);
     }
-  queries.contacts(scene.bodies[0], scene.tool, Matrix3d::Identity(), {1e9, 0, 0}, 0.1, out);
+  queries.contacts(scene.bodies[0], scene.tool, {Matrix3d::Identity(), {1e9, 0, 0}}, 0.1, out);
   EXPECT_EQ(out.validity().atEnd, 0u);
 }
 

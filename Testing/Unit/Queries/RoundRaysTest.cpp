@@ -197,7 +197,7 @@ TEST(RoundRays, EnterAndLeaveLinesAndPoints) {
     test(now, 20);
     const Matrix3d turn = randomTurn(random);
     const Vector3d shift(0.1, 0.05, -0.1);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
     test(placed(now, turn, shift), 20);
     EXPECT_GE(hits, leastOf(30));
   }
@@ -288,7 +288,7 @@ TEST(RoundRays, EnterAndLeaveShapes) {
   for (const PlacedShape& shape : roundShapes(random)) {
     const Both both([&](OctreeBasedCD& each) {
       const GeometryId id = each.addAnalyticalGeometry(shape.geometry);
-      each.setTransform(id, shape.rotation, shape.translation);
+      each.setTransform(id, {shape.rotation, shape.translation});
       return id;
     });
     const Depth depth = depthOf(shape);

@@ -18,10 +18,10 @@ using Wide = Eigen::Matrix<long double, 3, 1>;
 
 std::vector<std::uint32_t> overlapping(const Both& both, const PlacedShape& shape) {
   std::vector<std::uint32_t> found{7}, truth;
-  both.octree.queries().overlapping(both.id, shape.geometry, shape.rotation, shape.translation,
+  both.octree.queries().overlapping(both.id, shape.geometry, {shape.rotation, shape.translation},
                                     found);
-  both.bruteForce.queries().overlapping(both.id, shape.geometry, shape.rotation, shape.translation,
-                                        truth);
+  both.bruteForce.queries().overlapping(both.id, shape.geometry,
+                                        {shape.rotation, shape.translation}, truth);
   EXPECT_EQ(found, truth);
   EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
   return found;
@@ -283,7 +283,7 @@ TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
     test(now, {0, 0, 0}, 1e-13);
     const Matrix3d turn = Eigen::AngleAxisd(0.4, Vector3d(1, -2, 3).normalized()).matrix();
     const Vector3d shift(1e3, 0, -1e3);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
     test(placed(now, turn, shift), shift, 1e-11);
     EXPECT_GE(found, leastOf(10));
   }
@@ -330,7 +330,7 @@ TEST(ShapeOverlap, InexactRotationsFarFromTheBodysOrigin) {
   for (Vector3d& p : soupFarAway.positions) p += far;
   Both both(soupFarAway);
   const Matrix3d turn = (1 + 4e-10) * randomTurn(random);
-  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, -(turn * far)); });
+  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, -(turn * far)}); });
   std::size_t found = 0;
   for (int i = 0; i < casesOf(30); ++i) {
     const Vector3d p = randomPoint(random, 0, 1), q = randomPoint(random, 0, 1);
@@ -393,8 +393,8 @@ TEST(ShapeOverlap, TrianglesWithAVertexTwiceAreSegments) {
       const GeometryId mesh = collisions.addTriangleMesh(ends, {&triangle, 1});
       for (const AnalyticalGeometry& shape : shapes) {
         std::vector<std::uint32_t> found;
-        collisions.queries().overlapping(mesh, shape, Eigen::Matrix3d::Identity(), Vector3d::Zero(),
-                                         found);
+        collisions.queries().overlapping(mesh, shape,
+                                         {Eigen::Matrix3d::Identity(), Vector3d::Zero()}, found);
         EXPECT_EQ(found.size(), 1u)
             << shape.index() << ": " << triangle[0] << triangle[1] << triangle[2];
       }
@@ -482,7 +482,7 @@ TEST(ShapeOverlap, TaperedLinesAreHullsOfBalls) {
       const PlacedShape shape{geometry, randomTurn(random), near + randomPoint(random, -0.2, 0.2)};
       OctreeBasedCD alone;
       const GeometryId id = alone.addAnalyticalGeometry(shape.geometry);
-      alone.setTransform(id, shape.rotation, shape.translation);
+      alone.setTransform(id, {shape.rotation, shape.translation});
       const SpatialQueries queries = alone.queries();
       found += expectGaps(both, shape, elements, 1e-9, [&](const Triangle& t) -> long double {
         const double gap = gapOfBalls(queries, id, line, t);

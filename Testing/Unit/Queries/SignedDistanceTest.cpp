@@ -153,7 +153,7 @@ TEST(SignedDistances, SignsAreThoseOfRationalRays) {
               leastOf(points.size() / 20));
     const Matrix3d turn = randomTurn(random);
     const Vector3d shift(1e3, 0.2, -30);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, turn, shift); });
+    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
     const Positions world = placed(mesh.positions, turn, shift);
     expectSigns(both, world, mesh.triangles, probesOf(random, world, mesh.triangles, 12));
     ASSERT_FALSE(HasFailure());

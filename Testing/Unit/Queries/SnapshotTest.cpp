@@ -58,8 +58,8 @@ struct SnapshotScene {
     }
     const Eigen::Matrix3d turn =
         Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d(1, 2, 2) / 3).toRotationMatrix();
-    collisions.setTransform(body, turn, {0.1, 0.01 * i, 0});
-    collisions.setTransform(capsule, turn, {0.2, 0.3, 0.01 * i});
+    collisions.setTransform(body, {turn, {0.1, 0.01 * i, 0}});
+    collisions.setTransform(capsule, {turn, {0.2, 0.3, 0.01 * i}});
     collisions.detectCollision();
   }
 
@@ -90,7 +90,7 @@ std::uint64_t hashOf(const SnapshotScene& scene, const SpatialQueries& queries) 
     if (const auto in = queries.findTetrahedron(scene.solid, p)) add(in->tetrahedron);
     queries.elementsWithin(scene.ball, p, 0.2, elements);
     for (const std::uint32_t element : elements) add(element);
-    queries.contacts(scene.ball, palpate::Sphere{{0, 0, 0}, 0.1}, Eigen::Matrix3d::Identity(), p,
+    queries.contacts(scene.ball, palpate::Sphere{{0, 0, 0}, 0.1}, {Eigen::Matrix3d::Identity(), p},
                      0.02, touches);
     for (const ShapeContact& contact : touches) add(contact.distance);
   }
@@ -340,13 +340,11 @@ TEST(Snapshot, HasTheMotionOfItsStep) {
   EXPECT_EQ(snapshot->position(scene.ball, 5, 0.0), before[5]);
   EXPECT_EQ(snapshot->position(scene.ball, 5, 1.5), before[5] + 1.5 * (now[5] - before[5]));
   EXPECT_TRUE(snapshot->positions(scene.capsule).empty());
-  const ShapeMotion capsule = snapshot->motion(scene.capsule);
-  EXPECT_EQ(capsule.translation, Eigen::Vector3d(0.2, 0.3, 0.02));
-  EXPECT_EQ(capsule.translationBefore, Eigen::Vector3d(0.2, 0.3, 0.01));
-  const ShapeMotion pose = snapshot->motion(scene.body);
-  EXPECT_LT(
-      (pose.rotation * scene.rest[3] + pose.translation - snapshot->position(scene.body, 3)).norm(),
-      1e-15);
+  const RigidMotion capsule = snapshot->motion(scene.capsule);
+  EXPECT_EQ(capsule.now.translation, Eigen::Vector3d(0.2, 0.3, 0.02));
+  EXPECT_EQ(capsule.before.translation, Eigen::Vector3d(0.2, 0.3, 0.01));
+  const RigidMotion pose = snapshot->motion(scene.body);
+  EXPECT_LT((pose.now(scene.rest[3]) - snapshot->position(scene.body, 3)).norm(), 1e-15);
   expectRefused(ErrorCode::IndexOutOfRange, "vertex 9999",
                 [&] { (void)snapshot->position(scene.ball, 9999); });
 }

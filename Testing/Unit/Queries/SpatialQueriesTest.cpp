@@ -90,7 +90,7 @@ TEST(SpatialQueries, AreInvalidAfterAnyChangeOfTheirGeometries) {
       {"setPositions", [](Scene& s) { s.collisions.setPositions(s.ball, s.ballRest); }},
       {"setTransform",
        [&](Scene& s) {
-         s.collisions.setTransform(s.ball, unit, {0, 0, 0.1});
+         s.collisions.setTransform(s.ball, {unit, {0, 0, 0.1}});
        }},
       {"setTriangles",
        [](Scene& s) { s.collisions.setTriangles(s.ball, s.ballRest, s.ballTriangles); }},

@@ -221,7 +221,7 @@ TEST(WindingNumber, DoesNotDependOnTheOctree) {
   }
   const double angle = 0.7;
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Vector3d(1, 2, 3).normalized()).matrix();
-  detection.setTransform(id, turn, {0.1, 0.2, 0.3});
+  detection.setTransform(id, {turn, {0.1, 0.2, 0.3}});
   Mesh moved = body;
   for (Vector3d& p : moved.positions)
     p = (turn.col(0) * p[0] + turn.col(1) * p[1]) + turn.col(2) * p[2] + Vector3d(0.1, 0.2, 0.3);

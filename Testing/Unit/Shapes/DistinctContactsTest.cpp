@@ -70,7 +70,7 @@ struct FloorScene {
   }
   std::vector<ShapeContact> contacts(const Matrix3d& turn, const Vector3d& from,
                                      const Vector3d& to) {
-    collisions.setTransform(tool, turn, from, turn, to);
+    collisions.setTransform(tool, {turn, from}, {turn, to});
     collisions.detectCollision();
     const auto found = collisions.collisionData(mesh, tool).shape();
     return {found.begin(), found.end()};
@@ -192,8 +192,8 @@ TEST(DistinctContacts, MatchTheDefinition) {
                            tool = collisions.addAnalyticalGeometry(shape);
           collisions.addCollisionPair(body, tool, settings);
           collisions.setPositions(body, mesh.positions, moved);
-          collisions.setTransform(tool, before.rotation, before.translation, now.rotation,
-                                  now.translation);
+          collisions.setTransform(tool, {before.rotation, before.translation},
+                                  {now.rotation, now.translation});
           collisions.detectCollision();
           return collisions.collisionData(body, tool);
         };
@@ -334,7 +334,8 @@ TEST(DistinctContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
               return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
             };
             const Vector3d at(0.25, 0.125, 1 + gap);
-            scene.collisions.setTransform(scene.tool, turnBy(start), at, turnBy(start + turn), at);
+            scene.collisions.setTransform(scene.tool, {turnBy(start), at},
+                                          {turnBy(start + turn), at});
             scene.collisions.detectCollision();
             for (const ShapeContact& c :
                  scene.collisions.collisionData(scene.mesh, scene.tool).shape()) {

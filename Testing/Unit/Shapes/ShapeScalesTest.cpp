@@ -70,9 +70,9 @@ struct Scene {
                                     : geometry.addTo(collisions);
     collisions.addCollisionPair(first, second, pair);
     for (const std::size_t end : {0, 1}) {
-      collisions.setTransform(first, ends[end].turn, ends[end].shift);
+      collisions.setTransform(first, {ends[end].turn, ends[end].shift});
       if (other)
-        collisions.setTransform(second, otherEnds[end].turn, otherEnds[end].shift);
+        collisions.setTransform(second, {otherEnds[end].turn, otherEnds[end].shift});
       else if (end == 1)
         collisions.setPositions(second, geometry.positions, now);
       collisions.detectCollision();

@@ -35,8 +35,7 @@ class PALPATE_EXPORT FclEngine {
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
-  void setTransform(GeometryId, const Eigen::Matrix3d& rotation,
-                    const Eigen::Vector3d& translation);
+  void setTransform(GeometryId, const Pose&);
 
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
   void removeCollisionPair(GeometryId a, GeometryId b);
