@@ -18,11 +18,11 @@ Held heldBy(std::initializer_list<std::uint32_t> vertices) {
 }
 
 Held heldBy(const VertexTriangleContact& contact) {
-  const auto& [p, q, r] = contact.corners;
+  const auto& [p, q, r] = contact.vertices;
   const int feature = static_cast<int>(contact.feature);
   if (contact.feature == TriangleFeature::Face) return heldBy({p, q, r});
-  if (feature < 3) return heldBy({contact.corners[feature]});
-  return heldBy({contact.corners[feature - 3], contact.corners[(feature - 2) % 3]});
+  if (feature < 3) return heldBy({contact.vertices[feature]});
+  return heldBy({contact.vertices[feature - 3], contact.vertices[(feature - 2) % 3]});
 }
 
 Held heldBy(const std::array<std::uint32_t, 2>& edge, EdgeFeature feature) {

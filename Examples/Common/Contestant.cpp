@@ -78,7 +78,7 @@ struct Choice {
   double thickness = 0;  ///< mean edges
   Contacts contacts = Contacts::All;
   int substeps = 1;
-  double timeTolerance = PairSettings().timeTolerance;
+  double timeTolerance = PairSettings().continuous.timeTolerance;
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
 };
@@ -89,12 +89,13 @@ Contestant contestant(std::string family, std::string setting, Method method,
           [=](const scenes::Scene& scene, const Positions& start) -> std::unique_ptr<Run> {
             const Settings settings{.octree = choice.octree, .engine = choice.engine, .threads = 1};
             const double edge = 20 * scene.thickness;
-            return std::make_unique<PalpateRun>(scene, start, settings,
-                                                PairSettings{.method = method,
-                                                             .thickness = choice.thickness * edge,
-                                                             .contacts = choice.contacts,
-                                                             .timeTolerance = choice.timeTolerance},
-                                                choice.substeps);
+            return std::make_unique<PalpateRun>(
+                scene, start, settings,
+                PairSettings{.method = method,
+                             .thickness = choice.thickness * edge,
+                             .contacts = choice.contacts,
+                             .continuous = {.timeTolerance = choice.timeTolerance}},
+                choice.substeps);
           }};
 }
 
@@ -122,11 +123,11 @@ std::vector<Contestant> contestants() {
                  {.thickness = 0.05, .substeps = 16}),
       contestant("Continuous", "exact", kContinuous, {}),
       contestant("Continuous: time tolerance", "1/20 edge kept; 1e-2", kContinuous,
-                 {.thickness = 0.05, .timeTolerance = 1e-2}),
+                 {.thickness = 0.05, .continuous = {.timeTolerance = 1e-2}}),
       contestant("Continuous: time tolerance", "1/20 edge kept; 1e-4", kContinuous,
-                 {.thickness = 0.05, .timeTolerance = 1e-4}),
+                 {.thickness = 0.05, .continuous = {.timeTolerance = 1e-4}}),
       contestant("Continuous: time tolerance", "1/20 edge kept; 1e-10", kContinuous,
-                 {.thickness = 0.05, .timeTolerance = 1e-10}),
+                 {.thickness = 0.05, .continuous = {.timeTolerance = 1e-10}}),
       contestant("Continuous", "1/20 edge kept", kContinuous, {.thickness = 0.05}),
       contestant("Auto", "1/20 edge", kAuto, {.thickness = 0.05}),
       contestant("Auto: distinct", "1/20 edge", kAuto,

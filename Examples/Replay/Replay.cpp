@@ -51,8 +51,8 @@ std::string nameOf(const ElementPair& pair) {
 }
 
 auto valuesOf(const VertexTriangleContact& c) {
-  return std::tuple(c.barycentric[0], c.barycentric[1], c.barycentric[2], c.normal[0], c.normal[1],
-                    c.normal[2], c.distance, c.timeOfImpact);
+  return std::tuple(c.weights[0], c.weights[1], c.weights[2], c.normal[0], c.normal[1], c.normal[2],
+                    c.distance, c.timeOfImpact);
 }
 auto valuesOf(const EdgeEdgeContact& c) {
   return std::tuple(c.weightA, c.weightB, c.normal[0], c.normal[1], c.normal[2], c.distance,

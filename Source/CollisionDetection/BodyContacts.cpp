@@ -18,8 +18,9 @@ namespace {
 /// Whether contacts of bodies may stand for those of a pair.
 bool mayBeBodies(const PairRecord& record) {
   const PairSettings& settings = record.pair.settings;
-  if (settings.method != Method::Auto || settings.earliestTimeOnly || record.a == record.b ||
-      record.plan.kind != PairKind::Meshes || record.anyDisabled() || record.meshes().hasFilters())
+  if (settings.method != Method::Auto || settings.continuous.earliestTimeOnly ||
+      record.a == record.b || record.plan.kind != PairKind::Meshes || record.anyDisabled() ||
+      record.meshes().hasFilters())
     return false;
   return !record.a->body.mesh.topology.triangles.empty() &&
          !record.b->body.mesh.topology.triangles.empty() && hasClosedSurface(record.a->body) &&
@@ -105,7 +106,7 @@ Vector3d normalOfEdge(const TriangleMesh& mesh, const Segment& edge) {
 
 /// Whether an impact's normal is that of a feature which leaves a body.
 bool leaves(const TriangleMesh& body, const VertexTriangleContact& c) {
-  const auto& [p, q, r] = c.corners;
+  const auto& [p, q, r] = c.vertices;
   return c.normal.dot(windingNormal(body.now[p], body.now[q], body.now[r])) < 0;
 }
 bool leaves(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
@@ -205,7 +206,7 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
     m_scratch.pair.stack.exactDecisions += at.exact;
     auto& list = ofA ? m_contacts.vertexTriangle : m_contacts.triangleVertex;
     list.push_back(
-        {v, exit->element, corners, at.barycentric, direction, -exit->distance, 1.0, at.feature});
+        {v, exit->element, corners, at.weights, direction, -exit->distance, 1.0, at.feature});
   }
 }
 

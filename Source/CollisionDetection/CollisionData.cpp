@@ -47,7 +47,7 @@ std::uint64_t CollisionData::hash() const {
   for (const auto* list : {&m_contents.vertexTriangle, &m_contents.triangleVertex}) {
     hash.add(list->size());
     for (const VertexTriangleContact& c : *list)
-      hash.add(c.vertex, c.triangle, c.barycentric, c.normal, c.distance, c.timeOfImpact,
+      hash.add(c.vertex, c.triangle, c.weights, c.normal, c.distance, c.timeOfImpact,
                static_cast<std::uint64_t>(c.feature));
   }
   hash.add(m_contents.edgeEdge.size());

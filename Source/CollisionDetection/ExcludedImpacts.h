@@ -54,8 +54,8 @@ class ExcludedImpacts {
   bool isExcluded(const VertexTriangleContact& c, bool swapped) const {
     if (c.feature == TriangleFeature::Face) return false;
     const int i = static_cast<int>(c.feature);
-    const Segment feature = i < 3 ? Segment{c.corners[i], c.corners[i]}
-                                  : Segment{c.corners[i - 3], c.corners[(i - 2) % 3]};
+    const Segment feature = i < 3 ? Segment{c.vertices[i], c.vertices[i]}
+                                  : Segment{c.vertices[i - 3], c.vertices[(i - 2) % 3]};
     return excludesDirection(swapped ? m_pair.a : m_pair.b, feature, c.normal, c.timeOfImpact);
   }
   bool isExcluded(const EdgeEdgeContact& c) const {
@@ -70,7 +70,7 @@ class ExcludedImpacts {
   template <class AnyOf>
   bool isReplaced(const VertexTriangleContact& c, bool swapped, AnyOf&& anyOf) const {
     return anyOf([&](const auto& s, const TangentPlane& plane) {
-      return isInTime(s, c) && areInPlane(plane, swapped ? m_pair.a : m_pair.b, c.corners);
+      return isInTime(s, c) && areInPlane(plane, swapped ? m_pair.a : m_pair.b, c.vertices);
     });
   }
   template <class AnyOf>
@@ -94,8 +94,8 @@ class ExcludedImpacts {
     const TriangleMesh &vertices = swapped ? m_pair.b : m_pair.a,
                        &mesh = swapped ? m_pair.a : m_pair.b;
     Vector3d point = Vector3d::Zero();
-    for (int i = 0; i < 3; ++i) point += s.barycentric[i] * mesh.now[s.corners[i]];
-    return planeAt(s.normal, point, mesh.radius(s.corners, s.barycentric), vertices.now[s.vertex],
+    for (int i = 0; i < 3; ++i) point += s.weights[i] * mesh.now[s.vertices[i]];
+    return planeAt(s.normal, point, mesh.radius(s.vertices, s.weights), vertices.now[s.vertex],
                    vertices.radius(s.vertex));
   }
   /// Of the mesh near lines.
@@ -123,7 +123,7 @@ class ExcludedImpacts {
   }
   bool isInTime(const VertexTriangleContact& s, const auto& c) const {
     return s.feature == TriangleFeature::Face
-               ? s.timeOfImpact <= c.timeOfImpact + m_pair.settings.timeTolerance
+               ? s.timeOfImpact <= c.timeOfImpact + m_pair.settings.continuous.timeTolerance
                : isEarlierOrNearer(s, c);
   }
   bool isInTime(const EdgeEdgeContact& s, const auto& c) const { return isEarlierOrNearer(s, c); }

@@ -42,8 +42,8 @@ std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, boo
   if (c.feature == TriangleFeature::Face) return {};
   const int i = static_cast<int>(c.feature);
   const std::uint64_t vertex = featureOf(c.vertex, c.vertex),
-                      other = i < 3 ? featureOf(c.corners[i], c.corners[i])
-                                    : featureOf(c.corners[i - 3], c.corners[(i - 2) % 3]);
+                      other = i < 3 ? featureOf(c.vertices[i], c.vertices[i])
+                                    : featureOf(c.vertices[i - 3], c.vertices[(i - 2) % 3]);
   return inOrder(vertex, other, self ? other < vertex : swapped);
 }
 

@@ -32,7 +32,7 @@ ImpactQuery::Step stepOf(const Geometry& geometry, std::uint32_t v) {
 }
 ImpactQuery queryOf(const Placed<VertexTriangleContact>& placed) {
   const auto& [contact, vertices, triangles] = placed;
-  const auto& [a, b, c] = contact.corners;
+  const auto& [a, b, c] = contact.vertices;
   return {ImpactQuery::Kind::VertexTriangle,
           {{stepOf(vertices, contact.vertex), stepOf(triangles, a), stepOf(triangles, b),
             stepOf(triangles, c)}}};

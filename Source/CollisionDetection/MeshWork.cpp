@@ -35,7 +35,7 @@ double approachSlack(const PairRecord& record, double thickness) {
   if (!record.plan.swept()) return 0.0;
   const double motion = record.plan.motion,
                largestDifference = record.a->inStep().extent + record.b->inStep().extent + motion;
-  return record.pair.settings.timeTolerance * motion +
+  return record.pair.settings.continuous.timeTolerance * motion +
          kApproachError * (largestDifference + 2.0 * thickness);
 }
 
@@ -195,7 +195,7 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
       detectIntersections(pairs, scratch);
     else
       scratch.intersectionsMissed = true;
-    if (meshes.settings.earliestTimeOnly)
+    if (meshes.settings.continuous.earliestTimeOnly)
       findEarliest(meshes, pairs, scratch);
     else
       findContacts(meshes, pairs, scratch.contacts);
@@ -227,7 +227,8 @@ void MeshWork::findEarliest(const MeshPair& meshes, std::span<const ElementPair>
 
 void MeshWork::runByBruteForce(JobScratch& scratch) const {
   detectPairByBruteForce(*m_record, scratch.contacts, scratch.intersections);
-  if (m_record->pair.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
+  if (m_record->pair.settings.continuous.earliestTimeOnly)
+    takeEarliest(*m_record, scratch.contacts);
   scratch.nearby = true;
 }
 

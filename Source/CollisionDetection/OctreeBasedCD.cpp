@@ -251,7 +251,7 @@ PairStatistics OctreeBasedCD::pairStatistics(GeometryId a, GeometryId b) const {
   return all.pairs.at(all.geometries, a, b).statistics;
 }
 
-bool OctreeBasedCD::contains(GeometryId geometry) const {
+bool OctreeBasedCD::has(GeometryId geometry) const {
   return read().geometries.find(geometry) != nullptr;
 }
 

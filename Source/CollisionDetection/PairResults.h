@@ -69,7 +69,7 @@ class PairResults {
   Buffer<std::uint8_t> m_flags;
 };
 
-/// PairSettings::earliestTimeOnly: replaces a pair's contacts by the earliest of their times.
+/// ContinuousSettings::earliestTimeOnly: replaces a pair's contacts by the earliest of their times.
 void takeEarliest(PairRecord&, ContactBuffers&);
 
 /// The error bound and the lists of Validity of an answer without an error.

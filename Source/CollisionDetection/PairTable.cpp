@@ -29,7 +29,7 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
   PALPATE_ASSERT(kind() == PairKind::Proxy);
   const ProxyState state{b->body.revisions.elements, b->body.mesh.now.bodyRevision()};
   const ProxySettings wanted{pair.settings.thickness + a->body.mesh.largestRadius,
-                             pair.settings.allowedError, pair.settings.widestNormalCone};
+                             pair.settings.allowedError, pair.settings.proxy.widestNormalCone};
   const auto isCurrent = [&](const PairRecord& record) {
     return record.proxy && record.b == b && record.proxySettings == wanted &&
            record.proxyVersion.isCurrent(state);

@@ -42,7 +42,7 @@ struct PairRecord : CountedObject {
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
-    if (settings.earliestTimeOnly) settings.contacts = Contacts::All;
+    if (settings.continuous.earliestTimeOnly) settings.contacts = Contacts::All;
     const PairRecord& filters = guarded ? *guarded : *this;
     return {a->body.mesh,
             b->body.mesh,
@@ -104,11 +104,12 @@ struct PairRecord : CountedObject {
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed
   Derived dataVersion;
-  bool hasData = false;            ///< a detection was completed
-  CollisionData next;              ///< of the detection that runs
-  bool sidesAreKnown = false;      ///< whether KnownSides changed the last answer
-  bool byBodies = false;           ///< whether BodyContacts changed the last answer
-  std::atomic<double> earliest;    ///< PairSettings::earliestTimeOnly: found so far in this frame
+  bool hasData = false;        ///< a detection was completed
+  CollisionData next;          ///< of the detection that runs
+  bool sidesAreKnown = false;  ///< whether KnownSides changed the last answer
+  bool byBodies = false;       ///< whether BodyContacts changed the last answer
+  std::atomic<double>
+      earliest;  ///< ContinuousSettings::earliestTimeOnly: found so far in this frame
   std::size_t candidateCount = 0;  ///< number of candidates when last found
   PairStatistics statistics;       ///< of the last detection
   std::unique_ptr<FieldScratch> fieldScratch;

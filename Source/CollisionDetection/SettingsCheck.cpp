@@ -98,8 +98,10 @@ class PairCheck {
   }
 
   void range() const {
-    const auto [method, thickness, contacts, motionTolerance, rest, timeTolerance, earliestTimeOnly,
-                allowedError, normalCone] = m_settings;
+    const auto [method, thickness, contacts, rest, allowedError, continuous, automatic, proxy] =
+        m_settings;
+    const auto [timeTolerance, earliestTimeOnly] = continuous;
+    const double motionTolerance = automatic.motionTolerance, normalCone = proxy.widestNormalCone;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);
     need(rest == 0.0 || (&m_a == &m_b && m_a.body.mesh.topology.type != GeometryType::Points),
          "restDistance is for a triangle or line mesh with itself");

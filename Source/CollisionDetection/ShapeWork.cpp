@@ -18,10 +18,11 @@ void findWithShape(const PairRecord& record, std::span<const std::uint32_t> elem
   const PairSettings& settings = meshes.settings;
   PALPATE_ASSERT(a || b);
   if (a && b)
-    meshes.keepsApart ? findShapePairNearing(*a, *b, settings.timeTolerance, out)
+    meshes.keepsApart ? findShapePairNearing(*a, *b, settings.continuous.timeTolerance, out)
                       : findShapePair(*a, *b, settings, out);
   else if (meshes.keepsApart)
-    findShapeNearings(record.mesh().body.mesh, a ? *a : *b, settings.timeTolerance, elements, out);
+    findShapeNearings(record.mesh().body.mesh, a ? *a : *b, settings.continuous.timeTolerance,
+                      elements, out);
   else
     findShapeContacts(record.mesh().body.mesh, a ? *a : *b, settings, elements, out);
 }
@@ -42,12 +43,13 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
   Stopwatch watch;
   findWithShape(record, scratch.elements, scratch.contacts.shapes);
   scratch.narrowMilliseconds += watch.lap();
-  if (record.pair.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
+  if (record.pair.settings.continuous.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
 }
 
 void ShapeWork::runByBruteForce(JobScratch& scratch) const {
   detectPairByBruteForce(*m_record, scratch.contacts, scratch.intersections);
-  if (m_record->pair.settings.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
+  if (m_record->pair.settings.continuous.earliestTimeOnly)
+    takeEarliest(*m_record, scratch.contacts);
 }
 
 void ShapeWork::join(Jobs jobs, const FrameJoin& join) const {

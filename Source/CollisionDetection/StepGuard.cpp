@@ -24,7 +24,7 @@ PairSettings settingsOf(const PairRecord& guarded) {
   return {.method = Method::Continuous,
           .contacts = Contacts::All,
           .restDistance = guarded.pair.settings.restDistance,
-          .timeTolerance = touches ? kTouchTolerance : kGuardTolerance};
+          .continuous = {.timeTolerance = touches ? kTouchTolerance : kGuardTolerance}};
 }
 
 /// Brings pairs up to date with those of the table.

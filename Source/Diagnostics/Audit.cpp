@@ -134,7 +134,7 @@ class KnownVertices {
   explicit KnownVertices(const MeshPair& meshes) : m_meshes(meshes) {}
 
   bool mayDrop(const VertexTriangleContact& c, bool swapped) const {
-    return intersects(swapped, c.vertex) || anyIntersects(!swapped, c.corners);
+    return intersects(swapped, c.vertex) || anyIntersects(!swapped, c.vertices);
   }
   bool mayDrop(const EdgeEdgeContact& c) const {
     return anyIntersects(false, c.edgeA) || anyIntersects(true, c.edgeB);
@@ -263,7 +263,7 @@ void audit(const PairRecord& record, const CollisionData& data, const AuditSetti
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
   };
-  if (meshes.settings.earliestTimeOnly) {
+  if (meshes.settings.continuous.earliestTimeOnly) {
     return forEachTimed(expected, [&](const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())

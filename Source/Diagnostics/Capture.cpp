@@ -217,7 +217,7 @@ void contactsOf(File& file, SettingsType& settings, int version) {
   if constexpr (kReads<File>) {
     ContactsBefore9 contacts{};
     file.word(contacts, kContactsBefore9);
-    settings.earliestTimeOnly = contacts == ContactsBefore9::Earliest;
+    settings.continuous.earliestTimeOnly = contacts == ContactsBefore9::Earliest;
     settings.contacts = contacts == ContactsBefore9::All ? Contacts::All : PairSettings().contacts;
   }
 }
@@ -230,13 +230,13 @@ void pairLine(File& file, PairType& pair, int version) {
   file.word(pair.method, kMethods);
   file.real(pair.settings.thickness);
   contactsOf(file, pair.settings, version);
-  if (version >= 2) file.real(pair.settings.motionTolerance);
+  if (version >= 2) file.real(pair.settings.automatic.motionTolerance);
   if (version >= 3) file.real(pair.settings.restDistance);
   if (version >= 4) fieldOf(file, pair.predicate);
-  if (version >= 6) file.real(pair.settings.timeTolerance);
-  if (version >= 9) fieldOf(file, pair.settings.earliestTimeOnly);
+  if (version >= 6) file.real(pair.settings.continuous.timeTolerance);
+  if (version >= 9) fieldOf(file, pair.settings.continuous.earliestTimeOnly);
   if (version >= 11) file.real(pair.settings.allowedError);
-  if (version >= 11) file.real(pair.settings.widestNormalCone);
+  if (version >= 11) file.real(pair.settings.proxy.widestNormalCone);
 }
 
 template <class File, class FilterType>

@@ -117,7 +117,7 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
     const auto gap = [&](std::uint32_t t) {
       const VertexTriangleDistance& measured = *against.answer(t);
       return measured.distance -
-             pair.radii(v, triangles.topology.triangles[t], measured.barycentric, kSwapped);
+             pair.radii(v, triangles.topology.triangles[t], measured.weights, kSwapped);
     };
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);

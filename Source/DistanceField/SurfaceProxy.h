@@ -17,7 +17,7 @@ namespace palpate {
 struct ProxySettings {
   double reach = 0;         ///< L: distance to which points are answered, positive
   double allowedError = 0;  ///< L: largest proven error of a leaf's plane
-  double normalCone = 0;    ///< rad: PairSettings::widestNormalCone
+  double normalCone = 0;    ///< rad: LeafSettings::widestNormalCone
   /// Most triangles that are compared with nodes while the leaves are built, and most in lists of
   /// leaves and of nodes that are divided last.
   std::uint64_t mostWork = std::uint64_t{1} << 33, mostListed = 1u << 26;

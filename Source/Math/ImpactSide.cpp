@@ -113,7 +113,7 @@ struct ClosestPoints {
 ClosestPoints closestPointsOf(ImpactQuery::Kind kind, const std::array<Vector3d, 4>& p) {
   if (kind == ImpactQuery::Kind::VertexTriangle) {
     const auto found = finiteVertexTriangleDistance(p[0], p[1], p[2], p[3]);
-    const Vector3d& w = found.barycentric;
+    const Vector3d& w = found.weights;
     ClosestPoints closest{found.difference, found.distance, {1.0, -w[0], -w[1], -w[2]}, {}};
     const int edge = static_cast<int>(found.feature) - static_cast<int>(TriangleFeature::EdgeAB);
     if (edge >= 0 && found.feature != TriangleFeature::Face)

@@ -276,7 +276,7 @@ RayPoint firstPoint(const RaySegment& ray, const RayInterval& interval, const Ei
   const auto exact =
       interval.error <= most ? interval : *intersectRayExactly(ray, a, b, c, exactDecisions);
   const Eigen::Vector3d point = ray.origin + exact.first * d;
-  return {exact.first, finiteVertexTriangleDistance(point, a, b, c).barycentric};
+  return {exact.first, finiteVertexTriangleDistance(point, a, b, c).weights};
 }
 
 }  // namespace palpate

@@ -120,10 +120,10 @@ struct TriangleMesh {
     if (radii.empty()) return largestRadius;
     return (1.0 - weight) * radii[edge[0]] + weight * radii[edge[1]];
   }
-  double radius(const Triangle& corners, const Eigen::Vector3d& barycentric) const {
+  double radius(const Triangle& corners, const Eigen::Vector3d& weights) const {
     if (radii.empty()) return largestRadius;
-    return barycentric[0] * radii[corners[0]] + barycentric[1] * radii[corners[1]] +
-           barycentric[2] * radii[corners[2]];
+    return weights[0] * radii[corners[0]] + weights[1] * radii[corners[1]] +
+           weights[2] * radii[corners[2]];
   }
 };
 

@@ -28,7 +28,7 @@ TimeOfImpactSettings settingsOf(const MeshPair& pair) {
   TimeOfImpactSettings settings;
   settings.minimumDistance =
       pair.settings.thickness + (pair.a.largestRadius + pair.b.largestRadius);
-  settings.timeTolerance = pair.settings.timeTolerance;
+  settings.timeTolerance = pair.settings.continuous.timeTolerance;
   return settings;
 }
 
@@ -134,7 +134,7 @@ class ContactFinder {
       contact.normal = normal.direction;
       m_out.facts.sideUnknown |= !normal.isSideKnown;
     };
-    if (m_pair.settings.earliestTimeOnly) m_out.facts.clearance = 0.0;
+    if (m_pair.settings.continuous.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isSuppressed = [&](const auto& closest, const Vector3d& direction, bool rejected) {
       if (store) m_check.recordImpact(features, firstId, secondId, time, closest.distance);
       return rejected || ((m_pair.a.outerSideOnly || m_pair.b.outerSideOnly) &&

@@ -61,10 +61,10 @@ struct MeshPair {
   bool self() const { return &a == &b; }
   /// L: the radius of a vertex plus that of the other element at its closest point. swapped: the
   /// vertex is of b.
-  double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& barycentric,
+  double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& weights,
                bool swapped) const {
     const TriangleMesh &vertices = swapped ? b : a, &others = swapped ? a : b;
-    return vertices.radius(vertex) + others.radius(corners, barycentric);
+    return vertices.radius(vertex) + others.radius(corners, weights);
   }
   /// L: the largest radii of two features. Surfaces are at least their distance less this apart,
   /// also where radii differ along an element.

@@ -54,7 +54,7 @@ class VertexTriangleFinder {
     if (!(gap <= m_thickness)) return;
     m_check.recordDistance(gap);
     if (m_check.addImpactIfTouched(m_features, vertex, triangle, m_swapped, gap)) return;
-    const double radii = m_pair.radii(vertex, corners, answer.barycentric, m_swapped);
+    const double radii = m_pair.radii(vertex, corners, answer.weights, m_swapped);
     if (!(answer.distance - radii <= m_thickness)) return;
     if (rejectsVertex(m_pair, vertex, triangle, m_swapped)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
@@ -103,7 +103,7 @@ class VertexTriangleFinder {
     const VertexTriangleDistance measured =
         finiteVertexTriangleDistance(m_vertices[vertex], m_positions[corners[0]],
                                      m_positions[corners[1]], m_positions[corners[2]]);
-    return measured.distance - m_pair.radii(vertex, corners, measured.barycentric, m_swapped) <=
+    return measured.distance - m_pair.radii(vertex, corners, measured.weights, m_swapped) <=
            m_thickness;
   }
 

@@ -36,8 +36,8 @@ inline bool containsVertex(const Triangle& triangle, std::uint32_t vertex) {
 
 /// The feature that the corners with weights other than 0 span. In a segment {p, q, q} or a point
 /// {p, p, p} a feature has several names; returns the first.
-inline TriangleFeature spannedFeature(const Triangle& corners, const Eigen::Vector3d& barycentric) {
-  bool a = barycentric[0] != 0.0, b = barycentric[1] != 0.0, c = barycentric[2] != 0.0;
+inline TriangleFeature spannedFeature(const Triangle& corners, const Eigen::Vector3d& weights) {
+  bool a = weights[0] != 0.0, b = weights[1] != 0.0, c = weights[2] != 0.0;
   if (corners[1] == corners[2]) b = b || c, c = false;
   if (corners[0] == corners[1]) a = a || b, b = false;
   if (a && b && c) return TriangleFeature::Face;
@@ -56,8 +56,8 @@ inline EdgeFeature spannedFeature(double weight) {
 inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
                                        const Triangle& corners,
                                        const VertexTriangleDistance& answer, double time = 1.0) {
-  return {vertex,        triangle,        corners, answer.barycentric,
-          answer.normal, answer.distance, time,    spannedFeature(corners, answer.barycentric)};
+  return {vertex,        triangle,        corners, answer.weights,
+          answer.normal, answer.distance, time,    spannedFeature(corners, answer.weights)};
 }
 
 inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,

@@ -72,7 +72,7 @@ void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuf
     std::erase_if(list, [&](const VertexTriangleContact& c) {
       return c.timeOfImpact == 1.0 &&
              (isTouched(vertices, c.vertex) ||
-              isTouched(corners, c.corners[0], c.corners[1], c.corners[2])) &&
+              isTouched(corners, c.vertices[0], c.vertices[1], c.vertices[2])) &&
              addImpact(pair, features, c.vertex, c.triangle, swapped, out);
     });
   };

@@ -85,7 +85,7 @@ class BodyQuery {
     const InsideVertex result{vertex,
                               near->element,
                               m_geometry.tree.ordered()[near->place],
-                              near->closest.barycentric,
+                              near->closest.weights,
                               -near->closest.normal,
                               near->closest.distance,
                               true};
@@ -102,7 +102,7 @@ class BodyQuery {
             way->element,
             corners,
             vertexTriangleDistance(way->point, now[corners[0]], now[corners[1]], now[corners[2]])
-                .barycentric,
+                .weights,
             (way->point - p).stableNormalized(),
             depth,
             true};

@@ -49,11 +49,11 @@ ElementDistance featureDistance(const Element& a, const Element& b) {
   for (std::size_t i = 0; i < 3; ++i) {
     if (!a.repeatsCorner(i)) {
       const auto found = finiteVertexTriangleDistance(a[i], b[0], b[1], b[2]);
-      take(found.distance, cornerWeights(i), found.barycentric);
+      take(found.distance, cornerWeights(i), found.weights);
     }
     if (!b.repeatsCorner(i)) {
       const auto found = finiteVertexTriangleDistance(b[i], a[0], a[1], a[2]);
-      take(found.distance, found.barycentric, cornerWeights(i));
+      take(found.distance, found.weights, cornerWeights(i));
     }
   }
   for (std::size_t i = 0; i < 3; ++i)
@@ -87,7 +87,7 @@ ElementDistance taperedDistance(const Element& tapered, const Element& other) {
                                     scale * other.radius(std::size_t{1}));
       weights = edgeWeights(0, at);
     } else {
-      weights = finiteVertexTriangleDistance(centre, a, b, c).barycentric;
+      weights = finiteVertexTriangleDistance(centre, a, b, c).weights;
     }
     const Vector3d difference =
         (weights[0] * (centre - a) + weights[1] * (centre - b)) + weights[2] * (centre - c);
@@ -138,7 +138,7 @@ void moveToCrossing(const Element& a, const Element& b, ElementDistance& found) 
       if (!(foot.distance < least)) continue;
       least = foot.distance;
       found.weightsA = edgeWeights(i, met->first);
-      found.weightsB = foot.barycentric;
+      found.weightsB = foot.weights;
       if (exchanged) std::swap(found.weightsA, found.weightsB);
     }
   };

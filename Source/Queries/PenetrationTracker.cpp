@@ -72,7 +72,7 @@ struct PenetrationTracker::Implementation {
   /// A vertex and its surface point at the end of a step.
   struct VertexState {
     std::uint32_t vertex, triangle;
-    Eigen::Vector3d barycentric, direction;
+    Eigen::Vector3d weights, direction;
     double depth;
     Eigen::Vector3d position;  ///< of the vertex
     Corners triangleAt;
@@ -138,8 +138,8 @@ class PenetrationTracker::Implementation::Search {
     const Eigen::Matrix3d rotation = rotationOf(earlier->triangleAt, corners);
     const Eigen::Vector3d direction = (rotation * earlier->direction).normalized();
     const Eigen::Vector3d moved =
-        (p - pointAt(corners, earlier->barycentric)) -
-        rotation * (earlier->position - pointAt(earlier->triangleAt, earlier->barycentric));
+        (p - pointAt(corners, earlier->weights)) -
+        rotation * (earlier->position - pointAt(earlier->triangleAt, earlier->weights));
     const double turnByMotion = moved.norm() / std::sqrt(earlier->depth) / std::sqrt(nearest.depth);
     if ((nearest.direction - direction).norm() <= TrackedVertex::kMaxTurn + turnByMotion)
       return {nearest, nearest, DirectionChange::None};
@@ -209,13 +209,8 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
       const Eigen::Vector3d p = vertices.mesh.now[vertex];
       all.found[i] = search(all.inside[i], p, known ? &*last : nullptr);
       const InsideVertex& at = all.found[i].penetration;
-      all.now[i] = {vertex,
-                    at.triangle,
-                    at.barycentric,
-                    at.direction,
-                    at.depth,
-                    p,
-                    cornersOf(body, at.corners)};
+      all.now[i] = {
+          vertex, at.triangle, at.weights, at.direction, at.depth, p, cornersOf(body, at.vertices)};
     }
   });
   all.nowTopology.commit(topologies);

@@ -59,7 +59,7 @@ PointDistances::Near PointDistances::nearOf(std::uint32_t place, VertexTriangleD
     const auto [p, q, _] = corners;
     const Eigen::Vector3d start = mesh.now[p], along = mesh.now[q] - start, from = m_point - start;
     const double weight = nearestBall(m_point, start, mesh.now[q], mesh.radii[p], mesh.radii[q]);
-    closest.barycentric = {1.0 - weight, weight, 0.0};
+    closest.weights = {1.0 - weight, weight, 0.0};
     closest.difference = weight < 1.0 ? Eigen::Vector3d(from - weight * along)
                                       : Eigen::Vector3d(m_point - mesh.now[q]);
     closest.distance = stableLength(closest.difference);
@@ -67,7 +67,7 @@ PointDistances::Near PointDistances::nearOf(std::uint32_t place, VertexTriangleD
     closest.feature = TriangleFeature::EdgeAB;
   }
   return {place, m_geometry.tree.octree().order()[place], closest,
-          closest.distance - mesh.radius(corners, closest.barycentric),
+          closest.distance - mesh.radius(corners, closest.weights),
           kNearestSlack * 2 * std::max(reach, mesh.largestRadius)};
 }
 
@@ -147,7 +147,7 @@ SurfacePoint PointDistances::surfacePoint(const Near& near) const {
   return {m_geometry.id,
           near.element,
           m_geometry.tree.ordered()[near.place],
-          near.closest.barycentric,
+          near.closest.weights,
           m_point - near.closest.difference,
           near.distance};
 }

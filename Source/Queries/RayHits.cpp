@@ -220,7 +220,7 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
         nearestBall(point, a, b, mesh.radius(corners[0]), mesh.radius(corners[1]));
     return {m_geometry.id, met.element, corners, edgeWeights(0, weight), t, frontFace, crosses};
   }
-  const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).barycentric;
+  const Vector3d weights = finiteVertexTriangleDistance(point, a, b, c).weights;
   return {m_geometry.id, met.element, corners, weights, t, frontFace, crosses};
 }
 

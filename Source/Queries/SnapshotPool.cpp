@@ -241,7 +241,7 @@ std::uint64_t Snapshot::number() const { return m_contents.state(); }
 
 double Snapshot::time() const { return m_contents.time(); }
 
-bool Snapshot::contains(GeometryId id) const { return m_contents.find(id) != nullptr; }
+bool Snapshot::has(GeometryId id) const { return m_contents.find(id) != nullptr; }
 
 namespace {
 

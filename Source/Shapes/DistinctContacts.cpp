@@ -119,8 +119,9 @@ class DistinctContacts::Step {
   }
   /// Whether `s` is early enough to stand for `c`.
   bool isInTime(const ShapeContact& s, const ShapeContact& c) const {
-    return isFirst(s, c) || (s.element == ShapeElement::Face &&
-                             s.timeOfImpact <= c.timeOfImpact + m_settings.timeTolerance);
+    return isFirst(s, c) ||
+           (s.element == ShapeElement::Face &&
+            s.timeOfImpact <= c.timeOfImpact + m_settings.continuous.timeTolerance);
   }
 
  private:

@@ -348,7 +348,7 @@ std::optional<NearestToShape> Shape::nearestToAxis(const Vector3d& a, const Vect
   const Vector3d along = m_p1 - m_p0;
   const auto answer = [&](const VertexTriangleDistance& end, double distance) {
     const bool onAxis = distance <= kOnSurface * m_magnitude;
-    return NearestToShape{end.barycentric,
+    return NearestToShape{end.weights,
                           onAxis ? directionFromAxis(-end.normal) : Vector3d(-end.normal),
                           distance - m_radius, true, end.exact};
   };
@@ -390,7 +390,7 @@ std::optional<NearestToShape> Shape::nearestInTriangle(const Vector3d& a, const 
   const Vector3d point = m_p0 + m_axes * nearestOfPlane(m_axes.transpose() * normal, height, reach);
   const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
   if (on.feature != TriangleFeature::Face) return {};
-  const Vector3d& weights = on.barycentric;
+  const Vector3d& weights = on.weights;
   if (height > reach - kOnSurface * m_magnitude)  // the point is the shape's nearest to the plane
     return NearestToShape{weights, normal, on.distance, true};
   const Vector3d sides[] = {m_axes.transpose() * (b - a), m_axes.transpose() * (c - a)};
@@ -410,7 +410,7 @@ std::optional<NearestToShape> Shape::nearestToHull(const Vector3d& a, const Vect
     if (normal.dot(a - point) < -tie) continue;  // the plane goes through
     const VertexTriangleDistance on = finiteVertexTriangleDistance(point, a, b, c);
     if (on.feature != TriangleFeature::Face) return {};
-    return NearestToShape{on.barycentric, m_axes * normal, on.distance, true, on.exact};
+    return NearestToShape{on.weights, m_axes * normal, on.distance, true, on.exact};
   }
   const std::optional<Vector3d> weights = m_hull->leastInTriangle(a, b, c, tie);
   if (!weights) return {};

@@ -139,9 +139,9 @@ struct ShapeApproach::Simplex {
     const std::array<Point, 4> all = points;
     size = 0;
     for (int i = 0; i < 3; ++i) {
-      if (!(best.barycentric[i] > 0)) continue;
+      if (!(best.weights[i] > 0)) continue;
       points[size] = all[face[i]];
-      weights[size++] = best.barycentric[i];
+      weights[size++] = best.weights[i];
     }
     return best;
   }

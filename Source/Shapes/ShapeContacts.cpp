@@ -52,7 +52,7 @@ class ShapeImpacts {
         m_out(out) {
     PALPATE_ASSERT(m_before.corners().size() == m_now.corners().size());
     m_settings.minimumDistance = m_distance + m_before.radius();
-    m_settings.timeTolerance = settings.timeTolerance;
+    m_settings.timeTolerance = settings.continuous.timeTolerance;
     for (std::uint32_t i = 0; i < m_before.corners().size(); ++i)
       m_motion = std::max(m_motion, motionOf(corner(i)));
     if (m_before.isPlane()) m_motion = std::numeric_limits<double>::infinity();  // a plane may turn
@@ -231,7 +231,7 @@ class ShapeImpacts {
     take(closest);
     if (element == ShapeElement::Vertex) return nearest;
     nearest.normal = -nearest.normal;
-    nearest.weights = closest.barycentric;
+    nearest.weights = closest.weights;
     nearest.inInterior = closest.feature == TriangleFeature::Face;
     return nearest;
   }
@@ -401,7 +401,7 @@ void findShapeImpact(const PlacedShape& first, const PlacedShape& second,
   const bool exchanged =
       b->before.precedes(a->before) || (!a->before.precedes(b->before) && b->now.precedes(a->now));
   if (exchanged) std::swap(a, b);
-  const double thickness = settings.thickness, timeTolerance = settings.timeTolerance,
+  const double thickness = settings.thickness, timeTolerance = settings.continuous.timeTolerance,
                error = errorOfDistance(a->before, b->before);
   const MovingBody body = movingBody(b->before, b->now);
   std::optional<double> time;

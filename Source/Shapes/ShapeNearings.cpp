@@ -150,7 +150,7 @@ class ElementNearings {
     std::array<Vector3d, 3> x;
     for (int i = 0; i < 3; ++i) x[i] = (1.0 - time) * m_ends[0][i] + time * m_ends[1][i];
     const auto closest = finiteVertexTriangleDistance(nearest.pointA, x[0], x[1], x[2]);
-    const Vector3d& weights = closest.barycentric;
+    const Vector3d& weights = closest.weights;
     m_out.shape.push_back({ShapeElement::Face, element, corners, weights, nearest.pointA,
                            nearest.pointB, nearest.normal,
                            nearest.distance - m_mesh.radius(corners, weights), time});

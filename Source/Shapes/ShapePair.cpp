@@ -203,8 +203,7 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
   }
   Vector3d point = m_p0;
   for (int i = 0; i < 3; ++i)
-    point +=
-        on.from.barycentric[i] * pointsOfA[polytope.corners(on.face)[static_cast<std::size_t>(i)]];
+    point += on.from.weights[i] * pointsOfA[polytope.corners(on.face)[static_cast<std::size_t>(i)]];
   const Vector3d normal = -out.normal;
   return {point - m_radius * normal, point + on.from.difference + other.m_radius * normal, normal,
           out.distance - m_radius - other.m_radius};

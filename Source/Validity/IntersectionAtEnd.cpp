@@ -30,7 +30,7 @@ double motionOf(const TriangleMesh& a, const TriangleMesh& b,
 
 double motionOf(const TriangleMesh& vertices, const TriangleMesh& triangles,
                 const VertexTriangleContact& c) {
-  const auto& [i, j, k] = c.corners;
+  const auto& [i, j, k] = c.vertices;
   return motionOf<ImpactQuery::Kind::VertexTriangle>(vertices, triangles, {c.vertex, i, j, k});
 }
 double motionOf(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {

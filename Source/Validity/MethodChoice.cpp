@@ -42,13 +42,14 @@ static void chooseMethod(const PairSettings& settings, const GeometryInStep& a,
 constexpr double kMostFast = 0.4;
 
 static double motionToleranceOf(const PairSettings& settings) {
-  return settings.motionTolerance < 0 ? settings.thickness / 2 : settings.motionTolerance;
+  return settings.automatic.motionTolerance < 0 ? settings.thickness / 2
+                                                : settings.automatic.motionTolerance;
 }
 
 /// L: features that come within the thickness in a step in which they move this far are at its end
 /// at most this much further apart.
 static double extraThicknessOf(const PairSettings& settings, double motion) {
-  return motion * (1.0 + kMotionSlack * settings.timeTolerance);
+  return motion * (1.0 + kMotionSlack * settings.continuous.timeTolerance);
 }
 
 /// Features that touched in the step are at its end within their motion, and what arcs add.

@@ -84,7 +84,8 @@ bool measuredApart(const MeshPair& meshes, const PairPlan& plan, const StepFacts
   if (plan.kind == PairKind::ParticlesByLeaves) return false;
   if (plan.method == Method::Continuous) {
     // Earliest times come without distances, and without features that a filter refuses.
-    if (meshes.settings.earliestTimeOnly) return earliestTime > 0.0 && !meshes.hasFilters();
+    if (meshes.settings.continuous.earliestTimeOnly)
+      return earliestTime > 0.0 && !meshes.hasFilters();
     return facts.gapAtStart > 0.0;
   }
   if (plan.method != Method::Proximity) return false;
@@ -101,7 +102,7 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
                      bool foundOrFar) {
   if (plan.method == Method::DistanceField) return false;
   if (!haveTriangles(a, b))
-    return validity.startedApart && (settings.earliestTimeOnly || !facts.sideUnknown);
+    return validity.startedApart && (settings.continuous.earliestTimeOnly || !facts.sideUnknown);
   if (settings.method == Method::Auto)
     return plan.method == Method::Intersection || validity.startedApart;
   const bool isWithinLimit = plan.motion <= validity.displacementLimit;
@@ -151,7 +152,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   plan.startsIntersecting = m_atStart.meeting == Meeting::Piercing;
 
   const std::array topologies{a.elements, b.elements};
-  const int most = settings.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
+  const int most = settings.continuous.earliestTimeOnly ? kFramesPerCheck : kMaxCheckCredit;
   if (m_topologies.isCurrent(topologies)) {
     m_checkCredit = std::min(m_checkCredit + 1, most);
   } else {
@@ -267,7 +268,7 @@ void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair
     return;
   }
   // Earliest times come without contacts, and filtered features are not among the contacts.
-  if (meshes.settings.earliestTimeOnly || meshes.hasFilters()) return;
+  if (meshes.settings.continuous.earliestTimeOnly || meshes.hasFilters()) return;
   PALPATE_ASSERT(m_atStart.meeting.has_value() || !m_atStart.witness);
   IntersectionAtEnd end;
   if (m_atStart.meeting == Meeting::Piercing && m_atStart.witness &&

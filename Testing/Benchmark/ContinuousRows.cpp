@@ -39,7 +39,7 @@ class Step {
     PairSettings settings;
     settings.method = Method::Continuous;
     settings.contacts = Contacts::All;
-    settings.earliestTimeOnly = earliestTimeOnly;
+    settings.continuous.earliestTimeOnly = earliestTimeOnly;
     settings.thickness = thickness;
     m_id = m_detection.addTriangleMesh(workload.frames[0][0], workload.task.meshes[0]);
     m_detection.addCollisionPair(m_id, m_id, settings);

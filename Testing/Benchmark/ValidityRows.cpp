@@ -138,7 +138,7 @@ class ValidityCost {
   }
   /// The additional work of the narrow phase: its time with validity, less its time without.
   double narrowPhase(const std::pair<std::size_t, std::size_t>& pair) {
-    if (m_settings.earliestTimeOnly) return 0;
+    if (m_settings.continuous.earliestTimeOnly) return 0;
     const auto candidates = candidatesOf(pair);
     MeshPair plain{m_meshes[pair.first], m_meshes[pair.second], m_settings};
     MeshPair asked = plain;
@@ -186,7 +186,7 @@ void validityRows(Report& report, const RowOptions& options) {
     const std::pair<const char*, PairSettings> settings[] = {
         {"Proximity", {.method = Method::Proximity, .thickness = thickness}},
         {"Continuous", {.method = Method::Continuous}},
-        {"earliest", {.method = Method::Continuous, .earliestTimeOnly = true}}};
+        {"earliest", {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}}}};
     for (const auto& [name, ofPair] : settings) {
       ValidityCost cost(scene, ofPair);
       double whole = 0, validity = 0;

@@ -28,8 +28,8 @@ inline void append(Row& row, const Eigen::Vector3d& value) {
 template <bool kTriangleFirst>
 Row rowOf(const VertexTriangleContact& c) {
   Row row{kTriangleFirst ? c.triangle : c.vertex, kTriangleFirst ? c.vertex : c.triangle,
-          c.corners[0], c.corners[1], c.corners[2]};
-  append(row, c.barycentric);
+          c.vertices[0], c.vertices[1], c.vertices[2]};
+  append(row, c.weights);
   append(row, c.normal);
   append(row, c.distance);
   append(row, c.timeOfImpact);
@@ -111,10 +111,10 @@ inline bool ascend(const std::vector<Row>& rows, std::size_t idWords) {
 }
 
 inline void expectWellFormed(const VertexTriangleContact& c, const Mesh& triangles) {
-  EXPECT_EQ(c.corners, triangles.triangles[c.triangle]);
+  EXPECT_EQ(c.vertices, triangles.triangles[c.triangle]);
   EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);  // a NaN is near nothing
-  EXPECT_GE(c.barycentric.minCoeff(), 0.0);
-  EXPECT_EQ(c.barycentric.sum(), 1.0);
+  EXPECT_GE(c.weights.minCoeff(), 0.0);
+  EXPECT_EQ(c.weights.sum(), 1.0);
 }
 
 inline void expectWellFormed(const EdgeEdgeContact& c) {
@@ -173,7 +173,8 @@ inline std::vector<MethodCase> methodCases(double thickness) {
           {"Intersection", {Method::Intersection, 0, Contacts::All}},
           {"Continuous", {Method::Continuous, 0, Contacts::All}},
           {"ContinuousWithThickness", {Method::Continuous, thickness, Contacts::All}},
-          {"ContinuousEarliest", {.method = Method::Continuous, .earliestTimeOnly = true}}};
+          {"ContinuousEarliest",
+           {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}}}};
 }
 
 }  // namespace palpate::testing

@@ -44,7 +44,7 @@ std::vector<std::uint64_t> wordsOf(F&& query) {
 
 void append(std::vector<std::uint64_t>& words, const InsideVertex& v) {
   Row row{v.vertex, v.triangle, v.decided};
-  testing::append(row, v.barycentric);
+  testing::append(row, v.weights);
   testing::append(row, v.direction);
   testing::append(row, v.depth);
   words.insert(words.end(), row.begin(), row.end());
@@ -292,9 +292,9 @@ PairSettings RandomHistory::randomSettings() {
   settings.thickness = m_random() % 2 ? m_unit * uniform(m_random, 0.001, 0.1) : 0.0;
   settings.contacts = m_random() % 2 ? Contacts::Distinct : Contacts::All;
   if (settings.method == Method::Continuous && m_random() % 4 == 0)
-    settings.earliestTimeOnly = true;
+    settings.continuous.earliestTimeOnly = true;
   if (m_random() % 8 == 0) settings.restDistance = 0.2 * m_unit;
-  if (m_random() % 4 == 0) settings.timeTolerance = 1e-3;
+  if (m_random() % 4 == 0) settings.continuous.timeTolerance = 1e-3;
   return settings;
 }
 

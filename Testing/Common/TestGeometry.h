@@ -122,7 +122,9 @@ inline std::vector<PairSettings> settingsFor(double thickness, bool continuous =
   if (continuous) {
     all.push_back({Method::Continuous, thickness, Contacts::All});
     all.push_back({Method::Continuous, 0, Contacts::All});
-    all.push_back({.method = Method::Continuous, .thickness = thickness, .earliestTimeOnly = true});
+    all.push_back({.method = Method::Continuous,
+                   .thickness = thickness,
+                   .continuous = {.earliestTimeOnly = true}});
   }
   return all;
 }

@@ -206,7 +206,7 @@ bool isRepresented(const CollisionData& data, const Vertices& vertices) {
 void expectAllRepresented(const CollisionData& data, const CollisionData& truth) {
   for (const auto& c : truth.vertexTriangle())
     EXPECT_TRUE(isRepresented(data, std::array{c.vertex}));
-  for (const auto& c : truth.triangleVertex()) EXPECT_TRUE(isRepresented(data, c.corners));
+  for (const auto& c : truth.triangleVertex()) EXPECT_TRUE(isRepresented(data, c.vertices));
   for (const auto& c : truth.edgeEdge()) EXPECT_TRUE(isRepresented(data, c.edgeA));
 }
 
@@ -390,7 +390,7 @@ TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
                          body = detection.addTriangleMesh(box.mesh.positions, box.mesh.triangles);
         detection.attachDistanceField(body, box.field);
         PairSettings pair = pairOf(kErrorBound);
-        pair.motionTolerance = 0.06;
+        pair.automatic.motionTolerance = 0.06;
         detection.addCollisionPair(triangle, body, pair);
         detection.setTransform(body, {rotation, Vector3d::Zero()}, {rotation, Vector3d::Zero()});
         detection.setPositions(triangle, before.other, now.other);

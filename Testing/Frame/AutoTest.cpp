@@ -72,11 +72,12 @@ TEST(Auto, MatchesBruteForce) {
   for (int i = 0; i < casesOf(120); ++i) {
     const Motion& motion = kMotions[i % std::size(kMotions)];
     const Case c = randomCase(random, motion.slow, motion.fastShare, motion.fast);
-    for (const PairSettings& settings :
-         {PairSettings{.thickness = kThickness},
-          PairSettings{
-              .thickness = kThickness, .contacts = Contacts::All, .motionTolerance = 0.005},
-          PairSettings{.thickness = i % 2 ? 0.0 : kThickness, .motionTolerance = 0.0}}) {
+    for (const PairSettings& settings : {PairSettings{.thickness = kThickness},
+                                         PairSettings{.thickness = kThickness,
+                                         .contacts = Contacts::All,
+                                         .automatic = {.motionTolerance = 0.005}},
+                                         PairSettings{.thickness = i % 2 ? 0.0 : kThickness,
+                                         .automatic = {.motionTolerance = 0.0}}}) {
       SCOPED_TRACE(std::string(motion.name) + ", case " + std::to_string(i));
       PairRun truth(settingsOf(Engine::BruteForce), c.a, c.b, settings);
       truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
@@ -115,8 +116,9 @@ TEST(Auto, HasTheSameContactsAtATinyScale) {
   for (int i = 0; i < casesOf(60); ++i) {
     Case c = randomCase(random, 0.0005, 0.03, 0.1);
     const auto detect = [&](double thickness) {
-      const PairSettings settings{
-          .method = Method::Auto, .thickness = thickness, .motionTolerance = 2 * thickness};
+      const PairSettings settings{.method = Method::Auto,
+                                  .thickness = thickness,
+                                  .automatic = {.motionTolerance = 2 * thickness}};
       PairRun run(settingsOf(Engine::Octree), c.a, c.b, settings, false);
       run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
       mixed += run.data().validity().reason == MethodReason::Mixed;
@@ -148,7 +150,9 @@ TEST(Auto, FindsEverythingThatContinuousFinds) {
     truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
     run.step(c.a.positions, c.aNow, c.b.positions, c.bNow);
     const double most =
-        thickness + (automatic.motionTolerance < 0 ? thickness / 2 : automatic.motionTolerance) +
+        thickness +
+        (automatic.automatic.motionTolerance < 0 ? thickness / 2
+                                                 : automatic.automatic.motionTolerance) +
         1e-6;
     for (const CollisionPair& pair : run.detection().pairs()) {
       const CollisionData& data = run.detection().collisionData(pair.a, pair.b);
@@ -183,11 +187,11 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
     std::set<std::uint32_t> ofA, ofB;
     for (const auto& contact : run.data().vertexTriangle()) {
       ofA.insert(contact.vertex);
-      ofB.insert(contact.corners.begin(), contact.corners.end());
+      ofB.insert(contact.vertices.begin(), contact.vertices.end());
     }
     for (const auto& contact : run.data().triangleVertex()) {
       ofB.insert(contact.vertex);
-      ofA.insert(contact.corners.begin(), contact.corners.end());
+      ofA.insert(contact.vertices.begin(), contact.vertices.end());
     }
     for (const auto& contact : run.data().edgeEdge()) {
       ofA.insert(contact.edgeA.begin(), contact.edgeA.end());
@@ -203,9 +207,9 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
       EXPECT_TRUE(any(ofA, featureOfA) && any(ofB, featureOfB));
     };
     for (const auto& contact : truth.data().vertexTriangle())
-      expectRepresented(std::array{contact.vertex}, contact.corners);
+      expectRepresented(std::array{contact.vertex}, contact.vertices);
     for (const auto& contact : truth.data().triangleVertex())
-      expectRepresented(contact.corners, std::array{contact.vertex});
+      expectRepresented(contact.vertices, std::array{contact.vertex});
     for (const auto& contact : truth.data().edgeEdge())
       expectRepresented(contact.edgeA, contact.edgeB);
     found += idsOf(truth.data()).size();

@@ -143,7 +143,7 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
         for (const auto& c : ofA ? data.vertexTriangle() : data.triangleVertex()) {
           const Mesh &own = ofA ? bodies.a : bodies.b, &other = ofA ? bodies.b : bodies.a;
           Vector3d sum = own.positions[c.vertex];
-          for (int i = 0; i < 3; ++i) sum -= c.barycentric[i] * other.positions[c.corners[i]];
+          for (int i = 0; i < 3; ++i) sum -= c.weights[i] * other.positions[c.vertices[i]];
           EXPECT_LE((sum - c.distance * c.normal).norm(), 1e-12);
           pushes.push_back(ofA ? c.normal : Vector3d(-c.normal));
           deepest = std::max(deepest, -c.distance);

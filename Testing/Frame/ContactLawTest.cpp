@@ -57,7 +57,7 @@ class Law {
         m_b(b),
         m_asked(settings.method),
         m_method(data.validity().method),
-        m_timeTolerance(settings.timeTolerance),
+        m_timeTolerance(settings.continuous.timeTolerance),
         m_distinct(settings.contacts == Contacts::Distinct),
         m_seen(seen),
         m_hasCylinder(hasCylinder) {}
@@ -146,7 +146,7 @@ class Law {
                             const Side& triangles) {
     expectSum(c, {&vertices, &triangles, &triangles, &triangles});
     expectFeature(c);
-    const auto at = [&](int i) { return triangles.at(c.corners[i], c.timeOfImpact); };
+    const auto at = [&](int i) { return triangles.at(c.vertices[i], c.timeOfImpact); };
     const WideVector u = at(1) - at(0), v = at(2) - at(0), winding = cross(u, v);
     const Wide sine = winding.norm();
     const WideVector normal = c.normal.cast<Wide>();
@@ -161,7 +161,7 @@ class Law {
       if (std::abs(height) > 1e-9L * from.norm()) {
         EXPECT_EQ(c.distance < 0, height < 0);
       }
-      if (c.barycentric.minCoeff() > 0) {
+      if (c.weights.minCoeff() > 0) {
         EXPECT_NEAR(normal.dot(winding) / sine, 1, 1e-12L);
       }
       m_seen.add(c.distance < 0 ? "behind" : "in front");
@@ -191,19 +191,19 @@ class Law {
   void expectFeature(const VertexTriangleContact& c) {
     const int feature = static_cast<int>(c.feature);
     std::map<std::uint32_t, double> weights;
-    for (int i = 0; i < 3; ++i) weights[c.corners[i]] += c.barycentric[i];
+    for (int i = 0; i < 3; ++i) weights[c.vertices[i]] += c.weights[i];
     for (const auto& [vertex, weight] : weights) {
       bool isOfFeature = c.feature == TriangleFeature::Face;
-      if (feature < 3) isOfFeature = vertex == c.corners[feature];
+      if (feature < 3) isOfFeature = vertex == c.vertices[feature];
       if (feature >= 3 && feature < 6)
-        isOfFeature = vertex == c.corners[feature - 3] || vertex == c.corners[(feature - 2) % 3];
+        isOfFeature = vertex == c.vertices[feature - 3] || vertex == c.vertices[(feature - 2) % 3];
       expectWeight(weight, isOfFeature);
     }
-    if (c.corners[1] == c.corners[2]) {
+    if (c.vertices[1] == c.vertices[2]) {
       EXPECT_TRUE(feature <= 1 || c.feature == TriangleFeature::EdgeAB);
       m_seen.add("of a segment");
     }
-    if (c.corners[0] == c.corners[1] && c.corners[1] == c.corners[2]) {
+    if (c.vertices[0] == c.vertices[1] && c.vertices[1] == c.vertices[2]) {
       EXPECT_EQ(c.feature, TriangleFeature::CornerA);
     }
     m_seen.add(feature < 3 ? "at a corner" : feature < 6 ? "at an edge" : "at a face");
@@ -371,8 +371,11 @@ std::vector<PairSettings> everySetting(double thickness) {
     all.push_back({Method::Auto, thickness, contacts, 4 * thickness});
     all.push_back({Method::Auto, thickness, contacts, 0.0});
   }
-  all.push_back({.method = Method::Continuous, .thickness = 0.0, .timeTolerance = 1e-2});
-  all.push_back({.method = Method::Continuous, .thickness = thickness, .timeTolerance = 1e-2});
+  all.push_back(
+      {.method = Method::Continuous, .thickness = 0.0, .continuous = {.timeTolerance = 1e-2}});
+  all.push_back({.method = Method::Continuous,
+                 .thickness = thickness,
+                 .continuous = {.timeTolerance = 1e-2}});
   return all;
 }
 

@@ -155,7 +155,7 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
   const auto [vertexTime, edgeTime] = both({});
   const auto [vertexNear, edgeNear] = both({.minimumDistance = 0.125, .timeTolerance = 0x1p-10});
   const Stencil stencils[] = {
-      stencil(VertexTriangleContact{0, 1, {2, 3, 4}, vertex.barycentric, vertex.normal, 0, 0}),
+      stencil(VertexTriangleContact{0, 1, {2, 3, 4}, vertex.weights, vertex.normal, 0, 0}),
       unchanged([&] {
         return stencil(
             EdgeEdgeContact{{0, 1}, {2, 3}, edges.weightA, edges.weightB, edges.normal, 0, 0});
@@ -168,7 +168,7 @@ Bits featureAnswers(const test::CornersPair& pair, const Mode& mode) {
             edges.exact,
             edges.parallel};
   for (const Eigen::Vector3d& v :
-       {vertex.barycentric, vertex.difference, vertex.normal, edges.difference, edges.normal})
+       {vertex.weights, vertex.difference, vertex.normal, edges.difference, edges.normal})
     appendBits(bits, v);
   for (const double x : {vertex.distance, edges.distance, edges.weightA, edges.weightB})
     appendBits(bits, x);

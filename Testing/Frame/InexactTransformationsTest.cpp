@@ -126,7 +126,7 @@ TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
   RecordProperty("same", std::to_string(m_same));
   RecordProperty("different", std::to_string(m_different));
   std::printf("%zu contacts alike, %zu on one side only\n", m_same, m_different);
-  if (GetParam().settings.earliestTimeOnly) return;
+  if (GetParam().settings.continuous.earliestTimeOnly) return;
   EXPECT_GT(m_same, 1000u);
   // On the lattice everything touches. A minimum distance holds within a tolerance above rounding.
   EXPECT_EQ(m_different > 0u,
@@ -135,7 +135,7 @@ TEST_P(InexactTransformations, ChangeContactsByRoundingOnly) {
 
 /// Tests the exact reference above: on a sample of all features, reported or not.
 TEST_P(InexactTransformations, ExactContactsMatchReportedOnes) {
-  if (distinct() || GetParam().settings.earliestTimeOnly) return;
+  if (distinct() || GetParam().settings.continuous.earliestTimeOnly) return;
   std::size_t yes = 0, no = 0;
   for (const StepScene& scene : scenesOfSteps()) {
     if (scene.name != "lattice" && scene.name != "soups") continue;

@@ -194,7 +194,7 @@ class Placement {
     setNumbers(out, c);
     std::array<std::pair<std::uint32_t, double>, 3> corners;
     for (int i = 0; i < 3; ++i)
-      corners[i] = {m_names[triangles].vertices[c.corners[i]], c.barycentric[i]};
+      corners[i] = {m_names[triangles].vertices[c.vertices[i]], c.weights[i]};
     std::sort(corners.begin(), corners.end());
     for (int i = 0; i < 3; ++i) out.weights[i] = corners[i].second;
     const std::uint32_t vertex = m_names[vertices].vertices[c.vertex];

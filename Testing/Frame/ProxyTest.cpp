@@ -137,7 +137,7 @@ Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
 PairSettings pairOf(const Scene& scene) {
   PairSettings pair{.method = Method::Proxy, .thickness = scene.thickness};
   pair.allowedError = scene.allowedError;
-  pair.widestNormalCone = 0.6;  // the meshes are coarse
+  pair.proxy.widestNormalCone = 0.6;  // the meshes are coarse
   return pair;
 }
 
@@ -346,7 +346,7 @@ TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   run.detection.detectCollision();
   EXPECT_LT(run.data().errorBound(), 1.001e-3);
   pair.allowedError = 1;
-  pair.widestNormalCone = 1e-6;
+  pair.proxy.widestNormalCone = 1e-6;
   run.detection.setPairSettings(run.smoke, run.body, pair);
   run.detection.detectCollision();
   EXPECT_LT(run.data().errorBound(), 1e-12);
@@ -489,10 +489,10 @@ TEST(Proxy, IsRefusedWhereItHasNoMeaning) {
   refuse(points, body, kSettings, "allowedError is -1");
   pair.allowedError = 0.01;
   for (const double cone : {0.0, 1.6, -1.0, std::nan("")}) {
-    pair.widestNormalCone = cone;
+    pair.proxy.widestNormalCone = cone;
     refuse(points, body, kSettings, "widestNormalCone is");
   }
-  pair.widestNormalCone = 0.2;
+  pair.proxy.widestNormalCone = 0.2;
   detection.addCollisionPair(points, body, pair);
   expectRefused(kType, "contact predicates are not for Method::Proxy", [&] {
     detection.setContactPredicate(points, body, [](const ContactFeatures&) { return true; });
@@ -519,7 +519,7 @@ TEST(Proxy, CapturesKeepTheSettings) {
                                 {.method = Method::Proxy,
                                  .thickness = 0.04,
                                  .allowedError = 0.0123,
-                                 .widestNormalCone = 0.21});
+                                 .proxy = {.widestNormalCone = 0.21}});
   run.detection.detectCollision();
   const auto path = std::filesystem::path(::testing::TempDir()) / "Proxy.capture";
   capture(run.detection, path);
@@ -527,7 +527,7 @@ TEST(Proxy, CapturesKeepTheSettings) {
   std::filesystem::remove(path);
   const CollisionPair pair = again.pairs()[0];
   EXPECT_EQ(pair.settings.allowedError, 0.0123);
-  EXPECT_EQ(pair.settings.widestNormalCone, 0.21);
+  EXPECT_EQ(pair.settings.proxy.widestNormalCone, 0.21);
   again.detectCollision();
   EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(), run.data().hash());
 }

@@ -192,11 +192,11 @@ bool isReported(const CollisionData& data, const Body& a, const Body& b,
   };
   return any(data.vertexTriangle(),
              [&](const auto& c) {
-               return contain(ofA, {{c.vertex}}) && contain(ofB, c.corners);
+               return contain(ofA, {{c.vertex}}) && contain(ofB, c.vertices);
              }) ||
          any(data.triangleVertex(),
              [&](const auto& c) {
-               return contain(ofB, {{c.vertex}}) && contain(ofA, c.corners);
+               return contain(ofB, {{c.vertex}}) && contain(ofA, c.vertices);
              }) ||
          any(data.edgeEdge(),
              [&](const auto& c) { return contain(ofA, c.edgeA) && contain(ofB, c.edgeB); });
@@ -211,8 +211,8 @@ void expectSides(const CollisionData& data, const Body& a, const Body& b, bool i
     std::array<std::array<Vector3d, 4>, 3> p;
     for (int end = 0; end < 3; ++end) {
       const double s = std::array{0.0, 1.0, t}[end];
-      p[end] = {of.at(c.vertex, s), other.at(c.corners[0], s), other.at(c.corners[1], s),
-                other.at(c.corners[2], s)};
+      p[end] = {of.at(c.vertex, s), other.at(c.vertices[0], s), other.at(c.vertices[1], s),
+                other.at(c.vertices[2], s)};
     }
     const auto& [x, y, z] = p;
     const auto passed = vertexTriangleTimeOfImpact(x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3]);

@@ -41,10 +41,10 @@ struct BallAndSheet {
   static bool anyFromBelow(const CollisionData& data, const Positions& before,
                            const Positions& now) {
     for (const VertexTriangleContact& c : data.vertexTriangle()) {
-      if (!(c.barycentric.minCoeff() > 0.0)) continue;
+      if (!(c.weights.minCoeff() > 0.0)) continue;
       const double t = c.timeOfImpact;
       const auto at = [&](std::uint32_t v) { return Vector3d((1 - t) * before[v] + t * now[v]); };
-      const Vector3d a = at(c.corners[0]), b = at(c.corners[1]), d = at(c.corners[2]);
+      const Vector3d a = at(c.vertices[0]), b = at(c.vertices[1]), d = at(c.vertices[2]);
       if ((b - a).cross(d - a).dot(c.normal) < 0.0) return true;
     }
     return false;

@@ -147,7 +147,7 @@ void appendCells(const CollisionData& contacts, const CellTypes<CellType>& types
     return element;
   };
   const auto element = [&](const VertexTriangleContact& contact) {
-    const auto [p, q, r] = contact.corners;  // {p, p, p} of a point, {p, q, q} of a segment
+    const auto [p, q, r] = contact.vertices;  // {p, p, p} of a point, {p, q, q} of a segment
     if (p == q && q == r) return cell(types.vertex, p);
     return q == r ? edge({p, q}) : cell(types.triangle, contact.triangle);
   };

@@ -69,8 +69,8 @@ struct InsideSettings {
 /// to the vertex.
 struct InsideVertex {
   std::uint32_t vertex, triangle;  ///< a vertex of the other geometry, a triangle of the body.
-  std::array<std::uint32_t, 3> corners;  ///< the vertices of that triangle.
-  Eigen::Vector3d barycentric;           ///< weights of the corners at the surface point.
+  std::array<std::uint32_t, 3> vertices;  ///< of that triangle
+  Eigen::Vector3d weights;                ///< of these vertices at the surface point
   /// Unit: the penetration direction, from the vertex to the surface point.
   Eigen::Vector3d direction;
   double depth;  ///< L, positive: the distance to the surface point.

@@ -56,18 +56,19 @@ namespace palpate {
 //          it, to where the vertex leaves the other body; it is negative until then.
 
 /// A contact of a vertex with a triangle. A contact of a vertex with the segment {p, q} has the
-/// corners {p, q, q}. A contact of a vertex with the point p has the corners {p, p, p}.
+/// vertices {p, q, q}. A contact of a vertex with the point p has the vertices {p, p, p}.
 struct VertexTriangleContact {
-  std::uint32_t vertex, triangle;        ///< indices; `triangle` may be a segment or a point
-  std::array<std::uint32_t, 3> corners;  ///< the vertices of the triangle, segment or point
-  Eigen::Vector3d barycentric;           ///< weights of the corners at the closest point
+  std::uint32_t vertex, triangle;         ///< indices; `triangle` may be a segment or a point
+  std::array<std::uint32_t, 3> vertices;  ///< of the triangle, segment or point
+  Eigen::Vector3d weights;                ///< of these vertices at the closest point
   /// Unit. It points from the triangle to the vertex, or from the vertex to the triangle where the
   /// vertex is behind the surface, and the distance negative without radii.
   Eigen::Vector3d normal;
   double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above.
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end.
-  /// The part that holds the closest point at that time: the corner, edge or face that the corners
-  /// with weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point CornerA.
+  /// The part that holds the closest point at that time: the corner, edge or face that the
+  /// vertices with weights other than 0 span. A segment has EdgeAB, CornerA or CornerB, a point
+  /// CornerA.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -137,10 +138,10 @@ struct Stencil {
   std::array<double, 4> weights;
 };
 
-/// The vertex with weight 1, then the triangle's corners with the weights -barycentric.
+/// The vertex with weight 1, then the triangle's vertices with the negative weights.
 inline Stencil stencil(const VertexTriangleContact& contact) {
-  return {{contact.vertex, contact.corners[0], contact.corners[1], contact.corners[2]},
-          {1.0, -contact.barycentric[0], -contact.barycentric[1], -contact.barycentric[2]}};
+  return {{contact.vertex, contact.vertices[0], contact.vertices[1], contact.vertices[2]},
+          {1.0, -contact.weights[0], -contact.weights[1], -contact.weights[2]}};
 }
 
 /// The two ends of edge a with weights of at least 0, then those of edge b with weights of at most
@@ -164,7 +165,8 @@ class PALPATE_EXPORT CollisionData {
     CountedVector<ShapeContact> shape;
     CountedVector<ShapeShapeContact> shapeShape;
     double earliestTimeOfImpact =
-        std::numeric_limits<double>::infinity();  ///< only with PairSettings::earliestTimeOnly
+        std::numeric_limits<double>::infinity();  ///< only with
+                                                  ///< ContinuousSettings::earliestTimeOnly
     double errorBound = 0.0;
     Validity validity;
   };
@@ -200,7 +202,8 @@ class PALPATE_EXPORT CollisionData {
   std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
   /// Fraction of the step: the least timeOfImpact of all contacts, or infinity without contacts. 1
   /// if all contacts come from methods that test the step's end. With
-  /// PairSettings::earliestTimeOnly it is the time of the first contact, although no list has it.
+  /// ContinuousSettings::earliestTimeOnly it is the time of the first contact, although no list has
+  /// it.
   /// Cost     linear in the contacts.
   double earliestTimeOfImpact() const;
 

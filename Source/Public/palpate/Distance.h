@@ -27,12 +27,12 @@ PALPATE_EXPORT const char* toString(EdgeFeature) noexcept;  ///< its name, or "u
 
 /// The result of vertexTriangleDistance().
 struct VertexTriangleDistance {
-  Eigen::Vector3d barycentric;  ///< Weights of the closest point: at least 0, sum exactly 1.
-  Eigen::Vector3d difference;   ///< L: from the closest point to the vertex.
-  Eigen::Vector3d normal;       ///< Unit, along the difference.
-  double distance;              ///< L; infinity if it exceeds the largest double.
-  TriangleFeature feature;      ///< The feature that holds the closest point.
-  bool exact;                   ///< Whether exact arithmetic was necessary.
+  Eigen::Vector3d weights;     ///< Weights of the closest point: at least 0, sum exactly 1.
+  Eigen::Vector3d difference;  ///< L: from the closest point to the vertex.
+  Eigen::Vector3d normal;      ///< Unit, along the difference.
+  double distance;             ///< L; infinity if it exceeds the largest double.
+  TriangleFeature feature;     ///< The feature that holds the closest point.
+  bool exact;                  ///< Whether exact arithmetic was necessary.
 };
 
 /// The point of triangle (a, b, c) that is closest to a vertex p, and the distance.

@@ -47,7 +47,7 @@ struct CollisionPair {
 /// Units    L is the length unit of the positions. All lengths are in L.
 /// Errors   a function that takes data throws palpate::Error for invalid data and changes nothing.
 ///          Each function lists its error codes. In addition, every function that takes a
-///          GeometryId, except contains(), throws UnknownGeometry for a geometry that was never
+///          GeometryId, except has(), throws UnknownGeometry for a geometry that was never
 ///          added or was removed.
 ///          If an exception ends a frame, the last answers stay readable and the object is ready
 ///          for the next frame. Such exceptions come from memory, predicates, callbacks and
@@ -158,7 +158,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   void removeGeometry(GeometryId);
 
   /// Whether the geometry was added and not removed. Any id is valid.
-  bool contains(GeometryId) const;
+  bool has(GeometryId) const;
   std::size_t vertexCount(GeometryId) const;  ///< 0 for a shape
   /// L: the positions now, as setPositions() gave them. If setTransform() has placed the geometry,
   /// they are in the body's frame. Empty for a shape.

@@ -146,29 +146,8 @@ enum class Contacts {
 };
 PALPATE_EXPORT const char* toString(Contacts) noexcept;  ///< its name, or "unknown"
 
-/// How one pair is tested. Docs/SupportMatrix.md lists which methods use which settings. A setting
-/// that a method refuses, or a value outside its range, throws InvalidSettings.
-struct PairSettings {
-  Method method = Method::Auto;
-  /// L, 0 to kLargestMeasure. The contact distance, which IPC users know as d-hat: features at most
-  /// this far apart are contacts. Radii of lines and points add to it. Proximity needs a positive
-  /// thickness, or radii, or an analytical shape. The contacts of Intersection do not depend on it.
-  double thickness = 0.0;
-  /// Intersection reports all contacts in either case.
-  Contacts contacts = Contacts::Distinct;
-  /// L, to 1e300. Only Auto accepts a value that is not negative. Negative: half the thickness. It
-  /// has an effect for two triangle or tetrahedral meshes with Distinct and a positive thickness.
-  /// Auto tests features that move at most this far, relative to each other, at the step's end. The
-  /// thickness is up to this much larger there. Auto tests other features for impacts. A larger
-  /// value is faster and gives more contacts of features that are further apart. For all geometries
-  /// it also limits the motion with which an attached DistanceField or proxy answers.
-  double motionTolerance = -1.0;
-  /// L, 0 to kLargestMeasure. Only a triangle, tetrahedral or line mesh with itself accepts a value
-  /// other than 0. Features that are nearer to each other than this along the mesh's edges are no
-  /// contacts. These distances are measured once, at the positions with which the mesh was added or
-  /// its topology was set. More than 2^28 pairs of vertices that are so near throw TooLarge. 0:
-  /// only features with a common vertex are no contacts.
-  double restDistance = 0.0;
+/// What only Continuous uses, and Auto for impacts.
+struct ContinuousSettings {
   /// Fraction of the step, in [2^-50, 1]. A reported time of impact is never late, and early by at
   /// most this. With a thickness, Continuous and Auto also report features that only come within
   /// the thickness and this fraction of their relative motion. Without a thickness the set of
@@ -179,15 +158,51 @@ struct PairSettings {
   /// CollisionData::earliestTimeOfImpact(), which is that of all contacts. This is much cheaper.
   /// `contacts` has no effect then.
   bool earliestTimeOnly = false;
+};
+
+/// What only Auto uses.
+struct AutoSettings {
+  /// L, to 1e300. Only Auto accepts a value that is not negative. Negative: half the thickness. It
+  /// has an effect for two triangle or tetrahedral meshes with Distinct and a positive thickness.
+  /// Auto tests features that move at most this far, relative to each other, at the step's end. The
+  /// thickness is up to this much larger there. Auto tests other features for impacts. A larger
+  /// value is faster and gives more contacts of features that are further apart. For all geometries
+  /// it also limits the motion with which an attached DistanceField or proxy answers.
+  double motionTolerance = -1.0;
+};
+
+/// What only Proxy uses.
+struct LeafSettings {
+  /// rad, in (0, 1.5]. Proxy: the largest angle between the normal of a leaf's plane and those of
+  /// the triangles that the plane stands for. Other leaves are divided or answered by triangles.
+  double widestNormalCone = 0.25;
+};
+
+/// How one pair is tested. Docs/SupportMatrix.md lists which methods use which settings. A setting
+/// that a method refuses, or a value outside its range, throws InvalidSettings.
+struct PairSettings {
+  Method method = Method::Auto;
+  /// L, 0 to kLargestMeasure. The contact distance, which IPC users know as d-hat: features at most
+  /// this far apart are contacts. Radii of lines and points add to it. Proximity needs a positive
+  /// thickness, or radii, or an analytical shape. The contacts of Intersection do not depend on it.
+  double thickness = 0.0;
+  /// Intersection reports all contacts in either case.
+  Contacts contacts = Contacts::Distinct;
+  /// L, 0 to kLargestMeasure. Only a triangle, tetrahedral or line mesh with itself accepts a value
+  /// other than 0. Features that are nearer to each other than this along the mesh's edges are no
+  /// contacts. These distances are measured once, at the positions with which the mesh was added or
+  /// its topology was set. More than 2^28 pairs of vertices that are so near throw TooLarge. 0:
+  /// only features with a common vertex are no contacts.
+  double restDistance = 0.0;
   /// L, 0 to kLargestMeasure. What an answer may be off by. Proxy needs a positive value: a larger
   /// one gives fewer and larger leaves, and fewer that triangles answer. Auto answers by an
   /// attached DistanceField or by the leaves of attachSurfaceProxy() if their error bound is at
   /// most this, but only where they prove that nothing touches in the step. Other methods accept 0
   /// only.
   double allowedError = 0.0;
-  /// rad, in (0, 1.5]. Proxy: the largest angle between the normal of a leaf's plane and those of
-  /// the triangles that the plane stands for. Other leaves are divided or answered by triangles.
-  double widestNormalCone = 0.25;
+  ContinuousSettings continuous{};
+  AutoSettings automatic{};
+  LeafSettings proxy{};
 };
 
 /// The leaves that OctreeBasedCD::attachSurfaceProxy() builds for a rigid body.
@@ -199,7 +214,7 @@ struct SurfaceProxySettings {
   /// L, positive. The largest proven error of a leaf's plane. A larger one gives fewer and larger
   /// leaves.
   double errorBound = 0.0;
-  /// rad, in (0, 1.5]. As PairSettings::widestNormalCone.
+  /// rad, in (0, 1.5]. As LeafSettings::widestNormalCone.
   double widestNormalCone = 0.25;
   friend bool operator==(const SurfaceProxySettings&, const SurfaceProxySettings&) = default;
 };

@@ -37,7 +37,7 @@ class PALPATE_EXPORT Snapshot {
   std::uint64_t number() const;  ///< counts the publications of the OctreeBasedCD, from 1
   double time() const;           ///< as passed to publish()
 
-  bool contains(GeometryId) const;  ///< whether the snapshot has the geometry; any id is valid
+  bool has(GeometryId) const;  ///< whether the snapshot has the geometry; any id is valid
   /// L: the positions at the end and at the start of the step. As in OctreeBasedCD::positions(),
   /// they are in the body's frame, and empty for a shape. motion() brings them into the world.
   std::span<const Eigen::Vector3d> positions(GeometryId) const;

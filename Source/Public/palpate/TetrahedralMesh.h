@@ -23,14 +23,14 @@ struct TetrahedralSurface {
   std::span<const std::uint32_t> tetrahedra;
 };
 
-/// A point in a tetrahedral mesh. Its position is the weighted sum of the corners' positions.
+/// A point in a tetrahedral mesh. Its position is the weighted sum of its vertices' positions.
 ///
 /// Weights  at least 0; their sum is 1 within 2^-50. A weight is exactly 0 if the point is on the
-///          face without that corner. Each is within 2^-49 of its exact value.
+///          face without that vertex. Each is within 2^-49 of its exact value.
 struct TetrahedronPoint {
   std::uint32_t tetrahedron;      ///< its index in the mesh
-  Tetrahedron corners;            ///< its vertices
-  std::array<double, 4> weights;  ///< of the corners
+  Tetrahedron vertices;           ///< of the tetrahedron
+  std::array<double, 4> weights;  ///< of these vertices
   friend bool operator==(const TetrahedronPoint&, const TetrahedronPoint&) = default;
 };
 

@@ -15,7 +15,7 @@ enum class MethodReason {
   Requested,  ///< The pair's settings name the method. Also the value of a separated pair.
   // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
   Still,  ///< Nothing moves: Proximity, or Intersection for two meshes without a thickness.
-  /// All features move at most PairSettings::motionTolerance: Proximity. Features that may have
+  /// All features move at most AutoSettings::motionTolerance: Proximity. Features that may have
   /// touched in the step are reported by their impact even so.
   Slow,
   Fast,   ///< All or most features move further: Continuous.
@@ -95,7 +95,7 @@ struct Validity {
   /// Number of contacts that describe the step's end, by distance or by intersection.
   std::size_t atEnd = 0;
   /// Number of contacts that describe an impact. Both numbers are 0 with
-  /// PairSettings::earliestTimeOnly, which gives no contacts.
+  /// ContinuousSettings::earliestTimeOnly, which gives no contacts.
   std::size_t atImpact = 0;
 
   /// L: upper bound on the motion of any two features in the step, relative to each other. Of a

@@ -207,10 +207,11 @@ void expectPossible(Call call) {
   refuse({.method = Method::Proximity, .thickness = -0.0},
          {ErrorCode::InvalidSettings, {"Proximity", "thickness"}});
   for (Method method : {Method::Auto, Method::Proximity, Method::Intersection})
-    refuse({.method = method, .thickness = 1, .earliestTimeOnly = true},
+    refuse({.method = method, .thickness = 1, .continuous = {.earliestTimeOnly = true}},
            {ErrorCode::InvalidSettings, {"earliestTimeOnly", "Continuous"}});
   for (const double bad : {0.0, 0x1p-51, 1.5, -1.0, kNan})
-    refuse({.timeTolerance = bad}, {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
+    refuse({.continuous = {.timeTolerance = bad}},
+           {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
   refuse({.method = static_cast<Method>(99), .thickness = 1}, {ErrorCode::InvalidSettings, {}});
   refuse({.thickness = 1, .contacts = static_cast<Contacts>(99)}, {ErrorCode::InvalidSettings, {}});
 }

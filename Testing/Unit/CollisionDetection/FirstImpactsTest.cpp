@@ -30,7 +30,7 @@ using FeaturePair = std::pair<VertexSet, VertexSet>;
 VertexSet verticesOf(const VertexTriangleContact& c) {
   VertexSet vertices;
   for (int i = 0; i < 3; ++i)
-    if (c.barycentric[i] != 0.0) vertices.insert(c.corners[i]);
+    if (c.weights[i] != 0.0) vertices.insert(c.vertices[i]);
   return vertices;
 }
 
@@ -137,10 +137,10 @@ std::vector<Named> namedOf(const CollisionData& data, const std::array<Moving, 2
     } else {
       const bool swapped = impact.list == 1;
       const auto& c = (swapped ? data.triangleVertex() : data.vertexTriangle())[impact.index];
-      const VertexSet vertex{c.vertex}, corners(c.corners.begin(), c.corners.end());
+      const VertexSet vertex{c.vertex}, corners(c.vertices.begin(), c.vertices.end());
       const Positions &own = pair[swapped].now, &other = pair[!swapped].now;
       std::array<Vector3d, 2> points{own[c.vertex], Vector3d::Zero()};
-      for (int i = 0; i < 3; ++i) points[1] += c.barycentric[i] * other[c.corners[i]];
+      for (int i = 0; i < 3; ++i) points[1] += c.weights[i] * other[c.vertices[i]];
       if (swapped) std::swap(points[0], points[1]);
       all.push_back({swapped ? FeaturePair{corners, vertex} : FeaturePair{vertex, corners},
                      impact.features, swapped ? Vector3d(-c.normal) : c.normal, c.timeOfImpact,
@@ -187,7 +187,7 @@ struct Sides {
   bool standsFor(const Named& s, const Named& c, const std::vector<Named>& proper,
                  const PairSettings& pair) const {
     const bool isInTime = ofOther(s.closest).size() == 3
-                              ? s.time <= c.time + pair.timeTolerance
+                              ? s.time <= c.time + pair.continuous.timeTolerance
                               : std::tie(s.time, s.distance) < std::tie(c.time, c.distance);
     if (!isInTime || !areOfOne(s, c)) return false;
     const Vector3d up = upOf(s);

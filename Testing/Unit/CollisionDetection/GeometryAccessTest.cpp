@@ -24,15 +24,15 @@ Positions copyOf(std::span<const Vector3d> positions) {
 
 TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
   OctreeBasedCD collisions;
-  EXPECT_FALSE(collisions.contains(GeometryId{0}));
+  EXPECT_FALSE(collisions.has(GeometryId{0}));
   const Mesh mesh = sheet(2, 0.5, 0.0);
   const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
                    b = collisions.addAnalyticalGeometry(Sphere{});
-  EXPECT_TRUE(collisions.contains(a) && collisions.contains(b));
+  EXPECT_TRUE(collisions.has(a) && collisions.has(b));
   collisions.removeGeometry(a);
-  EXPECT_FALSE(collisions.contains(a));
-  EXPECT_TRUE(collisions.contains(b));
-  EXPECT_FALSE(collisions.contains(GeometryId{7}));
+  EXPECT_FALSE(collisions.has(a));
+  EXPECT_TRUE(collisions.has(b));
+  EXPECT_FALSE(collisions.has(GeometryId{7}));
   expectRefused(ErrorCode::UnknownGeometry, "geometry 0 was removed",
                 [&] { (void)collisions.vertexCount(a); });
 }

@@ -116,7 +116,8 @@ TEST(Range, OfRadiiTransformsAndSettings) {
   expectLimit(InvalidSettings, "thickness is",
               [&](double x) { collisions.setPairSettings(placed, other, {.thickness = x}); });
   expectLimit(InvalidSettings, "motionTolerance is", [&](double x) {
-    collisions.setPairSettings(placed, other, {.thickness = 1, .motionTolerance = x});
+    collisions.setPairSettings(placed, other,
+                               {.thickness = 1, .automatic = {.motionTolerance = x}});
   });
   expectLimit(InvalidSettings, "allowedError is",
               [&](double x) { collisions.setPairSettings(placed, other, {.allowedError = x}); });

@@ -379,7 +379,7 @@ TEST(Rigid, FlatBodiesTouchInOneFrame) {
 TEST(Rigid, NearMissesMatchBruteForce) {
   Random random(9);
   PairSettings pair{Method::Continuous, 0.01, Contacts::All};
-  pair.timeTolerance = 0.5;
+  pair.continuous.timeTolerance = 0.5;
   std::size_t contacts = 0;
   for (int repeat = 0; repeat < casesOf(150); ++repeat) {
     const TestGeometry first = testGeometry(soup(random, 60, 0.3)),
@@ -752,7 +752,7 @@ TEST(Rigid, InsideVerticesMatchSetPositions) {
         EXPECT_EQ(other[i].vertex, found[0][i].vertex);
         EXPECT_EQ(other[i].triangle, found[0][i].triangle);
         EXPECT_EQ(other[i].depth, found[0][i].depth);
-        EXPECT_EQ(other[i].barycentric, found[0][i].barycentric);
+        EXPECT_EQ(other[i].weights, found[0][i].weights);
       }
     }
   }

@@ -135,7 +135,7 @@ Bounds distanceAt(const MovingShape& a, const MovingShape& b, double t, double e
 
 PairSettings continuousPair(double thickness, double timeTolerance = 1e-6) {
   PairSettings pair{Method::Continuous, thickness};
-  pair.timeTolerance = timeTolerance;
+  pair.continuous.timeTolerance = timeTolerance;
   return pair;
 }
 
@@ -168,7 +168,8 @@ std::optional<ShapeShapeContact> contactOf(const CollisionData& data) {
 /// Expects that a contact within the step has its stated distance, between points of both shapes.
 void expectContact(const MovingShape& a, const MovingShape& b, const ShapeShapeContact& c,
                    const PairSettings& pair) {
-  const double motion = a.motion() + b.motion(), early = pair.timeTolerance * motion + 1e-12;
+  const double motion = a.motion() + b.motion(),
+               early = pair.continuous.timeTolerance * motion + 1e-12;
   EXPECT_NEAR(c.normal.norm(), 1, 1e-13);
   EXPECT_LE((c.pointA - c.pointB - c.distance * c.normal).norm(), 1e-12);
   EXPECT_LE(c.distance, pair.thickness + early);
@@ -206,7 +207,7 @@ void expectTrueContacts(const MovingShape& a, const MovingShape& b, const PairSe
   if (c && time > 0) expectContact(a, b, *c, pair);
   if (c && time == 0) {
     EXPECT_LE(distanceAt(a, b, 0, pair.thickness + 1e-9).lower,
-              pair.thickness + pair.timeTolerance * (a.motion() + b.motion()) + 1e-9);
+              pair.thickness + pair.continuous.timeTolerance * (a.motion() + b.motion()) + 1e-9);
   }
   constexpr int kSamples = 25;
   for (int i = 0; i <= kSamples && time > 0; ++i) {
@@ -226,7 +227,7 @@ void expectTrueContacts(const MovingShape& a, const MovingShape& b, const PairSe
   }
   EXPECT_EQ(answer(a, b, pair, Engine::BruteForce).hash(), data.hash());
   PairSettings earliest = pair;
-  earliest.earliestTimeOnly = true;
+  earliest.continuous.earliestTimeOnly = true;
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     const CollisionData only = answer(a, b, earliest, engine);
     EXPECT_TRUE(only.shapeShape().empty());

@@ -29,16 +29,10 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Transform {
-  Matrix3d rotation = Matrix3d::Identity();
-  Vector3d translation = Vector3d::Zero();
-  Vector3d operator()(const Vector3d& p) const { return rotation * p + translation; }
-};
-
 /// A shape at both ends of a step.
 struct Tool {
   AnalyticalGeometry geometry;
-  std::array<Transform, 2> ends;
+  std::array<Pose, 2> ends;
 
   /// A point of its frame at a time. It moves linearly.
   Vector3d at(const Vector3d& p, double t) const { return (1 - t) * ends[0](p) + t * ends[1](p); }
@@ -170,8 +164,7 @@ CollisionData answer(const Settings& settings, const Moving& body, const Tool& t
   const GeometryId mesh = body.geometry.addTo(collisions),
                    shape = collisions.addAnalyticalGeometry(tool.geometry);
   collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
-  collisions.setTransform(shape, {tool.ends[0].rotation, tool.ends[0].translation},
-                          {tool.ends[1].rotation, tool.ends[1].translation});
+  collisions.setPose(shape, tool.ends[0], tool.ends[1]);
   collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
@@ -179,7 +172,7 @@ CollisionData answer(const Settings& settings, const Moving& body, const Tool& t
 
 PairSettings continuous(double thickness, double timeTolerance = 1e-6) {
   PairSettings pair{Method::Continuous, thickness};
-  pair.timeTolerance = timeTolerance;
+  pair.continuous.timeTolerance = timeTolerance;
   return pair;
 }
 
@@ -207,7 +200,7 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
     motion = std::max(motion, (body.now[v] - body.geometry.positions[v]).norm());
   for (const Vector3d& p : {Vector3d(-2, -2, -2), Vector3d(2, 2, 2), Vector3d(2, -2, 2)})
     motion += (tool.ends[1](p) - tool.ends[0](p)).norm();
-  const double early = pair.timeTolerance * motion + 1e-9;
+  const double early = pair.continuous.timeTolerance * motion + 1e-9;
   for (const ShapeContact& c : data.shape()) {
     ++tally.contacts;
     tally.within += c.timeOfImpact > 0;
@@ -259,15 +252,19 @@ void expectDistinct(const CollisionData& all, const CollisionData& distinct, con
   for (const auto& [p, q] : body.geometry.segments) elements.push_back({p, q, q});
   const auto& [start, end] = tool.ends;
   std::vector<ConstraintRow> rows;
-  appendRows(all, {0, body.geometry.positions, body.now}, {}, rows,
-             {start.rotation, start.translation, end.rotation, end.translation});
+  appendRows(all, {0, body.geometry.positions, body.now}, {}, rows, {start, end});
   std::vector<double> gaps;
   for (const ConstraintRow& row : rows) gaps.push_back(row.gap(body.now));
   const PlacedShape atStart{tool.geometry, start.rotation, start.translation},
       atEnd{tool.geometry, end.rotation, end.translation};
-  const DistinctTruth truth{body.geometry.positions, body.now,          elements,
-                            body.geometry.radii[0],  atStart,           atEnd,
-                            pair.thickness,          pair.timeTolerance};
+  const DistinctTruth truth{body.geometry.positions,
+                            body.now,
+                            elements,
+                            body.geometry.radii[0],
+                            atStart,
+                            atEnd,
+                            pair.thickness,
+                            pair.continuous.timeTolerance};
   const std::vector<char> stays = std::holds_alternative<Plane>(tool.geometry)
                                       ? std::vector<char>(gaps.size(), true)
                                       : truth.kept(all.shape(), gaps);
@@ -282,7 +279,7 @@ void expectDistinct(const CollisionData& all, const CollisionData& distinct, con
         if (holds(part, c.vertices)) first = std::min(first, c.timeOfImpact);
       return first;
     };
-    EXPECT_LE(firstOf(distinct), firstOf(all) + pair.timeTolerance);
+    EXPECT_LE(firstOf(distinct), firstOf(all) + pair.continuous.timeTolerance);
   }
 }
 
@@ -357,7 +354,7 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
                         .hash(),
                     data.hash());
         PairSettings earliest = pair;
-        earliest.earliestTimeOnly = true;
+        earliest.continuous.earliestTimeOnly = true;
         const CollisionData only = answer(settingsOf(Engine::Octree, 2), body, tool, earliest);
         EXPECT_TRUE(only.shape().empty());
         EXPECT_EQ(only.earliestTimeOfImpact(), all.earliestTimeOfImpact());
@@ -567,13 +564,13 @@ TEST(ShapeSteps, CapturesAndAuditIncludeThem) {
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& geometry : geometries(random)) {
     tools.push_back(collisions.addAnalyticalGeometry(geometry));
-    collisions.setTransform(tools.back(), {randomTurn(random), randomPoint(random, -1, 1)});
+    collisions.setPose(tools.back(), {randomTurn(random), randomPoint(random, -1, 1)});
     collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
   }
   collisions.detectCollision();
   collisions.advance();
   for (const GeometryId tool : tools)
-    collisions.setTransform(tool, {randomTurn(random), randomPoint(random, -1, 1)});
+    collisions.setPose(tool, {randomTurn(random), randomPoint(random, -1, 1)});
   collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());

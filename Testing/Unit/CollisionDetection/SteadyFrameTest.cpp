@@ -108,9 +108,10 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
       // It has edges many times those of its small triangles. Each frame takes half a second and is
       // exact.
       if (scene.name == "uneven triangles" && tolerance * thickness > 0.5) continue;
-      const LastPass pass = lastPass(scene, {.threads = 1},
-                                     {.thickness = thickness * scene.thickness,
-                                      .motionTolerance = tolerance * scene.thickness});
+      const LastPass pass =
+          lastPass(scene, {.threads = 1},
+                   {.thickness = thickness * scene.thickness,
+                    .automatic = {.motionTolerance = tolerance * scene.thickness}});
       EXPECT_EQ(pass.allocations, 0u)
           << scene.name << ", thickness " << thickness << ", tolerance " << tolerance;
       reasons.insert(pass.reasons.begin(), pass.reasons.end());

@@ -211,7 +211,9 @@ TEST(Audit, FindsEachRemovedAddedOrChangedContact) {
 TEST(Audit, FindsAnImpactBeforeTheEarliest) {
   Random random(4);
   const Scene scene(
-      random, {.method = Method::Continuous, .thickness = 0.001, .earliestTimeOnly = true}, false);
+      random,
+      {.method = Method::Continuous, .thickness = 0.001, .continuous = {.earliestTimeOnly = true}},
+      false);
   CollisionData::Contents contents = scene.found();
   EXPECT_TRUE(scene.failures(contents).empty());
   const double earliest = contents.earliestTimeOfImpact;
@@ -293,7 +295,7 @@ TEST(Audit, ComparesWithAutoWhatKnownSidesDoNotConcern) {
       return any(c->edgeA, ofA) || any(c->edgeB, ofB);
     const auto& c = std::get<VertexTriangleContact>(failure.expected);
     const bool swapped = failure.list == List::TriangleVertex;
-    return (swapped ? ofB : ofA).contains(c.vertex) || any(c.corners, swapped ? ofA : ofB);
+    return (swapped ? ofB : ofA).contains(c.vertex) || any(c.vertices, swapped ? ofA : ofB);
   };
   std::vector<AuditFailure> expected = missing(false);
   const std::size_t all = expected.size();

@@ -86,8 +86,10 @@ void expectSame(const CollisionProblem& l, const CollisionProblem& r) {
     EXPECT_EQ(l.pairs[i].method, r.pairs[i].method);
     EXPECT_EQ(l.pairs[i].settings.method, r.pairs[i].settings.method);
     EXPECT_EQ(l.pairs[i].settings.thickness, r.pairs[i].settings.thickness);
-    EXPECT_EQ(l.pairs[i].settings.motionTolerance, r.pairs[i].settings.motionTolerance);
-    EXPECT_EQ(l.pairs[i].settings.timeTolerance, r.pairs[i].settings.timeTolerance);
+    EXPECT_EQ(l.pairs[i].settings.automatic.motionTolerance,
+              r.pairs[i].settings.automatic.motionTolerance);
+    EXPECT_EQ(l.pairs[i].settings.continuous.timeTolerance,
+              r.pairs[i].settings.continuous.timeTolerance);
     EXPECT_EQ(l.pairs[i].settings.contacts, r.pairs[i].settings.contacts);
   }
 }
@@ -106,7 +108,7 @@ OctreeBasedCD movedScene() {
   const GeometryId b = detection.addTriangleMesh(second.positions, second.triangles);
   detection.removeGeometry(removed);
   detection.addCollisionPair(
-      b, a, {.thickness = 0.1, .contacts = Contacts::All, .timeTolerance = 0x1p-9});
+      b, a, {.thickness = 0.1, .contacts = Contacts::All, .continuous = {.timeTolerance = 0x1p-9}});
   detection.addCollisionPair(a, a);
   detection.detectCollision();
   detection.advance();
@@ -285,20 +287,22 @@ TEST_F(Capture, ReadsEarlierVersions) {
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2\n",
              " 1.0c6f7a0b5ed8dp-20 0\n");  // allowedError, widestNormalCone
   EXPECT_EQ(asVersion(10).pairs[0].settings.allowedError, 0.0);
-  EXPECT_EQ(asVersion(10).pairs[0].settings.widestNormalCone, PairSettings().widestNormalCone);
+  EXPECT_EQ(asVersion(10).pairs[0].settings.proxy.widestNormalCone,
+            PairSettings().proxy.widestNormalCone);
   replaceAll(" Auto Box\n", " Auto\n");  // bounds
   EXPECT_EQ(asVersion(9).settings.octree.bounds, OctreeBounds::Box);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0\n", " 1.0c6f7a0b5ed8dp-20\n");  // earliestTimeOnly
   const std::string version8 = text;
-  EXPECT_FALSE(asVersion(8).pairs[0].settings.earliestTimeOnly);
+  EXPECT_FALSE(asVersion(8).pairs[0].settings.continuous.earliestTimeOnly);
   text = version8;
   const std::string pair = "pair 0 1 Auto Proximity 1.999999999999ap-4 ";
   replaceAll(pair + "Distinct", "pair 0 1 Continuous Continuous 1.999999999999ap-4 Earliest");
-  EXPECT_TRUE(asVersion(8).pairs[0].settings.earliestTimeOnly);
+  EXPECT_TRUE(asVersion(8).pairs[0].settings.continuous.earliestTimeOnly);
   text = version8;
   replaceAll(" Both 0 0 0\n", " Both 0 0\n");  // tetrahedra
   replaceAll(" 1.0c6f7a0b5ed8dp-20\n", "\n");  // timeTolerance
-  EXPECT_EQ(asVersion(5).pairs[0].settings.timeTolerance, PairSettings().timeTolerance);
+  EXPECT_EQ(asVersion(5).pairs[0].settings.continuous.timeTolerance,
+            PairSettings().continuous.timeTolerance);
   replaceAll(" 0 1 4294967295 Both 0 0\n", " 0\n");  // filters, rest
   replaceAll(" 0p+0 0\n", " 0p+0\n");                // predicate
   EXPECT_EQ(asVersion(3).geometries[0].filter, CollisionFilter());
@@ -308,7 +312,8 @@ TEST_F(Capture, ReadsEarlierVersions) {
   replaceAll(" -1p+0\n", "\n");  // tolerance
   const CollisionProblem read = asVersion(1);
   EXPECT_EQ(read.pairs[0].settings.method, Method::Proximity);  // methods that Auto chose
-  EXPECT_EQ(read.pairs[0].settings.motionTolerance, PairSettings().motionTolerance);
+  EXPECT_EQ(read.pairs[0].settings.automatic.motionTolerance,
+            PairSettings().automatic.motionTolerance);
 }
 
 /// Nothing is written that cannot be read.

@@ -313,7 +313,7 @@ void append(Bits& bits, const Vector3d& value) {
 /// With weights in the order of corners a, b, c.
 Bits bitsOf(const VertexTriangleDistance& d, const std::array<int, 3>& order = {0, 1, 2}) {
   Bits bits;
-  for (const int i : order) append(bits, d.barycentric[i]);
+  for (const int i : order) append(bits, d.weights[i]);
   append(bits, d.difference);
   if (d.distance > 0.0) append(bits, d.normal);
   append(bits, d.distance);
@@ -493,9 +493,9 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
     ++shared;
     Bits leftBits, rightBits;
     append(leftBits, left.difference);
-    append(leftBits, left.barycentric[0]);
+    append(leftBits, left.weights[0]);
     append(rightBits, right.difference);
-    append(rightBits, right.barycentric[1]);
+    append(rightBits, right.weights[1]);
     ASSERT_EQ(leftBits, rightBits);
   }
   EXPECT_GT(shared, 100);

@@ -56,7 +56,7 @@ class FeaturesAtTime {
       difference = between(u, m_x[0], m_x[1]) - between(v, m_x[2], m_x[3]);
     } else {
       const auto distance = vertexTriangleDistance(p, q, r, s);
-      const Rational u(finite(distance.barycentric[1])), v(finite(distance.barycentric[2]));
+      const Rational u(finite(distance.weights[1])), v(finite(distance.weights[2]));
       valid = u >= 0 && v >= 0 && u + v <= 1;
       difference = m_x[0] - (m_x[1] + u * (m_x[2] - m_x[1]) + v * (m_x[3] - m_x[1]));
     }

@@ -47,7 +47,7 @@ inline Errors checkVertexTriangle(const Four& x) {
   Vector difference = toRational(x[0]);
   Rational sum = 0;
   for (int i = 0; i < 3; ++i) {
-    const Rational weight(answer.barycentric[i]);
+    const Rational weight(answer.weights[i]);
     EXPECT_TRUE(weight >= 0);
     sum += weight;
     difference = difference - weight * toRational(x[i + 1]);

@@ -100,7 +100,7 @@ TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
             finiteVertexTriangleDistance(p, x[k][1], x[k][2], x[k][3]);
         const VertexTriangleDistance found = lanes[k];
         ASSERT_EQ(found.feature, expected.feature) << path << i;
-        ASSERT_TRUE(isSame(found.barycentric, expected.barycentric)) << path << i;
+        ASSERT_TRUE(isSame(found.weights, expected.weights)) << path << i;
         ASSERT_TRUE(isSame(found.difference, expected.difference)) << path << i;
         ASSERT_TRUE(isSame(found.normal, expected.normal)) << path << i;
         ASSERT_TRUE(isSame(found.distance, expected.distance)) << path << i;

@@ -256,7 +256,7 @@ TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   collisions.setPairSettings(a, b, {Method::Auto, 0.1, Contacts::Distinct, 0.25});
   EXPECT_THROW(
       collisions.setPairSettings(a, b, {Method::Continuous, 0.1, Contacts::Distinct, 0.25}), Error);
-  EXPECT_EQ(collisions.pairs()[0].settings.motionTolerance, 0.25);
+  EXPECT_EQ(collisions.pairs()[0].settings.automatic.motionTolerance, 0.25);
 }
 
 /// A first pair of a new user: a suture against itself and against an organ, with default settings.

@@ -199,8 +199,8 @@ TEST(Continuous, ContactsBesideATouchAreReplacedByTheirImpacts) {
                      b = meshOf(ground, ground, {{0, 1, 2}});
   const VertexTriangleContact atEnd{.vertex = 0,
                                     .triangle = 0,
-                                    .corners = {0, 1, 2},
-                                    .barycentric = {0.25, 0.25, 0.5},
+                                    .vertices = {0, 1, 2},
+                                    .weights = {0.25, 0.25, 0.5},
                                     .normal = {0, 0, -1},
                                     .distance = 0.25,
                                     .timeOfImpact = 1.0};
@@ -300,7 +300,7 @@ TEST(Continuous, VertexContactsHaveTheirPointAndSide) {
     EXPECT_LE(contact.timeOfImpact, 0.75);
     EXPECT_GE(contact.timeOfImpact, 0.75 - 1e-6);
     EXPECT_LE((contact.normal - Vector3d(0, 0, side)).norm(), 1e-15);
-    EXPECT_LE((contact.barycentric - Vector3d(0.625, 0.25, 0.125)).norm(), 1e-12);
+    EXPECT_LE((contact.weights - Vector3d(0.625, 0.25, 0.125)).norm(), 1e-12);
     EXPECT_LE(contact.distance, 4e-6);
 
     ContactBuffers swapped{}, thick{};

@@ -84,7 +84,7 @@ std::vector<PairSettings> everyMethod(double thickness) {
   for (const MethodCase& method : methodCases(thickness)) all.push_back(method.settings);
   for (const double tolerance : {0.0, 0.02, 1.0}) {
     PairSettings automatic{Method::Auto, thickness, Contacts::Distinct};
-    automatic.motionTolerance = tolerance;
+    automatic.automatic.motionTolerance = tolerance;
     all.push_back(automatic);
   }
   return all;
@@ -457,7 +457,7 @@ TEST(Filters, CapturesAndAuditIncludeThem) {
     for (const CollisionPair& p : detection.pairs())
       expectSameRows(Rows(again.collisionData(p.a, p.b)), Rows(detection.collisionData(p.a, p.b)));
     EXPECT_GT(detection.statistics().contacts + detection.statistics().intersectingTriangles +
-                  (pair.earliestTimeOnly),
+                  (pair.continuous.earliestTimeOnly),
               0u);
     // The file does not contain a predicate, but says that there was one. The audit calls it.
     detection.setContactPredicate(b, a, hashed);

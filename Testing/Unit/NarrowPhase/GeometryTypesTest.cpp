@@ -94,9 +94,8 @@ std::set<Ids> expectedVertexTriangle(const TestGeometry& vertices, const TestGeo
       if (&vertices == &others && !(v < t)) continue;
       const VertexTriangleDistance d =
           vertexTriangleDistance(vertices.positions[v], at(i), at(j), at(k));
-      const double radius = d.barycentric[0] * others.radius(i) +
-                            d.barycentric[1] * others.radius(j) +
-                            d.barycentric[2] * others.radius(k);
+      const double radius = d.weights[0] * others.radius(i) + d.weights[1] * others.radius(j) +
+                            d.weights[2] * others.radius(k);
       if (d.distance - (vertices.radius(v) + radius) <= thickness)
         ids.insert(ofSecond ? Ids{t, v} : Ids{v, t});
     }
@@ -271,8 +270,8 @@ TEST(GeometryTypes, SwappingPointSetsReversesTheirContacts) {
     ASSERT_NE(twin, back.vertexTriangle().end());
     EXPECT_EQ(twin->distance, c.distance);
     EXPECT_EQ(twin->normal, -c.normal);
-    EXPECT_EQ(c.barycentric, Vector3d(1, 0, 0));
-    EXPECT_EQ(c.corners, (Triangle{c.triangle, c.triangle, c.triangle}));
+    EXPECT_EQ(c.weights, Vector3d(1, 0, 0));
+    EXPECT_EQ(c.vertices, (Triangle{c.triangle, c.triangle, c.triangle}));
   }
 }
 
@@ -354,13 +353,13 @@ TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
   const CollisionData data = answer(drops, thread, near);
   ASSERT_EQ(data.vertexTriangle().size(), 3u);
   const VertexTriangleContact &over = data.vertexTriangle()[0], &corner = data.vertexTriangle()[1];
-  EXPECT_EQ(over.corners, (Triangle{0, 1, 1}));
-  EXPECT_EQ(over.barycentric, Vector3d(0.75, 0.25, 0));
+  EXPECT_EQ(over.vertices, (Triangle{0, 1, 1}));
+  EXPECT_EQ(over.weights, Vector3d(0.75, 0.25, 0));
   EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
   EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
   EXPECT_EQ(corner.triangle,
             0u);  // of the two segments at the corner, the one with the lower index
-  EXPECT_EQ(corner.barycentric[0], 0.0);
+  EXPECT_EQ(corner.weights[0], 0.0);
   EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
             4u);
   const CollisionData self = answer(drops, drops, near);
@@ -475,8 +474,8 @@ TEST(GeometryTypes, DegeneratePointsMatchBruteForce) {
         EXPECT_TRUE(data.validity().degenerateTrianglesB.empty());
         for (const auto& c : data.vertexTriangle()) {
           EXPECT_NEAR(c.normal.norm(), 1.0, 1e-15);
-          EXPECT_EQ(c.barycentric.sum(), 1.0);
-          EXPECT_GE(c.barycentric.minCoeff(), 0.0);
+          EXPECT_EQ(c.weights.sum(), 1.0);
+          EXPECT_GE(c.weights.minCoeff(), 0.0);
         }
       }
   }

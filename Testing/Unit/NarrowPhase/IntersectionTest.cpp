@@ -43,8 +43,8 @@ using Rows = std::map<Row, Row>;
 Rows rowsOf(const Buffer<VertexTriangleContact>& contacts) {
   Rows rows;
   for (const VertexTriangleContact& c : contacts) {
-    Row bits{c.corners[0], c.corners[1], c.corners[2]};
-    append(bits, c.barycentric);
+    Row bits{c.vertices[0], c.vertices[1], c.vertices[2]};
+    append(bits, c.weights);
     append(bits, c.normal);
     append(bits, c.distance);
     EXPECT_EQ(rows.try_emplace({c.vertex, c.triangle}, bits).first->second, bits);
@@ -128,7 +128,7 @@ TEST(IntersectionRegression, VertexExactlyOnAFace) {
   const ContactBuffers found = contactsOf(meshOf(standing), meshOf(kGround));
   EXPECT_EQ(found.vertexTriangle[0].distance, 0);
   EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
-  EXPECT_TRUE(found.vertexTriangle[0].barycentric.isApprox(Vector3d(0.5, 0.25, 0.25), 1e-15));
+  EXPECT_TRUE(found.vertexTriangle[0].weights.isApprox(Vector3d(0.5, 0.25, 0.25), 1e-15));
 }
 
 TEST(IntersectionRegression, EdgesShorterThanTwentyMillionths) {
@@ -168,7 +168,7 @@ TEST(Intersection, NormalsOfEdgesPointToTheSideOfTheWindingNormal) {
   const Corners slanted{{{1, -3, -4}, {1, 3, 2}, {1.5, 3, 2}}};
   const ContactBuffers found = contactsOf(meshOf(slanted), meshOf(kGround));
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
-  EXPECT_EQ(found.vertexTriangle[0].barycentric, Vector3d(0.75, 0.25, 0));
+  EXPECT_EQ(found.vertexTriangle[0].weights, Vector3d(0.75, 0.25, 0));
   EXPECT_EQ(found.vertexTriangle[0].distance, -5);
   EXPECT_TRUE(found.vertexTriangle[0].normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-15));
 }
@@ -190,7 +190,7 @@ TEST(Intersection, EveryTouchingPairHasContactsWithUnitNormals) {
     for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
       for (const VertexTriangleContact& c : *list) {
         ASSERT_NEAR(c.normal.norm(), 1, 1e-15) << repeat;
-        ASSERT_EQ(c.barycentric.sum(), 1) << repeat;
+        ASSERT_EQ(c.weights.sum(), 1) << repeat;
       }
     for (const EdgeEdgeContact& c : found.edgeEdge) ASSERT_NEAR(c.normal.norm(), 1, 1e-15);
     expectSwaps(found, contactsOf(b, a));

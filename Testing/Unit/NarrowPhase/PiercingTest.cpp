@@ -77,7 +77,7 @@ TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector
 Vector3d weightedSum(const VertexTriangleContact& c, const TriangleMesh& vertices,
                      const TriangleMesh& triangles) {
   Vector3d sum = vertices.now[c.vertex];
-  for (int i = 0; i < 3; ++i) sum -= c.barycentric[i] * triangles.now[c.corners[i]];
+  for (int i = 0; i < 3; ++i) sum -= c.weights[i] * triangles.now[c.vertices[i]];
   return sum;
 }
 
@@ -118,7 +118,7 @@ TEST(Piercing, ATipBelowAndBeyondTheBorderLeavesTowardsIt) {
   EXPECT_TRUE(edge.normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-14));
   const VertexTriangleContact corner = contactOfTip({-0.02, -0.01, -0.02}, 2);
   EXPECT_EQ(corner.feature, TriangleFeature::CornerA);
-  EXPECT_EQ(corner.corners[0], 0u);
+  EXPECT_EQ(corner.vertices[0], 0u);
   EXPECT_NEAR(corner.distance, -0.03, 1e-16);
   EXPECT_TRUE(corner.normal.isApprox(Vector3d(2, 1, 2) / 3, 1e-14));
 }
@@ -143,7 +143,7 @@ TEST(Piercing, ANeedleThroughABarHasNoEndBehindIt) {
   EXPECT_FALSE(found.intersectingTriangles.empty());
   for (const VertexTriangleContact& c : found.vertexTriangle) {
     const double z = needle.now[c.vertex].z();
-    const bool isTop = bar.now[c.corners[0]].z() == 0.2 && bar.now[c.corners[1]].z() == 0.2;
+    const bool isTop = bar.now[c.vertices[0]].z() == 0.2 && bar.now[c.vertices[1]].z() == 0.2;
     EXPECT_EQ(c.distance < 0, (z < 0) == isTop);
   }
 }

@@ -65,8 +65,8 @@ void append(Row& row, const Vector3d& value) {
 }
 
 Row rowOf(const VertexTriangleContact& c) {
-  Row row{c.vertex, c.triangle, c.corners[0], c.corners[1], c.corners[2]};
-  append(row, c.barycentric);
+  Row row{c.vertex, c.triangle, c.vertices[0], c.vertices[1], c.vertices[2]};
+  append(row, c.weights);
   append(row, c.normal);
   append(row, c.distance);
   append(row, c.timeOfImpact);
@@ -389,7 +389,7 @@ Vector3d mappedNormal(const Vector3d& normal, double distance, bool mirrored) {
 Row unorderedRowOf(const VertexTriangleContact& c, bool mirrored, double scale) {
   Row row{c.vertex, c.triangle};
   std::array<std::pair<std::uint32_t, double>, 3> corners;
-  for (int i = 0; i < 3; ++i) corners[i] = {c.corners[i], c.barycentric[i]};
+  for (int i = 0; i < 3; ++i) corners[i] = {c.vertices[i], c.weights[i]};
   std::sort(corners.begin(), corners.end());
   for (const auto& [corner, weight] : corners) {
     row.push_back(corner);

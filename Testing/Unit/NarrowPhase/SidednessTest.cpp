@@ -71,8 +71,8 @@ struct Touch {
 Touch touchOf(const VertexTriangleContact& c, const Mesh& body) {
   Touch touch{rowOf<true>(c), Vector3d::Zero(), c.normal, {}};
   for (int i = 0; i < 3; ++i) {
-    touch.place += c.barycentric[i] * body.positions[c.corners[i]];
-    if (c.barycentric[i] > 0) touch.vertices.insert(c.corners[i]);
+    touch.place += c.weights[i] * body.positions[c.vertices[i]];
+    if (c.weights[i] > 0) touch.vertices.insert(c.vertices[i]);
   }
   return touch;
 }
@@ -239,7 +239,7 @@ TEST(Sidedness, EveryMethodMatchesBruteForce) {
     for (const MethodCase& method : methodCases(0.05)) methods.push_back(method.settings);
     for (const double tolerance : {0.0, 0.05, 1.0}) {
       methods.push_back({Method::Auto, 0.05, Contacts::All});
-      methods.back().motionTolerance = tolerance;
+      methods.back().automatic.motionTolerance = tolerance;
     }
     std::set<Row> impacts;
     for (const PairSettings& pair : methods) {

@@ -34,7 +34,7 @@ PairRun runOf(const Settings& settings, const PairSettings& pair, const Moving& 
 }
 
 double exactTime(const VertexTriangleContact& c, const Moving& vertex, const Moving& triangle) {
-  const auto [i, j, k] = c.corners;
+  const auto [i, j, k] = c.vertices;
   const Positions &v = vertex.mesh.positions, &t = triangle.mesh.positions;
   return *vertexTriangleTimeOfImpact(v[c.vertex], t[i], t[j], t[k], vertex.now[c.vertex],
                                      triangle.now[i], triangle.now[j], triangle.now[k],
@@ -68,8 +68,9 @@ TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   ASSERT_GT(truth.size(), 50u);
   for (const double tolerance : {0x1p-50, 1e-10, 1e-3, 0.25, 1.0}) {
     SCOPED_TRACE(tolerance);
-    const PairSettings settings{
-        .method = Method::Continuous, .contacts = Contacts::All, .timeTolerance = tolerance};
+    const PairSettings settings{.method = Method::Continuous,
+                                .contacts = Contacts::All,
+                                .continuous = {.timeTolerance = tolerance}};
     const PairRun run = runOf({}, settings, a, b);
     testing::expectSame(run.answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
@@ -86,7 +87,7 @@ TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
     for (const auto& c : data.triangleVertex()) expectTime(c.timeOfImpact, exactTime(c, b, a));
     for (const auto& c : data.edgeEdge()) expectTime(c.timeOfImpact, exactTime(c, a, b));
     PairSettings only = settings;
-    only.earliestTimeOnly = true;
+    only.continuous.earliestTimeOnly = true;
     EXPECT_EQ(runOf({}, only, a, b).data().earliestTimeOfImpact(), earliest);
   }
 }
@@ -100,7 +101,7 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
     const PairSettings settings{.method = Method::Continuous,
                                 .thickness = thickness,
                                 .contacts = Contacts::All,
-                                .timeTolerance = tolerance};
+                                .continuous = {.timeTolerance = tolerance}};
     const PairRun run = runOf({}, settings, a, b);
     testing::expectSame(run.answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
@@ -122,8 +123,9 @@ TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
   Random random(6);
   const Moving a = movingSoup(random), b = movingSoup(random);
   for (const double tolerance : {1e-10, 1e-3, 0.25}) {
-    const PairSettings settings{
-        .thickness = 0.1, .motionTolerance = 0.3, .timeTolerance = tolerance};
+    const PairSettings settings{.thickness = 0.1,
+                                .continuous = {.timeTolerance = tolerance},
+                                .automatic = {.motionTolerance = 0.3}};
     testing::expectSame(runOf({}, settings, a, b).answers(),
                         runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
   }
@@ -154,7 +156,8 @@ TEST(EarliestTime, IsFoundAmongManyLaterImpacts) {
     for (const int threads : {1, 2}) {
       OctreeBasedCD detection({.threads = threads});
       const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-      detection.addCollisionPair(id, id, {.method = Method::Continuous, .earliestTimeOnly = true});
+      detection.addCollisionPair(
+          id, id, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
       detection.setPositions(id, mesh.positions, now);
       detection.detectCollision();
       const double time = detection.collisionData(id, id).earliestTimeOfImpact();
@@ -188,7 +191,7 @@ TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {
                                      {.method = Method::Continuous,
                                       .thickness = thickness,
                                       .contacts = Contacts::All,
-                                      .earliestTimeOnly = earliestTimeOnly});
+                                      .continuous = {.earliestTimeOnly = earliestTimeOnly}});
           detection.setPositions(first, a.positions, nowA);
           if (!self) detection.setPositions(second, b.positions, nowB);
           detection.detectCollision();
@@ -222,7 +225,8 @@ TEST(EarliestTime, MatchesAllContactsOfAShapeBesideOtherPairs) {
   const GeometryId tissue = detection.addTriangleMesh(a.positions, a.triangles),
                    first = detection.addTriangleMesh(b.positions, b.triangles),
                    tool = detection.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.3, 0.3, 0.3}});
-  const PairSettings earliest{.method = Method::Continuous, .earliestTimeOnly = true};
+  const PairSettings earliest{.method = Method::Continuous,
+                              .continuous = {.earliestTimeOnly = true}};
   detection.addCollisionPair(tool, tissue, earliest);
   detection.addCollisionPair(first, first, earliest);
   detection.setTransform(tool, {Eigen::Matrix3d::Identity(), {0, 0, 0}});
@@ -247,7 +251,8 @@ TEST(EarliestTime, PredicateThatThrowsLeavesTheOctreesCorrect) {
   for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.02, 0.02);
   OctreeBasedCD detection({.threads = 1});
   const GeometryId id = detection.addTriangleMesh(a.positions, a.triangles);
-  detection.addCollisionPair(id, id, {.method = Method::Continuous, .earliestTimeOnly = true});
+  detection.addCollisionPair(
+      id, id, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
   int calls = 0, allowed = std::numeric_limits<int>::max();
   detection.setContactPredicate(id, id, [&](const ContactFeatures&) {
     if (++calls > allowed) throw std::runtime_error("enough");

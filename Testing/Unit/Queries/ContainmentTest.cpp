@@ -125,10 +125,10 @@ TEST(InsideVertices, MatchTheCellsWhereRaysHitEdgesAndCorners) {
       for (const InsideVertex& inside : insideVertices(points, body)) {
         EXPECT_TRUE(found.insert(inside.vertex).second);
         const Eigen::Vector3d& p = points.positions[inside.vertex];
-        const auto& [a, b, c] = inside.corners;
-        const Eigen::Vector3d exit = inside.barycentric[0] * body.positions[a] +
-                                     inside.barycentric[1] * body.positions[b] +
-                                     inside.barycentric[2] * body.positions[c];
+        const auto& [a, b, c] = inside.vertices;
+        const Eigen::Vector3d exit = inside.weights[0] * body.positions[a] +
+                                     inside.weights[1] * body.positions[b] +
+                                     inside.weights[2] * body.positions[c];
         EXPECT_NEAR((p + inside.depth * inside.direction - exit).norm(), 0, 1e-14);
         // The nearest of the lattice's points that are not inside is on the surface, or half a
         // cell from it along an axis.

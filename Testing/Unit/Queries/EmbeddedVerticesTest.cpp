@@ -98,7 +98,7 @@ TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
         const EmbeddedVertex& e = found[next++];
         EXPECT_EQ(e.vertex, v);
         EXPECT_EQ(e.at.tetrahedron, truth->tetrahedron);
-        EXPECT_EQ(e.at.corners, solid.tetrahedra[truth->tetrahedron]);
+        EXPECT_EQ(e.at.vertices, solid.tetrahedra[truth->tetrahedron]);
         std::int64_t sum = 0;
         for (const std::int64_t volume : truth->volumes) sum += volume;
         for (int i = 0; i < 4; ++i)
@@ -203,7 +203,7 @@ TEST(EmbeddedVertices, WeightsReproduceThePoint) {
     double one = 0;
     for (int i = 0; i < 4; ++i) {
       EXPECT_GE(at.weights[i], 0);
-      sum += at.weights[i] * solid.positions[at.corners[i]];
+      sum += at.weights[i] * solid.positions[at.vertices[i]];
       one += at.weights[i];
     }
     EXPECT_NEAR(one, 1, 0x1p-50);
@@ -225,7 +225,7 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
     EXPECT_EQ(found[i].at.tetrahedron, expected[i].at.tetrahedron);
     for (int k = 0; k < 4; ++k)
       for (int l = 0; l < 4; ++l)
-        if (found[i].at.corners[k] == expected[i].at.corners[l]) {
+        if (found[i].at.vertices[k] == expected[i].at.vertices[l]) {
           EXPECT_EQ(found[i].at.weights[k], expected[i].at.weights[l]);
         }
   }

@@ -99,8 +99,8 @@ void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
     const Vector3d &p = points[each.vertex], end = p + each.depth * each.direction;
     Vector3d point = Vector3d::Zero();
     for (int i = 0; i < 3; ++i) {
-      EXPECT_EQ(each.corners[i], mesh.triangles[each.triangle][i]);
-      point += each.barycentric[i] * mesh.positions[each.corners[i]];
+      EXPECT_EQ(each.vertices[i], mesh.triangles[each.triangle][i]);
+      point += each.weights[i] * mesh.positions[each.vertices[i]];
     }
     ASSERT_LT((point - end).norm(), 1e-12);
     ASSERT_LE(each.depth, boxes.depth(p, kSpacing) + 1e-12);

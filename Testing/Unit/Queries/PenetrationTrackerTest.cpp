@@ -110,9 +110,9 @@ Tally expectDefined(const Story& story, const Answers& all) {
                 TrackedVertex::kMaxDepthRatio * f.nearest.depth * (1 + kSlack));
       EXPECT_GE(f.penetration.depth, f.nearest.depth * (1 - kSlack));
       EXPECT_NEAR(f.penetration.direction.norm(), 1, 1e-12);
-      EXPECT_EQ(f.penetration.corners, story.triangles[f.penetration.triangle]);
+      EXPECT_EQ(f.penetration.vertices, story.triangles[f.penetration.triangle]);
       const Vector3d exit =
-          weighted(at(story, frame, f.penetration.corners), f.penetration.barycentric);
+          weighted(at(story, frame, f.penetration.vertices), f.penetration.weights);
       EXPECT_LT((p + f.penetration.depth * f.penetration.direction - exit).norm(), 1e-9);
       const auto before = last.find(f.penetration.vertex);
       EXPECT_EQ(f.change == DirectionChange::Entered, before == last.end());
@@ -121,12 +121,12 @@ Tally expectDefined(const Story& story, const Answers& all) {
       }
       if (before == last.end()) continue;
       const InsideVertex& old = before->second.penetration;
-      const Corners then = at(story, frame - 1, old.corners), now = at(story, frame, old.corners);
+      const Corners then = at(story, frame - 1, old.vertices), now = at(story, frame, old.vertices);
       const Eigen::Matrix3d turned = turn(then, now);
       const Vector3d direction = turned * old.direction,
-                     moved = (p - weighted(now, old.barycentric)) -
+                     moved = (p - weighted(now, old.weights)) -
                              turned * (story.points[frame - 1][f.penetration.vertex] -
-                                       weighted(then, old.barycentric));
+                                       weighted(then, old.weights));
       const double explained = moved.norm() / std::sqrt(old.depth * f.nearest.depth);
       const double excess = (f.penetration.direction - direction).norm() - explained,
                    nearestExcess = (f.nearest.direction - direction).norm() - explained;

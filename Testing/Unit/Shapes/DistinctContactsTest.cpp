@@ -215,8 +215,9 @@ TEST(DistinctContacts, MatchTheDefinition) {
           candidates.push_back(c);
           gaps.push_back(rows[i].gap(moved));
         }
-        const DistinctTruth truth{mesh.positions, moved, mesh.triangles, 0.0,
-                                  before,         now,   thickness,      settings.timeTolerance};
+        const DistinctTruth truth{
+            mesh.positions, moved, mesh.triangles, 0.0,
+            before,         now,   thickness,      settings.continuous.timeTolerance};
         const std::vector<char> stays = truth.kept(candidates, gaps);
         std::vector<ShapeContact> expected;
         for (std::size_t i = 0; i < stays.size(); ++i) {

@@ -166,7 +166,7 @@ void expectFirstOfParts(const Scene& scene, const CollisionData& all, const Coll
     const auto found = kept.find(part);
     ASSERT_NE(found, kept.end()) << part;
     EXPECT_LE(found->second,
-              value + (pair.method == Method::Continuous ? pair.timeTolerance : slack));
+              value + (pair.method == Method::Continuous ? pair.continuous.timeTolerance : slack));
   }
 }
 
