@@ -79,9 +79,9 @@ void WindingNumbers::update(const Body& body, const Threads& threads) {
   m_clustersVersion.invalidate();
   const Octree& octree = body.tree.octree();
   const std::size_t blocks = octree.pool().used();
-  m_clusters.resize(8 * blocks);
+  m_clusters.resize(kChildren * blocks);
   threads.forChunks(blocks, kBlocksPerPart, [&](std::size_t, std::size_t from, std::size_t to) {
-    for (auto node = static_cast<OctreeNode>(8 * from); node < 8 * to; ++node)
+    for (auto node = static_cast<OctreeNode>(kChildren * from); node < kChildren * to; ++node)
       if (octree.isEmpty(node))
         m_clusters[node] = {};
       else
@@ -91,7 +91,7 @@ void WindingNumbers::update(const Body& body, const Threads& threads) {
   for (std::size_t block = blocks; block-- > 1;) {
     Cluster& parent = m_clusters[octree.parent(block)];
     Cluster own = parent;
-    const std::span children = std::span(m_clusters).subspan(8 * block, 8);
+    const std::span children = std::span(m_clusters).subspan(kChildren * block, kChildren);
     for (const Cluster& child : children) parent.add(child);
     parent.radius = 0;
     if (own.radius > 0) parent.enclose(own);

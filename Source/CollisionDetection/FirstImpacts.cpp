@@ -14,14 +14,14 @@ namespace palpate {
 
 namespace {
 
-std::uint64_t featureOf(std::uint32_t p, std::uint32_t q) {
+std::uint64_t featureKey(std::uint32_t p, std::uint32_t q) {
   return std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
 }
 
-std::uint64_t featureOf(const Segment& edge, EdgeFeature feature) {
+std::uint64_t featureKey(const Segment& edge, EdgeFeature feature) {
   const std::uint32_t p = edge[feature == EdgeFeature::End],
                       q = edge[feature != EdgeFeature::Start];
-  return featureOf(p, q);
+  return featureKey(p, q);
 }
 
 ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
@@ -41,14 +41,14 @@ std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact& c, boo
                                              bool self) {
   if (c.feature == TriangleFeature::Face) return {};
   const int i = static_cast<int>(c.feature);
-  const std::uint64_t vertex = featureOf(c.vertex, c.vertex),
-                      other = i < 3 ? featureOf(c.vertices[i], c.vertices[i])
-                                    : featureOf(c.vertices[i - 3], c.vertices[(i - 2) % 3]);
+  const std::uint64_t vertex = featureKey(c.vertex, c.vertex),
+                      other = i < 3 ? featureKey(c.vertices[i], c.vertices[i])
+                                    : featureKey(c.vertices[i - 3], c.vertices[(i - 2) % 3]);
   return inOrder(vertex, other, self ? other < vertex : swapped);
 }
 
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self) {
-  const std::uint64_t a = featureOf(c.edgeA, c.featureA), b = featureOf(c.edgeB, c.featureB);
+  const std::uint64_t a = featureKey(c.edgeA, c.featureA), b = featureKey(c.edgeB, c.featureB);
   if (c.featureA == EdgeFeature::Interior && c.featureB == EdgeFeature::Interior) return {};
   return inOrder(a, b, self && b < a);
 }

@@ -4,7 +4,7 @@
 #include <palpate/Types.h>
 
 #include "CollisionDetection/GeometryStep.h"
-#include "CollisionDetection/RigidBody.h"
+#include "CollisionDetection/RigidSearch.h"
 #include "Validity/MethodChoice.h"
 #include "DistanceField/SurfaceProxy.h"
 #include "Bodies/Body.h"

@@ -44,7 +44,7 @@ void OctreeBasedCD::Implementation::releaseMemory() {
   holdsSpare = false;
 }
 
-void OctreeBasedCD::Implementation::publish(FrameStatistics next) {
+void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
   next.geometries = next.triangles = next.segments = next.points = next.untestedVertices = 0;
   for (const auto& geometry : geometries.all()) {
     ++next.geometries;
@@ -101,7 +101,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
 #ifdef PALPATE_VALIDATE
   PALPATE_ASSERT(octree->validate().empty());
 #endif
-  if (explicitly) publish(updates);
+  if (explicitly) setStatistics(updates);
 }
 
 bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
@@ -173,7 +173,7 @@ void OctreeBasedCD::Implementation::collect() {
     if (!record->collides()) record->commitNoCandidates();
     next.candidatePairs += record->candidates.size();
   }
-  publish(next);
+  setStatistics(next);
   hasUpdates = false;
 }
 
@@ -230,7 +230,7 @@ void OctreeBasedCD::Implementation::detect() {
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
   for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->body.mesh);
-  publish(next);
+  setStatistics(next);
   hasUpdates = false;
   auditFrame(settings, geometries, pairs, audit);
 }

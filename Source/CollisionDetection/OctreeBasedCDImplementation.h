@@ -59,7 +59,7 @@ struct OctreeBasedCD::Implementation {
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
   /// Adds the counts of geometries to the statistics, and makes them visible.
-  void publish(FrameStatistics next);
+  void setStatistics(FrameStatistics next);
 
   void releaseMemory();
 

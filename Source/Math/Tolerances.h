@@ -222,7 +222,7 @@ constexpr double kClusterError = 0x1p-46;
 /// For each triangle: twice what a triangle that is not near adds to the error of the whole sum.
 constexpr double kWindingSlack = 0x1p-44;
 
-// ---- Bodies placed in the world (CollisionDetection/RigidBody.cpp) ----
+// ---- Bodies placed in the world (CollisionDetection/RigidSearch.cpp) ----
 
 /// Error relative to the sum of the terms' magnitudes: 4 u for fl(R x + t), and 9 u for a
 /// difference of two. Values that are computed from a box's centre and compared with them have some
@@ -299,6 +299,10 @@ constexpr double kMotionSlack = 4;
 constexpr double kSlowSlack = 0x1p-20;
 /// L²: squares above this lose nothing significant to underflow.
 constexpr double kSmallestSlowSquare = 0x1p-900;
+
+/// Of a sum of unit normals around an edge or vertex: a shorter sum has no direction. Some hundred
+/// roundings, so that faces in opposite directions cancel.
+constexpr double kOpposedNormals = 0x1p-40;
 
 // ---- Surface proxies (DistanceField) ----
 

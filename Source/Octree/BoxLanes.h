@@ -13,8 +13,8 @@ namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using NodeTag = hn::CappedTag<float, 8>;   ///< eight siblings
-using LeafTag = hn::CappedTag<float, 16>;  ///< elements of a leaf
+using NodeTag = hn::CappedTag<float, kChildren>;  ///< eight siblings
+using LeafTag = hn::CappedTag<float, 16>;         ///< elements of a leaf
 using BoxTag = hn::CappedTag<float, 1>;
 
 /// Bounds along K directions: a box, or a k-DOP.

@@ -2,6 +2,7 @@
 
 #include <palpate/Settings.h>
 
+#include "Octree/Keys.h"
 #include "Math/Box.h"
 #include "Core/Buffer.h"
 
@@ -27,7 +28,7 @@ std::span<const DopDirection> dopDirections(int count);  ///< count: 3, 7 or 9
 struct OctreeDops {
   /// Eight siblings along one direction. An empty slot overlaps nothing.
   struct alignas(64) Siblings {
-    float lower[8], upper[8];
+    float lower[kChildren], upper[kChildren];
   };
 
   int directions = 3;                                       ///< 3: there are none
@@ -57,7 +58,7 @@ struct DopMap {
 
 /// Sets one end's map. It takes for each direction the combination that is least for the mean half
 /// widths of the tree's leaves. thickness: along any unit vector. error: along an axis, as
-/// forEachBodyEnd() in Bodies/Body.cpp derives it.
+/// forEachBodyEnd() in Bodies/OctreeFrame.cpp derives it.
 ///
 /// Rounding. Let u be 2^-53, d a direction, and m the matrix. c = d m has components with an error
 /// of 2 u sqrt(3), and their magnitudes sum up to 3 at most. Let E be three old directions, as

@@ -13,7 +13,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, std::size_t begin,
                               std::size_t end) {
-  const hn::CappedTag<float, 8> d;
+  const hn::CappedTag<float, kChildren> d;
   for (std::size_t b = end; b-- > begin;) {
     const OctreeBlock& block = blocks[b];
     OctreeBlock& parent = blocks[blockOf(parents[b])];
@@ -22,7 +22,7 @@ HWY_ATTR void fitBlocksKernel(OctreeBlock* blocks, const OctreeNode* parents, st
     FloatBox box;
     for (int k = 0; k < 3; ++k) {
       auto lower = hn::Load(d, block.lower[k]), upper = hn::Load(d, block.upper[k]);
-      for (std::size_t i = hn::Lanes(d); i < 8; i += hn::Lanes(d)) {
+      for (std::size_t i = hn::Lanes(d); i < kChildren; i += hn::Lanes(d)) {
         lower = hn::Min(lower, hn::Load(d, block.lower[k] + i));
         upper = hn::Max(upper, hn::Load(d, block.upper[k] + i));
       }

@@ -102,7 +102,7 @@ template <int digits, class F>
 void forBins(unsigned before, F&& f) {
   f(before << Key::kDigitBits * digits);
   if constexpr (digits > 0)
-    for (unsigned octant = 0; octant < 8; ++octant)
+    for (unsigned octant = 0; octant < kChildren; ++octant)
       forBins<digits - 1>(before << Key::kDigitBits | Key::kOctant | octant, f);
 }
 
@@ -155,8 +155,7 @@ int KeySort::sortByDigits(const KeyRange& range, std::uint32_t* ends,
     differ |= HWY_DYNAMIC_DISPATCH(countKeysKernel)(scratch + from, to - from, shift, bins, own);
   });
   for (std::size_t i = 0; i < size; i += grain) differ |= scratch[0] ^ scratch[i];
-  const int equalDigits =
-      std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kMaxLevels);
+  const int equalDigits = std::min(std::countl_zero(differ.load()) / Key::kDigitBits, Key::kLevels);
   if (equalDigits >= range.level + range.digits) {
     std::copy_n(scratch, range.cube ? size : 0, m_keys.data() + range.begin);
     return equalDigits;
@@ -176,16 +175,17 @@ int KeySort::sortByDigits(const KeyRange& range, std::uint32_t* ends,
   return 0;
 }
 
-void KeySort::sortByOneDigit(const KeyRange& range, std::array<std::uint32_t, 9>& begins) const {
+void KeySort::sortByOneDigit(const KeyRange& range,
+                             std::array<std::uint32_t, kChildren + 1>& begins) const {
   const std::size_t size = range.end - range.begin;
   PALPATE_ASSERT(range.digits == 1 && size <= KeyRange::kFew);
   std::array<std::uint64_t, KeyRange::kFew> keys;
   loadKeys(range, 0, size, keys.data());
   const std::uint64_t places = HWY_DYNAMIC_DISPATCH(sortFewKeysKernel)(
       keys.data(), size, shiftOf(range.level, 1), m_keys.data() + range.begin);
-  for (unsigned octant = 0; octant < 8; ++octant)
+  for (unsigned octant = 0; octant < kChildren; ++octant)
     begins[octant] = range.begin + (places >> 8 * octant & 0xff);
-  begins[8] = range.end;
+  begins[kChildren] = range.end;
 }
 
 }  // namespace palpate

@@ -55,7 +55,7 @@ class KeySort {
   /// Sorts at most KeyRange::kFew keys by one digit. Writes where the octants begin, and where the
   /// last one ends. The result goes directly to its destination, because a wide load from freshly
   /// written narrower values would stall.
-  void sortByOneDigit(const KeyRange&, std::array<std::uint32_t, 9>& begins) const;
+  void sortByOneDigit(const KeyRange&, std::array<std::uint32_t, kChildren + 1>& begins) const;
 
  private:
   /// Writes the keys of a part of the range to `out`. They are computed if the range requires it,

@@ -31,7 +31,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
   const hn::RebindToSigned<decltype(d)> di;
   const hn::RebindToUnsigned<decltype(d)> du;
   const std::size_t lanes = hn::Lanes(d);
-  constexpr int kCells = 1 << Key::kMaxLevels;
+  constexpr int kCells = 1 << Key::kLevels;
   const float cells = kCells;
   const auto cellsPerUnit = hn::Set(d, static_cast<float>(cells / cube.edge));
   const auto slack = hn::Set(d, 1.0f + 0x1p-10f);
@@ -89,7 +89,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto sizeExponent = hn::ShiftRight<23>(sizeBits + hn::Set(di, 0x7fffff));
     const auto level = hn::Min(hn::Max(edgeExponent - sizeExponent, zero), deepest);
     // Eight levels are in the key's upper half, and the ninth is in its lower half, above the slot.
-    static_assert(Key::kMaxLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
+    static_assert(Key::kLevels == 9 && Key::kDigitBits == 4 && Key::kSlotBits == 28);
     const auto octants = [&](auto x, auto y, auto z) {
       return hn::Or(hn::Or(x, hn::ShiftLeft<1>(y)), hn::ShiftLeft<2>(z));
     };
@@ -104,7 +104,7 @@ HWY_ATTR void octreeKeysKernel(const BoxArrays& boxes, const std::uint64_t* slot
     const auto one = hn::Set(di, 1);
     const auto last = hn::Or(hn::Set(di, 8), octants(hn::And(cell[0], one), hn::And(cell[1], one),
                                                      hn::And(cell[2], one)));
-    const auto ninth = hn::IfThenElseZero(hn::Eq(level, hn::Set(di, Key::kMaxLevels)),
+    const auto ninth = hn::IfThenElseZero(hn::Eq(level, hn::Set(di, Key::kLevels)),
                                           hn::ShiftLeft<Key::kSlotBits>(last));
     const auto slot = isGathered ? hn::LoadU(di, gatheredSlots + place)
                                  : hn::Iota(di, static_cast<std::int32_t>(first + i));

@@ -3,9 +3,16 @@
 #include "Math/Box.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace palpate {
+
+/// Children of a node: the octants of its cell. Keys have four bits for each level, and blocks have
+/// one lane for each child, so that another number needs other keys and blocks.
+inline constexpr unsigned kChildren = 8;
+/// Levels of an octree at most.
+inline constexpr std::size_t kMaxLevels = 61;
 
 /// A cube in the float frame. Its edge is a power of two. Its lower corner and those of its cells
 /// are exact in double.
@@ -29,8 +36,8 @@ constexpr float kSmallestCell = 0x1p-100f;
 /// the box. Sorted keys therefore put a cell's own elements first, and every subtree in one range.
 /// Keys sorted by their first digits do so for the first levels.
 struct Key {
-  static constexpr int kMaxLevels = 9, kDigitBits = 4, kSlotBits = 28;
-  static constexpr std::uint64_t kOctant = 8;
+  static constexpr int kLevels = 9, kDigitBits = 4, kSlotBits = 28;
+  static constexpr std::uint64_t kOctant = kChildren;
 
   /// The `count` digits after the first `level` digits.
   static std::uint64_t digits(std::uint64_t key, int level, int count) {
@@ -41,6 +48,8 @@ struct Key {
     return static_cast<std::uint32_t>(key) & ((1u << kSlotBits) - 1);
   }
 };
+static_assert(2 * Key::kOctant == 1u << Key::kDigitBits);
+static_assert(Key::kLevels * Key::kDigitBits + Key::kSlotBits == 64);
 
 /// Computes keys[i] for the box of each slot. The box's level is the deepest of at most `levels`
 /// whose cell edge is not shorter than the box's longest side; a thousandth of the size is kept for

@@ -38,7 +38,7 @@ void Layout::layOutTop(const KeySort& keys, const Job& root, const OctreeSetting
   start(settings, taskSize, ends, &threads);
   links.emplace_back();
   parents.push_back(0);
-  for (unsigned slot = 0; slot < 8; ++slot) {
+  for (unsigned slot = 0; slot < kChildren; ++slot) {
     links[0].begin[slot] = root.end;
     links[0].child[slot] = OctreeBlock::kLeaf;
   }
@@ -123,7 +123,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
   if (job.level == job.levels) {
     range.first = job.levels == 0;
     range.level = job.level = 0;
-    range.levels = job.levels = std::min(Key::kMaxLevels, m_maxDepth - job.depth);
+    range.levels = job.levels = std::min(Key::kLevels, m_maxDepth - job.depth);
     range.cube = &job.cube;
   }
   const std::uint32_t size = job.end - job.begin;
@@ -133,7 +133,7 @@ void Layout::sort(const KeySort& keys, OpenNode& node) {
     return;
   }
   range.digits =
-      std::min(size >= KeyRange::kMany ? PartEnds::kMaxDigits : 2, Key::kMaxLevels - job.level);
+      std::min(size >= KeyRange::kMany ? PartEnds::kMaxDigits : 2, Key::kLevels - job.level);
   const std::size_t count = PartEnds::kCounts[static_cast<std::size_t>(range.digits)];
   m_ends->resize(node.endsBefore + count);
   const int equalDigits = keys.sortByDigits(range, m_ends->data() + node.endsBefore, m_threads);
@@ -165,7 +165,7 @@ std::uint32_t Layout::addBlock(const OpenNode& node) {
   }
   links.emplace_back();
   parents.push_back(node.job.node);
-  for (unsigned slot = 0; slot < 8; ++slot) {
+  for (unsigned slot = 0; slot < kChildren; ++slot) {
     links[block].begin[slot] = node.begins[slot];
     links[block].child[slot] = OctreeBlock::kLeaf | (node.begins[slot + 1] - node.begins[slot]);
   }
@@ -176,7 +176,7 @@ std::uint32_t Layout::addBlock(const OpenNode& node) {
 /// Returns whether there is such a child.
 bool Layout::nextChild(OpenNode& parent, Job& child) {
   const Job& job = parent.job;
-  for (unsigned slot = parent.nextSlot; slot < 8; ++slot) {
+  for (unsigned slot = parent.nextSlot; slot < kChildren; ++slot) {
     const std::uint32_t begin = parent.begins[slot], size = parent.begins[slot + 1] - begin;
     const OctreeNode node = nodeOf(parent.link, slot);
     if (size <= m_maxPerLeaf) {

@@ -21,7 +21,7 @@ namespace palpate {
 class Layout {
  public:
   struct Links {
-    std::uint32_t begin[8], child[8];
+    std::uint32_t begin[kChildren], child[kChildren];
   };
   /// A node that is to be laid out.
   struct Job {
@@ -65,7 +65,7 @@ class Layout {
   /// A node whose children are being laid out.
   struct OpenNode {
     Job job;
-    std::array<std::uint32_t, 9> begins;  ///< of the octants, and the end of the last
+    std::array<std::uint32_t, kChildren + 1> begins;  ///< of the octants, and the end of the last
     std::uint32_t link;  ///< its child block, or for other nodes the value of the parent's slot
     std::uint32_t endsBefore;  ///< size of the scratch before its range was sorted
     unsigned nextSlot;

@@ -26,7 +26,7 @@ template <class F>
 void forEachNode(const Octree& octree, OctreeNode node, int depth, F&& f) {
   f(node, depth);
   const OctreeNode first = octree.firstChild(node);
-  for (unsigned slot = 0; first != 0 && slot < 8; ++slot)
+  for (unsigned slot = 0; first != 0 && slot < kChildren; ++slot)
     if (!octree.isEmpty(first + slot)) forEachNode(octree, first + slot, depth + 1, f);
 }
 
@@ -105,7 +105,7 @@ LooseOctree::Node LooseOctree::node(NodeId id) const {
   if (node != 0) result.parent = NodeId{tree.firstNode + octree.parent(blockOf(node))};
   const OctreeNode first = octree.firstChild(node);
   result.leaf = first == 0;
-  for (unsigned slot = 0; !result.leaf && slot < 8; ++slot)
+  for (unsigned slot = 0; !result.leaf && slot < kChildren; ++slot)
     if (!octree.isEmpty(first + slot))
       result.children[slot] = NodeId{tree.firstNode + first + slot};
   const auto [begin, end] = octree.ownRange(node);

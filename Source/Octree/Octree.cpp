@@ -138,7 +138,7 @@ void Octree::fitDops(int directions) {
   dops.halfWidths.fill(0);
   // Children come after their parents.
   for (std::size_t block = m_nodes.pool.used(); block-- > 0;)
-    for (unsigned slot = 0; slot < 8; ++slot) {
+    for (unsigned slot = 0; slot < kChildren; ++slot) {
       const auto node = nodeOf(static_cast<std::uint32_t>(block), slot);
       const bool isUsed = (block > 0 || slot == 0) && !isEmpty(node);
       const auto [begin, end] = isUsed ? ownRange(node) : std::pair(0u, 0u);
@@ -155,7 +155,7 @@ void Octree::fitDops(int directions) {
           lower = std::min(lower, dops.lower[k + 3][i]);
           upper = std::max(upper, dops.upper[k + 3][i]);
         }
-        for (unsigned s = 0; child != 0 && s < 8; ++s) {
+        for (unsigned s = 0; child != 0 && s < kChildren; ++s) {
           lower = std::min(lower, dops.blocks[child * further + k].lower[s]);
           upper = std::max(upper, dops.blocks[child * further + k].upper[s]);
         }

@@ -19,10 +19,6 @@
 
 namespace palpate {
 
-/// Children of a node, and levels of an octree at most.
-inline constexpr unsigned kChildren = 8;
-inline constexpr std::size_t kMaxLevels = 61;
-
 /// Eight siblings with their fitted boxes side by side, so that one SIMD comparison tests all
 /// eight.
 ///

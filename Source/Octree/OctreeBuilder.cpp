@@ -148,7 +148,7 @@ void OctreeBuilder::writeGroup(std::size_t entry, OctreeNodes& nodes) const {
   const std::size_t task = node & ~Layout::kTask;
   const Layout& layout = m_layouts[task + 1];
   const OctreeNode root = top().tasks[task].node;
-  const std::uint32_t base = nodes.partBlocks[task + 1] * 8;
+  const std::uint32_t base = nodes.partBlocks[task + 1] * kChildren;
   std::copy(layout.groups.begin(), layout.groups.end(), nodes.groups.begin() + place);
   for (std::size_t g = 0; g < layout.groups.size(); ++g)
     nodes.groupNodes[place + g] =
@@ -160,14 +160,15 @@ void OctreeBuilder::writeBlocks(std::size_t part, OctreeNodes& nodes) const {
   const std::uint32_t base = nodes.partBlocks[part];
   for (std::size_t b = 0; b < layout.links.size(); ++b) {
     OctreeBlock& block = nodes.pool[base + b];
-    nodes.parents[base + b] = layout.parents[b] == Layout::kTaskRoot ? top().tasks[part - 1].node
-                                                                     : layout.parents[b] + base * 8;
+    nodes.parents[base + b] = layout.parents[b] == Layout::kTaskRoot
+                                  ? top().tasks[part - 1].node
+                                  : layout.parents[b] + base * kChildren;
     for (int k = 0; k < 3; ++k) {
       std::fill_n(block.lower[k], 8, FloatBox::kEmptyLower);
       std::fill_n(block.upper[k], 8, -FloatBox::kEmptyLower);
     }
     const Layout::Links& links = layout.links[b];
-    for (unsigned slot = 0; slot < 8; ++slot) {
+    for (unsigned slot = 0; slot < kChildren; ++slot) {
       block.begin[slot] = links.begin[slot];
       block.child[slot] = links.child[slot] + (links.child[slot] & OctreeBlock::kLeaf ? 0 : base);
     }

@@ -101,7 +101,7 @@ class PlacedTrees {
     const NodeTag d;
     const auto& siblings = m_boundsB.siblings(block);
     std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < kChildren; i += hn::Lanes(d)) {
       if constexpr (K == 3) {
         bits |= bitsOf(d, placedB(BoxLanes<NodeTag>::load(siblings, i)).overlapping(bounds)) << i;
       } else {
@@ -122,8 +122,8 @@ class PlacedTrees {
   }
 
   struct PlacedBlock {
-    alignas(32) float lower[K][8];
-    alignas(32) float upper[K][8];
+    alignas(32) float lower[K][kChildren];
+    alignas(32) float upper[K][kChildren];
     Bounds bounds(unsigned slot) const {
       Bounds bounds;
       for (int k = 0; k < K; ++k) {
@@ -140,7 +140,7 @@ class PlacedTrees {
     const Bounds bounds = boundsOfB(nodeB);
     const auto& siblings = m_boundsA.siblings(block);
     std::uint32_t bits = 0;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < kChildren; i += hn::Lanes(d)) {
       const auto boxes = placedA(BoxLanes<NodeTag, K>::load(siblings, i));
       for (int k = 0; k < K; ++k) {
         hn::Store(boxes.lower[k], d, out.lower[k] + i);

@@ -70,7 +70,7 @@ class Validation {
     if (!block.isLeaf(slot)) {
       m_blockVisited[child] = true;
       if (m_octree.parent(child) != node) fail(node, "its child block refers to another parent");
-      for (unsigned octant = 0; octant < 8; ++octant) {
+      for (unsigned octant = 0; octant < kChildren; ++octant) {
         if (m_octree.blocks()[child].isEmpty(octant)) {
           if (!m_octree.blocks()[child].box(octant).empty())
             fail(nodeOf(child, octant), "an empty slot has a box");
@@ -97,7 +97,7 @@ class Validation {
         upper = std::max(upper, to);
       };
       for (std::uint32_t i = begin; i < end; ++i) add(dops.lower[k][i], dops.upper[k][i]);
-      for (unsigned slot = 0; child != 0 && slot < 8; ++slot)
+      for (unsigned slot = 0; child != 0 && slot < kChildren; ++slot)
         add(dops.block(child)[k - 3].lower[slot], dops.block(child)[k - 3].upper[slot]);
       const OctreeDops::Siblings& fitted = dops.block(blockOf(node))[k - 3];
       if (fitted.lower[slotOf(node)] != lower || fitted.upper[slotOf(node)] != upper)

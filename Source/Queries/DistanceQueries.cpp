@@ -6,8 +6,27 @@
 #include "Queries/GeometryDistances.h"
 #include "Queries/QuerySource.h"
 #include "Queries/ShapePenetration.h"
+#include "Queries/SurfaceNormal.h"
 
 namespace palpate {
+
+namespace {
+
+GeometryDistance withNormals(GeometryDistance found, const Body& a, const Body& b) {
+  const Eigen::Vector3d way = found.b.position - found.a.position;
+  setNormal(a, way, found.a);
+  setNormal(b, -way, found.b);
+  return found;
+}
+
+Penetration withNormals(Penetration found, const Body& a, const Body& b) {
+  if (!found.intersecting) return found;
+  setNormal(a, found.direction, found.a);
+  setNormal(b, -found.direction, found.b);
+  return found;
+}
+
+}  // namespace
 
 GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const {
   const Source::Call source(*this);
@@ -17,17 +36,19 @@ GeometryDistance SpatialQueries::distance(GeometryId idA, GeometryId idB) const 
                 idA);
   const bool bruteForce = source->engine() == Engine::BruteForce;
   const Source::Loan scratch(*source);
-  if (!a.shape && !b.shape) return distanceBetween(a, b, bruteForce, scratch->pairs);
-  if (!a.shape) return distanceBetween(a, idB, b.shape->now, bruteForce);
+  if (!a.shape && !b.shape)
+    return withNormals(distanceBetween(a, b, bruteForce, scratch->pairs), a, b);
+  if (!a.shape) return withNormals(distanceBetween(a, idB, b.shape->now, bruteForce), a, b);
   if (!b.shape) {
     const GeometryDistance found = distanceBetween(b, idA, a.shape->now, bruteForce);
-    return {found.b, found.a, found.distance};
+    return withNormals({found.b, found.a, found.distance}, a, b);
   }
   const Shape &first = a.shape->now, &second = b.shape->now;
   if (first.isPlane() && second.isPlane())
     throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
                 idA);
-  return distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair);
+  return withNormals(distanceBetween(idA, first, idB, second, scratch->shapeContacts.shapePair), a,
+                     b);
 }
 
 Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
@@ -43,12 +64,14 @@ Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
     if (!body->shape && !body->solid) source->prepareInside(*body, {});
   }
   const Source::Loan scratch(*source);
-  if (!a.shape && !b.shape) return penetrationOf(a, b, source->engine(), scratch->penetration);
+  if (!a.shape && !b.shape)
+    return withNormals(penetrationOf(a, b, source->engine(), scratch->penetration), a, b);
   if (a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane())
     throw Error(ErrorCode::UnsupportedMethod, nameOf(a) + " and " + nameOf(b) + " are both planes",
                 idA);
-  return shapePenetration(a, b, source->engine(), source->octreeSettings(), scratch->penetration,
-                          scratch->shapeContacts.shapePair);
+  return withNormals(shapePenetration(a, b, source->engine(), source->octreeSettings(),
+                                      scratch->penetration, scratch->shapeContacts.shapePair),
+                     a, b);
 }
 
 }  // namespace palpate

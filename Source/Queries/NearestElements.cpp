@@ -81,7 +81,7 @@ class Search {
       if (depth == 0) break;
       Siblings& siblings = path[depth - 1];
       block = siblings.block;
-      slot = key % 8;
+      slot = key % kChildren;
       siblings.keys[slot] = kVisited;
     }
     test();
@@ -93,7 +93,7 @@ class Search {
   /// Eight siblings. A key is the bits of the squared distance of a box from the point, rounded
   /// down, with the slot in the lowest three bits.
   struct Siblings {
-    alignas(32) std::uint32_t keys[8];
+    alignas(32) std::uint32_t keys[kChildren];
     const OctreeBlock* block;
   };
   static constexpr std::uint32_t kVisited = 0xffffffff;  ///< or empty
@@ -102,7 +102,7 @@ class Search {
     const NodeTag d;
     const hn::RebindToUnsigned<NodeTag> du;
     const FloatBox point = m_search.point.box();
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < kChildren; i += hn::Lanes(d)) {
       const auto boxes = BoxLanes<NodeTag>::load(block, i);
       const auto bits = hn::BitCast(du, boxes.distanceFrom(point));
       const auto key =
@@ -115,7 +115,7 @@ class Search {
   HWY_ATTR HWY_INLINE static std::uint32_t leastKey(const Siblings& siblings) {
     const hn::RebindToUnsigned<NodeTag> du;
     auto least = hn::Load(du, siblings.keys);
-    for (std::size_t i = hn::Lanes(du); i < 8; i += hn::Lanes(du))
+    for (std::size_t i = hn::Lanes(du); i < kChildren; i += hn::Lanes(du))
       least = hn::Min(least, hn::Load(du, siblings.keys + i));
     return hn::GetLane(hn::MinOfLanes(du, least));
   }

@@ -179,10 +179,10 @@ class PairDescent {
                                   float square, Enter&& enter) {
     const PairSide& side = heights.side();
     const OctreeBlock& block = side.octree.blocks()[blockOf(child)];
-    alignas(64) float squares[8];
+    alignas(64) float squares[kChildren];
     std::uint32_t bits = 0;
     const NodeTag d;
-    for (std::size_t i = 0; i < 8; i += hn::Lanes(d)) {
+    for (std::size_t i = 0; i < kChildren; i += hn::Lanes(d)) {
       const auto boxes = BoxLanes<NodeTag>::load(block, i);
       std::uint32_t low = 0xff;
       if (hasHeights()) {

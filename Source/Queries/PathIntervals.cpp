@@ -3,6 +3,7 @@
 #include "Queries/GeometryDistances.h"
 #include "Queries/PointDistances.h"
 #include "Queries/ShapeRays.h"
+#include "Queries/SurfaceNormal.h"
 #include "Queries/VertexSearch.h"
 #include "Math/StableLength.h"
 #include "Exact/Compensated.h"
@@ -169,21 +170,27 @@ PathClearance clearanceOf(const Body& body, const PathLine& path, double radius,
                      kInfinity,
                      0.0,
                      {body.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), kInfinity}};
-  const auto take = [&](double distance, double at, const SurfacePoint& nearest) {
+  Vector3d onPath = Vector3d::Zero();
+  const auto take = [&](double distance, double at, const Vector3d& from,
+                        const SurfacePoint& nearest) {
     if (!(distance < best.distance)) return;
     best = {body.id, distance, at, nearest};
+    onPath = from;
   };
   for (std::size_t i = 0; i < path.segments(); ++i) {
     const Vector3d &p = path.point(i), &q = path.point(i + 1);
     if (body.shape) {
       const double t = p == q ? 0.0 : body.shape->now.nearestOfEdge(p, q).weights[1];
-      const SurfacePoint nearest = closestPointOnShape(body.id, body.shape->now, p + t * (q - p));
-      take(nearest.distance, path.at(i, t), nearest);
+      const Vector3d from = p + t * (q - p);
+      const SurfacePoint nearest = closestPointOnShape(body.id, body.shape->now, from);
+      take(nearest.distance, path.at(i, t), from, nearest);
     } else if (!body.tree.ordered().empty()) {
       const auto [t, nearest] = distanceFromSegment(body, p, q, best.distance, bruteForce);
-      if (nearest.element != kNoElement) take(nearest.distance, path.at(i, t), nearest);
+      if (nearest.element != kNoElement)
+        take(nearest.distance, path.at(i, t), p + t * (q - p), nearest);
     }
   }
+  setNormal(body, onPath - best.nearest.position, best.nearest);
   best.distance = best.nearest.distance = std::max(0.0, best.distance - radius);
   return best;
 }

@@ -1,5 +1,6 @@
 #include "Queries/PointDistances.h"
 
+#include "Queries/SurfaceNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/DistanceBounds.h"
 #include "Math/ExactClosestPoint.h"
@@ -149,7 +150,8 @@ SurfacePoint PointDistances::surfacePoint(const Near& near) const {
           m_geometry.tree.ordered()[near.place],
           near.closest.weights,
           m_point - near.closest.difference,
-          near.distance};
+          near.distance,
+          surfaceNormal(m_geometry, near.element, near.closest.weights, near.closest.difference)};
 }
 
 float PointDistances::boundOf(double distance) const {

@@ -110,7 +110,7 @@ class RaySearch {
     const float* const rows = block.lower[0];
     const float* const near[3] = {rows + m_nearRow[0], rows + m_nearRow[1], rows + m_nearRow[2]};
     const float* const far[3] = {rows + m_farRow[0], rows + m_farRow[1], rows + m_farRow[2]};
-    for (std::size_t i = 0; i < 8; i += kLanes) {
+    for (std::size_t i = 0; i < kChildren; i += kLanes) {
       const std::size_t slot = i ^ ofVector;
       hn::Vec<D> enter, leave;
       m_boxTest.intersect(d, near, far, slot, m_tMax, enter, leave);

@@ -130,7 +130,8 @@ SurfacePoint closestPointOnShape(GeometryId id, const Shape& shape, const Vector
           {},
           Vector3d::Zero(),
           point - distance.distance * distance.normal,
-          distance.distance};
+          distance.distance,
+          distance.normal};
 }
 
 }  // namespace palpate

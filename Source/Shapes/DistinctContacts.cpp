@@ -45,14 +45,14 @@ class DistinctContacts::Step {
 
   /// Whether elements around the vertex or edge that holds the contact's point exclude its normal.
   bool isExcluded(const ShapeContact& c) const {
-    const auto feature = featureOf(c);
+    const auto feature = endsOfFeature(c);
     return feature && excludesDirection(m_mesh, *feature, -c.normal, c.timeOfImpact);
   }
   /// The plane in which all triangles around the vertex or edge lie that holds the contact's point,
   /// at the step's end. None if there are fewer than two, or if areas are too small or too large to
   /// be squared twice.
   std::optional<FlatPart> flatPartOf(const ShapeContact& c) const {
-    const auto feature = featureOf(c);
+    const auto feature = endsOfFeature(c);
     if (!feature) return {};
     Vector3d corner = Vector3d::Zero(), first = corner;  // of the first triangle
     std::size_t count = 0;
@@ -126,7 +126,7 @@ class DistinctContacts::Step {
 
  private:
   /// The vertex {v, v} or the edge that holds the contact's point; none in a triangle's interior.
-  static std::optional<Segment> featureOf(const ShapeContact& c) {
+  static std::optional<Segment> endsOfFeature(const ShapeContact& c) {
     Segment feature{};
     std::size_t count = 0;
     for (int i = 0; i < 3; ++i) {

@@ -120,7 +120,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
   ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
   ///   detection.addCollisionPair(organ, tool, {.thickness = 0.5});
-  ///   detection.setTransform(tool, {rotationBefore, tipBefore}, {rotation, tip});  // in each step
+  ///   detection.setTransform(tool, before, now);  // in each step
   ///
   /// Docs/HowTo/RigidTools.md has the whole loop, with the rows of a solver.
   ///

@@ -32,6 +32,11 @@ struct SurfacePoint {
   Eigen::Vector3d position;
   /// L, less the radius of lines and points: negative inside the radius.
   double distance;
+  /// Unit, out of the surface, also at distance 0. Of a triangle mesh the winding normal of the
+  /// face that holds the point, or the sum of the normals around its edge or vertex, weighted by
+  /// the angles there. Of lines and points it leads away from the centre line or point. 0 where
+  /// there is no surface point.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 
 /// The distance of a point from the surface of a body, negative inside.

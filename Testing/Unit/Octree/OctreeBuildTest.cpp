@@ -38,8 +38,7 @@ TEST(OctreeBuild, FollowsTheWorkedExample) {
       inGivenOrder.upper[k][i] = boxes[i].upper[k];
     }
   std::vector<std::uint64_t> keys(boxes.size());
-  octreeKeys(inGivenOrder, nullptr, 0, boxes.size(), octree.rootCube(), Key::kMaxLevels,
-             keys.data());
+  octreeKeys(inGivenOrder, nullptr, 0, boxes.size(), octree.rootCube(), Key::kLevels, keys.data());
   const std::uint64_t digits[] = {0xbbc, 0x900, 0x898, 0x899, 0x880, 0x000};
   for (std::size_t i = 0; i < boxes.size(); ++i) EXPECT_EQ(keys[i], digits[i] << 52 | i);
 

@@ -1,4 +1,4 @@
-#include "CollisionDetection/RigidBody.h"
+#include "CollisionDetection/RigidSearch.h"
 
 #include "CollisionDetection/Geometry.h"
 #include "Octree/PointQueries.h"
