@@ -197,9 +197,8 @@ void tessellate(Mesh& shape, double size) {
   sphere->Update();
   vtkPolyData* all = sphere->GetOutput();
   for (vtkIdType i = 0; i < all->GetNumberOfPoints(); ++i)
-    shape.now.push_back(shape.rotation *
-                            furthest(*shape.analytical, 2 * Vector3d(all->GetPoint(i)), size) +
-                        shape.translation);
+    shape.now.push_back(
+        shape.motion.now(furthest(*shape.analytical, 2 * Vector3d(all->GetPoint(i)), size)));
   vtkNew<vtkIdList> corners;
   for (vtkIdType i = 0; i < all->GetNumberOfCells(); ++i) {
     all->GetCellPoints(i, corners);

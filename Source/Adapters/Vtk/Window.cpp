@@ -231,9 +231,10 @@ void Window::Implementation::drawCells() const {
   for (const auto id : chosen) {
     const LooseOctree::Node node = octree.node(id);
     const Mesh& mesh = problem.geometries[indices.at(node.geometry)];
-    cubes.add(mesh.rotation * node.bounds.center() + mesh.translation,
+    const Pose& pose = mesh.motion.now;
+    cubes.add(pose(node.bounds.center()),
               cells == Cells::ByOccupancy ? static_cast<double>(node.elements.size()) : node.depth,
-              node.bounds.sizes().x(), Quaterniond(mesh.rotation));
+              node.bounds.sizes().x(), Quaterniond(pose.rotation));
   }
   vtkNew<vtkLookupTable> green;
   green->SetHueRange(0.36, 0.36);

@@ -164,7 +164,7 @@ CollisionData answer(const Settings& settings, const Moving& body, const Tool& t
   const GeometryId mesh = body.geometry.addTo(collisions),
                    shape = collisions.addAnalyticalGeometry(tool.geometry);
   collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
-  collisions.setPose(shape, tool.ends[0], tool.ends[1]);
+  collisions.setTransform(shape, tool.ends[0], tool.ends[1]);
   collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
@@ -564,13 +564,13 @@ TEST(ShapeSteps, CapturesAndAuditIncludeThem) {
   std::vector<GeometryId> tools;
   for (const AnalyticalGeometry& geometry : geometries(random)) {
     tools.push_back(collisions.addAnalyticalGeometry(geometry));
-    collisions.setPose(tools.back(), {randomTurn(random), randomPoint(random, -1, 1)});
+    collisions.setTransform(tools.back(), {randomTurn(random), randomPoint(random, -1, 1)});
     collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
   }
   collisions.detectCollision();
   collisions.advance();
   for (const GeometryId tool : tools)
-    collisions.setPose(tool, {randomTurn(random), randomPoint(random, -1, 1)});
+    collisions.setTransform(tool, {randomTurn(random), randomPoint(random, -1, 1)});
   collisions.setPositions(mesh, body.geometry.positions, body.now);
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());

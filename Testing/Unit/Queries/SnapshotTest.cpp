@@ -274,7 +274,7 @@ TEST(Snapshot, SharesCopiesAndReusesMemory) {
   source.remove(1);
   held = {take(1)};
   EXPECT_EQ(pool->copyCount(), 5u + 1u);  // `same` has the removed geometry
-  EXPECT_TRUE(same->contains(GeometryId{1}));
+  EXPECT_TRUE(same->has(GeometryId{1}));
   same.reset();
   held = {take(2)};
   EXPECT_EQ(pool->copyCount(), 5u);
@@ -386,8 +386,8 @@ TEST(Snapshot, KeepsRemovedGeometriesAndOldTopology) {
   for (int i = 0; i < 3; ++i) {
     scene.collisions.publish();
     const auto now = scene.collisions.latestSnapshot();
-    EXPECT_FALSE(now->contains(scene.sheetId));
-    EXPECT_TRUE(now->contains(added));
+    EXPECT_FALSE(now->has(scene.sheetId));
+    EXPECT_TRUE(now->has(added));
     expectRefused(ErrorCode::UnknownGeometry, "geometry 1 is not in this snapshot", [&] {
       (void)now->queries().closestPoint(scene.sheetId, {0, 0, 0});
     });
@@ -395,7 +395,7 @@ TEST(Snapshot, KeepsRemovedGeometriesAndOldTopology) {
     EXPECT_EQ(now->queries().closestPoint(scene.ball, {2, 0, 0})->element,
               scene.collisions.queries().closestPoint(scene.ball, {2, 0, 0})->element);
   }
-  EXPECT_FALSE(old->contains(added));
+  EXPECT_FALSE(old->has(added));
   EXPECT_EQ(hashOf(scene, old->queries()), expected);
   expectRefused(ErrorCode::UnknownGeometry, "not in this snapshot",
                 [&] { (void)old->positions(added); });
