@@ -20,6 +20,8 @@ if(TARGET PalpateFcl)
 endif()
 foreach(component IN LISTS components)
   palpate_export_own_symbols(${component})
+  # The libraries find each other wherever they are installed.
+  set_target_properties(${component} PROPERTIES INSTALL_RPATH "$ORIGIN")
 endforeach()
 # A static Palpate::Vtk hands VTK on to its user's linker, and Palpate::Fcl FCL.
 if(TARGET PalpateVtk)

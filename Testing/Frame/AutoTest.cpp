@@ -143,8 +143,10 @@ TEST(Auto, FindsEverythingThatContinuousFinds) {
                               motion.fast * uniform(random, 0, 1));
     const double thickness = i % 4 == 0 ? 0.0 : kThickness;
     const PairSettings continuous{Method::Continuous, thickness, Contacts::All};
-    const PairSettings automatic{Method::Auto, thickness, Contacts::All,
-                                 uniform(random, -1, 1) * 0.01};
+    const PairSettings automatic{.method = Method::Auto,
+                                 .thickness = thickness,
+                                 .contacts = Contacts::All,
+                                 .automatic = {.motionTolerance = uniform(random, -1, 1) * 0.01}};
     PairRun truth(settingsOf(Engine::Octree), c.a, c.b, continuous);
     PairRun run(settingsOf(Engine::Octree), c.a, c.b, automatic);
     truth.step(c.a.positions, c.aNow, c.b.positions, c.bNow);

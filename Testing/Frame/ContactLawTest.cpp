@@ -368,8 +368,14 @@ std::vector<PairSettings> everySetting(double thickness) {
     all.push_back({Method::Continuous, 0.0, contacts});
     all.push_back({Method::Continuous, thickness, contacts});
     all.push_back({Method::Auto, thickness, contacts});
-    all.push_back({Method::Auto, thickness, contacts, 4 * thickness});
-    all.push_back({Method::Auto, thickness, contacts, 0.0});
+    all.push_back({.method = Method::Auto,
+                   .thickness = thickness,
+                   .contacts = contacts,
+                   .automatic = {.motionTolerance = 4 * thickness}});
+    all.push_back({.method = Method::Auto,
+                   .thickness = thickness,
+                   .contacts = contacts,
+                   .automatic = {.motionTolerance = 0.0}});
   }
   all.push_back(
       {.method = Method::Continuous, .thickness = 0.0, .continuous = {.timeTolerance = 1e-2}});

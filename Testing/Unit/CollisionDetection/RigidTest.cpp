@@ -204,7 +204,10 @@ TEST(Rigid, TrianglesMatchSetPositions) {
   all.push_back({Method::Intersection, 0.0});
   all.push_back({Method::Auto, 0.0});
   all.push_back({Method::Auto, 0.03});
-  all.push_back({Method::Auto, 0.2, Contacts::Distinct, 0.4});
+  all.push_back({.method = Method::Auto,
+                 .thickness = 0.2,
+                 .contacts = Contacts::Distinct,
+                 .automatic = {.motionTolerance = 0.4}});
   std::size_t number = 0;
   for (const PairSettings& pair : all)
     for (const Way way : kWays) {

@@ -34,9 +34,11 @@ class MeshFileFixture : public ::testing::Test {
  protected:
   MeshFileFixture()
       : folder(std::filesystem::path(::testing::TempDir()) /
-               (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
-                ".mesh-files")) {
+               (std::string(test()->test_suite_name()) + "." + test()->name() + ".mesh-files")) {
     std::filesystem::create_directories(folder);
+  }
+  static const ::testing::TestInfo* test() {
+    return ::testing::UnitTest::GetInstance()->current_test_info();
   }
   ~MeshFileFixture() override { std::filesystem::remove_all(folder); }
 

@@ -243,7 +243,11 @@ TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
   for (const auto& [method, name] : methods)
     for (const double tolerance : {0.0, 0.25}) {
       try {
-        collisions.addCollisionPair(a, b, {method, 0.1, Contacts::Distinct, tolerance});
+        collisions.addCollisionPair(a, b,
+                                    {.method = method,
+                                     .thickness = 0.1,
+                                     .contacts = Contacts::Distinct,
+                                     .automatic = {.motionTolerance = tolerance}});
         ADD_FAILURE() << name << " accepts a tolerance";
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
@@ -252,10 +256,22 @@ TEST(AutoGeometryTypes, OtherMethodsRefuseAMotionTolerance) {
       }
       EXPECT_TRUE(collisions.pairs().empty());
     }
-  collisions.addCollisionPair(a, b, {Method::Proximity, 0.1, Contacts::Distinct, -2.0});
-  collisions.setPairSettings(a, b, {Method::Auto, 0.1, Contacts::Distinct, 0.25});
-  EXPECT_THROW(
-      collisions.setPairSettings(a, b, {Method::Continuous, 0.1, Contacts::Distinct, 0.25}), Error);
+  collisions.addCollisionPair(a, b,
+                              {.method = Method::Proximity,
+                               .thickness = 0.1,
+                               .contacts = Contacts::Distinct,
+                               .automatic = {.motionTolerance = -2.0}});
+  collisions.setPairSettings(a, b,
+                             {.method = Method::Auto,
+                              .thickness = 0.1,
+                              .contacts = Contacts::Distinct,
+                              .automatic = {.motionTolerance = 0.25}});
+  EXPECT_THROW(collisions.setPairSettings(a, b,
+                                          {.method = Method::Continuous,
+                                           .thickness = 0.1,
+                                           .contacts = Contacts::Distinct,
+                                           .automatic = {.motionTolerance = 0.25}}),
+               Error);
   EXPECT_EQ(collisions.pairs()[0].settings.automatic.motionTolerance, 0.25);
 }
 
