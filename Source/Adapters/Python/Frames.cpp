@@ -1,0 +1,55 @@
+#include "Python/Classes.h"
+#include "Python/Collisions.h"
+
+namespace palpate::python {
+
+void addFrames(CollisionsClass& collisions) {
+  collisions
+      .def(
+          "advance", [](Collisions& self) { self.change([](OctreeBasedCD& d) { d.advance(); }); },
+          "advance() -> None\n\nEnds the step: the positions now become those before.")
+      .def(
+          "update", [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.update(); }); },
+          "update() -> None\n\nBrings octrees to the positions now. Others do so themselves.")
+      .def(
+          "collect_candidates",
+          [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.collectCandidates(); }); },
+          "collect_candidates() -> None\n\nFills candidate_pairs() of every pair.")
+      .def(
+          "detect_collision",
+          [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.detectCollision(); }); },
+          R"(detect_collision() -> None
+
+Finds the contacts of every pair; see collision_data(). Releases the GIL.)")
+      .def(
+          "memory_use",
+          [](Collisions& self) {
+            return self.read([](OctreeBasedCD& d) { return d.memoryUse(); });
+          },
+          "memory_use() -> MemoryUse\n\nThe bytes that the object holds now.")
+      .def(
+          "release_memory",
+          [](Collisions& self) { self.change([](OctreeBasedCD& d) { d.releaseMemory(); }); },
+          "release_memory() -> None\n\nGives back what is only kept for the next frames.")
+      .def(
+          "statistics",
+          [](Collisions& self) {
+            return self.read([](OctreeBasedCD& d) { return FrameStatistics(d.statistics()); });
+          },
+          "statistics() -> FrameStatistics\n\nTimes and counts of the last frame.")
+      .def(
+          "settings",
+          [](Collisions& self) {
+            return self.read([](OctreeBasedCD& d) { return Settings(d.settings()); });
+          },
+          "settings() -> Settings\n\nThe settings with which the object was made.")
+      .def("__repr__", [](Collisions& self) {
+        if (!self.gate.isOpen(false)) return std::string("<palpate.OctreeBasedCD at work>");
+        const std::size_t geometries = self.detection.statistics().geometries;
+        const std::size_t pairs = self.detection.pairs().size();
+        return "<palpate.OctreeBasedCD with " + std::to_string(pairs) + " pairs, " +
+               std::to_string(geometries) + " geometries in the last frame>";
+      });
+}
+
+}  // namespace palpate::python
