@@ -43,7 +43,7 @@ def test_closest_points(scene):
 def test_nearest_and_within(scene):
     nearest = scene.queries.nearest_elements(scene.ball, [2, 0, 0], 5)
     assert len(nearest) == 5 and (np.diff(nearest["distance"]) >= 0).all()
-    within = scene.queries.elements_within(scene.ball, [2, 0, 0], nearest["distance"][-1])
+    within = scene.queries.elements_within(scene.ball, [2, 0, 0], 1.001 * nearest["distance"][-1])
     assert set(nearest["element"]) <= set(within) and within.dtype == np.uint32
 
 

@@ -1,7 +1,7 @@
 """The enumerations. A call that takes one also takes its name as a string, in any case."""
 
 import enum
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 _E = TypeVar("_E", bound=enum.IntEnum)
 
@@ -199,7 +199,7 @@ SidednessName = Literal["both", "outer"]
 InsideRuleName = Literal["closed", "winding_number"]
 
 
-def parse(kind: type[_E], value: object) -> _E:
+def parse(kind: type[_E], value: Any) -> _E:
     """The enumerator of a member, of its name in any case, or of its number."""
     from palpate._errors import Error
 
