@@ -1,7 +1,7 @@
 """Builds the package by CMake; see pyproject.toml.
 
-The environment variable PALPATE_BUILD names a folder in which CMake has built Palpate with the same Python. Then nothing
-is compiled again. PALPATE_CMAKE_ARGS has further options for CMake.
+The environment variable PALPATE_BUILD names a folder in which CMake has built Palpate with the
+same Python. Then nothing is compiled again. PALPATE_CMAKE_ARGS has further options for CMake.
 """
 
 import os
@@ -23,7 +23,7 @@ class BuildByCMake(build_ext):
 
     def run(self) -> None:
         if self.inplace:
-            sys.exit("An editable install is not possible. Put build/.../Python on PYTHONPATH instead.")
+            sys.exit("An editable install is not possible. Put build/.../Python on PYTHONPATH.")
         with tempfile.TemporaryDirectory() as folder:
             build = os.environ.get("PALPATE_BUILD")
             if build is None:
@@ -45,15 +45,14 @@ class BuildByCMake(build_ext):
                     ["cmake", "--build", build, "--target", "PalpatePython", "--parallel", jobs],
                     check=True,
                 )
-            subprocess.run(
-                ["cmake", "--install", build, "--component", "Python", "--prefix", folder], check=True
-            )
+            install = ["cmake", "--install", build, "--component", "Python", "--prefix", folder]
+            subprocess.run(install, check=True)
             package = pathlib.Path(folder) / "palpate"
             copy_package(package, pathlib.Path(self.build_lib) / "palpate")
 
 
 def copy_package(package: pathlib.Path, target: pathlib.Path) -> None:
-    """Copies files. A wheel has no links, so each library comes once, by the name that others need."""
+    """Copies files. A wheel has no links: each library comes once, as others name it."""
     target.mkdir(parents=True, exist_ok=True)
     links = {path.resolve() for path in package.iterdir() if path.is_symlink()}
     for path in package.iterdir():
@@ -64,6 +63,6 @@ def copy_package(package: pathlib.Path, target: pathlib.Path) -> None:
 setup(
     packages=[],
     py_modules=[],
-    ext_modules=[Extension("palpate._palpate", sources=[])],  # makes the wheel one of this platform
+    ext_modules=[Extension("palpate._palpate", sources=[])],  # a wheel of this platform
     cmdclass={"build_ext": BuildByCMake},
 )

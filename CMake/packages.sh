@@ -1,10 +1,12 @@
 #!/bin/bash
-# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, test, docs, figures, benchmark, coverage),
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage),
 # as root or through sudo. Returns at once when all are there.
 set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
+python="python3-dev pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel
+  python3-pytest python3-mypy mypy"
 test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
   clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"

@@ -61,7 +61,7 @@ configuration() {
 fixedAddresses=()
 setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-no-randomize)
 
-stage packages CMake/packages.sh build test
+stage packages CMake/packages.sh build python test
 stage documentation CMake/docs.sh
 build release
 # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.

@@ -37,7 +37,7 @@ allowedIn() {
     CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
-    Vtk | Fcl) echo "$1/" ;;
+    Vtk | Fcl | Python) echo "$1/" ;;
   esac
 }
 
@@ -76,6 +76,7 @@ checkPlaces() {
         "<gmp"*) place=Source/Exact/Exact.h ;;
         "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
         "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
+        "<pybind11/"*) place=Source/Adapters/Python/Arrays.h ;;
         *[./]*) place=nowhere ;;
         *) continue ;;
       esac

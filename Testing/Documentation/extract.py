@@ -21,7 +21,7 @@ import sys
 COMMENT = re.compile(r"\s*<!--\s*(program|file scope|output|(?:not compiled|not run): .+?)\s*-->\s*$")
 HIDDEN = re.compile(r"\s*<!--\s*hidden(, file scope)?\s*$")
 FENCE = re.compile(r"(\s*)```+\s*([A-Za-z{:}]*)")
-SHOWN_ONLY = {"", "text", "json", "bibtex"}
+SHOWN_ONLY = {"", "text", "json", "bibtex", "python"}  # Testing/Python runs the Python blocks
 
 
 class Program:
@@ -107,7 +107,7 @@ def main():
                     program.runs = runs
                     programs.append(program)
                 program.add(code, (page, line), "file scope" in marks)
-            elif language == "text" and "output" in marks:
+            elif language == "text" and "output" in marks and page.stem != "Python":
                 if program is None:
                     sys.exit(f"{page}:{line}: no program prints this")
                 program.output = (program.output or "") + code

@@ -17,7 +17,9 @@ BLADE_MOVED = BLADE - [0, 0, 4]
 BLADE_TRIANGLES = np.array([[0, 1, 2]], dtype=np.uint32)
 
 
-def ball(rows: int, radius: float = 1.0, centre: npt.ArrayLike = (0, 0, 0)) -> tuple[Floats, Indices]:
+def ball(
+    rows: int, radius: float = 1.0, centre: npt.ArrayLike = (0, 0, 0)
+) -> tuple[Floats, Indices]:
     """A closed mesh of a sphere, wound outward: 4 rows (rows - 1) triangles."""
     columns = 2 * rows
     polar = np.pi * np.arange(1, rows) / rows
@@ -45,7 +47,7 @@ def ball(rows: int, radius: float = 1.0, centre: npt.ArrayLike = (0, 0, 0)) -> t
 
 
 def same(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> bool:
-    """Whether two arrays, of records too, have the same bits. Records have bytes between fields."""
+    """Whether two arrays have the same bits. Records may differ in bytes between fields."""
     if a.dtype.names is None:
         return a.tobytes() == b.tobytes()
     return all(same(a[name], b[name]) for name in a.dtype.names)

@@ -75,7 +75,8 @@ def test_integers_of_any_width(kind):
 def test_indices_beyond_32_bits_are_refused_with_their_place(index):
     collisions = palpate.OctreeBasedCD()
     triangles = [[0, 1, 2], [0, 2, 3], [1, index, 2]]
-    with pytest.raises(palpate.Error, match=f"Entry 2 of triangles has the index {index}") as caught:
+    message = f"Entry 2 of triangles has the index {index}"
+    with pytest.raises(palpate.Error, match=message) as caught:
         collisions.add_triangle_mesh(TETRAHEDRON, triangles)
     assert caught.value.code == palpate.ErrorCode.INDEX_OUT_OF_RANGE
     assert caught.value.element == 2
@@ -96,13 +97,17 @@ def test_positions_of_another_shape_are_refused(shape):
     assert caught.value.code is palpate.ErrorCode.WRONG_POSITION_COUNT
 
 
-@pytest.mark.parametrize("positions", ["abc", [["a", "b", "c"]], [[1j, 2, 3]], None, [[object()] * 3]])
+@pytest.mark.parametrize(
+    "positions", ["abc", [["a", "b", "c"]], [[1j, 2, 3]], None, [[object()] * 3]]
+)
 def test_what_holds_no_numbers_is_refused(positions):
     with pytest.raises(TypeError):
         palpate.OctreeBasedCD().add_triangle_mesh(positions, BLADE_TRIANGLES)
 
 
-@pytest.mark.parametrize("triangles", [[[0.0, 1.0, 2.0]], [["a", "b", "c"]], [[True, False, True]]])
+@pytest.mark.parametrize(
+    "triangles", [[[0.0, 1.0, 2.0]], [["a", "b", "c"]], [[True, False, True]]]
+)
 def test_what_holds_no_integers_is_refused(triangles):
     with pytest.raises(TypeError):
         palpate.OctreeBasedCD().add_triangle_mesh(BLADE, triangles)
@@ -169,7 +174,9 @@ def test_meshes_by_the_conventions_of_trimesh_and_meshio():
         palpate.add(collisions, Trimesh()),
         palpate.add(collisions, Mesh(Block("triangle", [[0, 1, 2]]), Block("line", [[0, 1]]))),
         palpate.add(collisions, Mesh(("quad", np.array([[0, 1, 2, 3]])))),
-        palpate.add(collisions, Mesh(Block("tetra", [[0, 1, 2, 3]]), Block("triangle", [[0, 1, 2]]))),
+        palpate.add(
+            collisions, Mesh(Block("tetra", [[0, 1, 2, 3]]), Block("triangle", [[0, 1, 2]]))
+        ),
         palpate.add(collisions, Mesh(Block("line", [[0, 1], [2, 3]])), radius=0.5),
         palpate.add(collisions, Mesh(Block("vertex", [[0]])), radius=0.5),
     ]

@@ -1,4 +1,4 @@
-"""Everything in the public headers has a name in Python, but what is listed here with its reason."""
+"""Everything in the public headers has a name in Python. Exceptions are listed with reasons."""
 
 import enum
 import os
@@ -38,7 +38,7 @@ METHODS = {
     "Executor.run": "a Python executor would run all tasks under the GIL",
     "ConstraintRow.gap": "jacobian @ x - offsets",
 }
-# Structs that are no class in Python: arrays of records have their fields, or a call its arguments.
+# Structs that are no class in Python.
 CLASSES = {
     "ElementPair": "(n, 2) arrays, or records",
     "TriangleMeshView": "two arguments",
@@ -71,11 +71,12 @@ def snake(name):
 
 
 def code_of(path):
-    """A header without comments, strings, preprocessor lines and the words that no check needs."""
+    """A header without comments, strings, preprocessor lines and words that no check needs."""
     text = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(), flags=re.S)
     text = re.sub(r'"(\\.|[^"\\])*"', '""', re.sub(r"^\s*#[^\n]*", "", text, flags=re.M))
     text = re.sub(r"\btemplate\s*<[^<>]*>", "", text)
-    return re.sub(r"\b(PALPATE_EXPORT|inline|static|constexpr|explicit|virtual|friend)\b", "", text)
+    words = r"\b(PALPATE_EXPORT|inline|static|constexpr|explicit|virtual|friend)\b"
+    return re.sub(words, "", text)
 
 
 def matching(text, start):
@@ -118,7 +119,9 @@ class Headers:
     def scan(self, text, struct, public):
         """Takes nested types out of a scope, then reads the declarations that remain."""
         scope = f"{struct.name}." if struct and struct.name else ""
-        pattern = re.compile(r"\benum class (\w+)[^;{]*{([^}]*)}|\b(class|struct)\s+(\w+)[^;{(]*{")
+        pattern = re.compile(
+            r"\benum class (\w+)[^;{]*{([^}]*)}|\b(class|struct)\s+(\w+)[^;{(]*{"
+        )
         while match := pattern.search(text):
             visible = public or "public:" in text[: match.start()]
             end = match.end()
@@ -135,17 +138,19 @@ class Headers:
             text = text[: match.start()] + " " + text[end:]
         if struct and not public:
             parts = re.split(r"\b(public|private|protected)\s*:", text)
-            text = " ".join(b for a, b in zip(parts[1::2], parts[2::2], strict=True) if a == "public")
+            pairs = zip(parts[1::2], parts[2::2], strict=True)
+            text = " ".join(part for access, part in pairs if access == "public")
         else:
             text = re.split(r"\bprivate\s*:", text)[0]
         self.read(strip_brackets(text, "{", "}"), struct)
 
     def read(self, text, struct):
         text = re.sub(r"\boperator\s*\(\)|\boperator\s*[^\s\w(]+", "operator_", text)
-        text = re.sub(r"\)\s*(const\b)?\s*(noexcept\b)?\s*(?=[A-Za-z~])(?!const\b|noexcept\b)", "); ", text)
+        end = r"\)\s*(const\b)?\s*(noexcept\b)?\s*(?=[A-Za-z~])(?!const\b|noexcept\b)"
+        text = re.sub(end, "); ", text)  # the end of a function whose body was removed
         for statement in strip_brackets(text, "<", ">").split(";"):
             statement = statement.strip()
-            if re.match(r"(using|template\s*using|class|struct)\b", statement) or "=>" in statement:
+            if re.match(r"(using|template\s*using|class|struct)\b", statement):
                 continue
             head = statement.split("=")[0] if "(" not in statement.split("=")[0] else statement
             function = re.search(r"([~\w]+)\s*\(", head)
@@ -155,7 +160,7 @@ class Headers:
                     (struct.functions if struct else self.functions).add(name)
             elif struct and re.match(r"[\w:]+", head):
                 names = re.sub(r"=[^,]*", "", statement).split(",")
-                struct.fields |= {re.sub(r"\[.*", "", n).split()[-1].strip("&* ") for n in names if n.split()}
+                struct.fields |= {n.split()[-1].strip("&* ") for n in names if n.split()}
             elif re.search(r"\bk[A-Z]\w*$", head.strip()):
                 self.constants.add(head.split()[-1])
 
@@ -174,17 +179,19 @@ def names_of(kind):
 
 
 def fields_in_bindings():
-    """For each C++ struct the members that Python sees as fields: those that kFields lists."""
+    """For each C++ struct the members that Python sees as fields, from the lists kFields."""
     result = {}
     for path in (SOURCE / "Adapters" / "Python").glob("*.h"):
-        for name, body in re.findall(r"kFields<([\w:]+)> =(.*?);\n(?=\S|$)", path.read_text(), re.S):
+        lists = re.findall(r"kFields<([\w:]+)> =(.*?);\n(?=\S|$)", path.read_text(), re.S)
+        for name, body in lists:
             members = set(re.findall(r'field\(\s*"(\w+)"', body))
             result[name.replace("::", ".")] = members
     return result
 
 
 def test_the_headers_are_read(headers):
-    assert {"OctreeBasedCD", "SpatialQueries", "StepGuard", "CollisionData", "Snapshot"} <= set(headers.structs)
+    classes = {"OctreeBasedCD", "SpatialQueries", "StepGuard", "CollisionData", "Snapshot"}
+    assert classes <= set(headers.structs)
     assert len(headers.structs["OctreeBasedCD"].functions) > 40
     assert len(headers.structs["SpatialQueries"].functions) > 18
     assert {"weld", "findMeshDefects", "simplify", "setUp", "tangentsOf"} <= headers.functions
@@ -241,8 +248,9 @@ def test_every_field_has_a_name(headers):
         names = names_of(kind) | set(recorded.get(struct.name, ()))
         for field in struct.fields:
             name = FIELDS.get(f"{struct.name}.{field}", snake(field))
-            parts = {"continuous", "automatic", "proxy"} if struct.name == "PairSettings" else set()
-            if name not in names and field not in parts and not field.startswith("k"):
+            if struct.name == "PairSettings" and field in ("continuous", "automatic", "proxy"):
+                continue  # their members are fields of PairSettings in Python
+            if name not in names and not field.startswith("k"):
                 missing.add(f"{struct.name}.{field}")
     assert {m for m in missing if m.split(".")[0] not in CLASSES} == set()
 
@@ -265,7 +273,8 @@ def test_every_enumeration_has_the_same_members(headers):
         assert kind is not None and issubclass(kind, enum.IntEnum), name
         assert [snake(m).upper() for m in members] == [m.name for m in kind], name
         assert [m.value for m in kind] == list(range(len(members))), name
-    here = [k for k in vars(palpate).values() if isinstance(k, type) and issubclass(k, enum.IntEnum)]
+    kinds = [kind for kind in vars(palpate).values() if isinstance(kind, type)]
+    here = [kind for kind in kinds if issubclass(kind, enum.IntEnum)]
     assert len(here) == sum(bool(members) for members in headers.enums.values())
 
 

@@ -52,7 +52,8 @@ def test_rows_give_the_gaps():
         palpate.SolverVertices(scene.collisions.positions(scene.b), first=len(scene.positions)),
     )
     assert np.array_equal(records["offset"], rows.offsets)
-    assert data.rows(scene.positions, x[len(scene.positions) :], vertex_count=5000).jacobian.shape[1] == 15000
+    wide = data.rows(scene.positions, x[len(scene.positions) :], vertex_count=5000)
+    assert wide.jacobian.shape[1] == 15000
 
 
 def test_rows_of_a_moving_shape():
@@ -265,7 +266,8 @@ def test_candidates_statistics_and_octrees():
     assert octree.validate() == []
     root = octree.node(octree.root(a))
     assert root.geometry == a and root.parent is None and root.bounds.shape == (2, 3)
-    assert octree.nodes(a)[0] == octree.root(a) and octree.statistics().elements == 2 * len(scene.triangles)
+    assert octree.nodes(a)[0] == octree.root(a)
+    assert octree.statistics().elements == 2 * len(scene.triangles)
     assert isinstance(octree.last_update(b), palpate.LooseOctreeUpdate)
 
 

@@ -56,14 +56,15 @@ NO_FAULTS = r"""
 palpate\._(enums|errors|meshes|results|settings|shapes)\..*
 # mypy does not see that keyword-only fields are no positional patterns
 palpate\.(_\w+\.)?\w+\.__match_args__
-# pybind11 has a metaclass of its own, and every class has an __init__ that may only raise TypeError
+# pybind11 has a metaclass of its own, and every class has an __init__, which may raise TypeError
 palpate\.(_palpate\.)?[A-Z]\w+
 palpate\.(_palpate\.)?[A-Z]\w+\.__init__
 """
 
 
 def run(*arguments, cwd):
-    environment = {**os.environ, "PYTHONPATH": f"{PACKAGE.parent}", "MYPYPATH": f"{PACKAGE.parent}"}
+    folder = str(PACKAGE.parent)
+    environment = {**os.environ, "PYTHONPATH": folder, "MYPYPATH": folder}
     return subprocess.run(
         [sys.executable, "-m", *arguments],
         capture_output=True,

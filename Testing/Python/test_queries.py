@@ -25,7 +25,7 @@ def scene():
 def test_closest_points(scene):
     batch = scene.queries.closest_points(scene.ball, scene.points)
     single = [scene.queries.closest_point(scene.ball, point) for point in scene.points]
-    assert all(same(batch[i : i + 1], np.array([row], batch.dtype)) for i, row in enumerate(single))
+    assert same(batch, np.array(single, batch.dtype))
     positions, triangles = ball(10)
     corners = positions[batch["vertices"]]
     assert np.allclose(np.einsum("ni,nij->nj", batch["weights"], corners), batch["position"])
@@ -104,7 +104,8 @@ def test_pairs_of_bodies(scene):
     assert distance.distance == pytest.approx(3) and distance.a.geometry == scene.ball
     penetration = scene.queries.penetration(scene.ball, scene.tetrahedron)
     assert penetration.intersecting and penetration.depth > 0
-    inside, outside = scene.queries.path([[-3, 0.1, 0.2], [3, 0.1, 0.2]], 0.05, [scene.ball, scene.box])
+    line = [[-3, 0.1, 0.2], [3, 0.1, 0.2]]
+    inside, outside = scene.queries.path(line, 0.05, [scene.ball, scene.box])
     assert inside["body"].tolist() == [scene.ball] and outside["body"].tolist() == [scene.box]
     assert inside[0].leave - inside[0].enter == pytest.approx(2, abs=0.2)
 
@@ -146,14 +147,16 @@ def test_distance_functions():
     assert fixed.shape == (50,) and fixed[3].distance == single.distance
     edges = palpate.edge_edge_distance(p, a, b, c)
     assert np.allclose(np.linalg.norm(edges["difference"], axis=1), edges["distance"])
-    assert palpate.triangles_intersect([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1], [1, 1, 1])
+    other = [0, 0, 0], [0, 0, 1], [1, 1, 1]
+    assert palpate.triangles_intersect([0, 0, 0], [1, 0, 0], [0, 1, 0], *other)
     assert palpate.triangles_intersect(p, a, b, c, a, b).all()
     rest = ([0, 0, 0], [1, 0, 0], [0, 1, 0])
     time = palpate.vertex_triangle_time_of_impact([0.2, 0.2, 1], *rest, [0.2, 0.2, -1], *rest)
     assert time == pytest.approx(0.5, abs=1e-6)
     assert palpate.vertex_triangle_time_of_impact([5, 5, 1], *rest, [5, 5, -1], *rest) is None
+    before, now = [[0.2, 0.2, 1], [5, 5, 1]], [[0.2, 0.2, -1], [5, 5, -1]]
     times = palpate.vertex_triangle_time_of_impact(
-        [[0.2, 0.2, 1], [5, 5, 1]], *rest, [[0.2, 0.2, -1], [5, 5, -1]], *rest, minimum_distance=0.5
+        before, *rest, now, *rest, minimum_distance=0.5
     )
     assert times[0] == pytest.approx(0.25, abs=1e-5) and np.isnan(times[1])
     edge = ([0, 0, 0], [1, 0, 0])

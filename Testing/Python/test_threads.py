@@ -283,6 +283,10 @@ kept = scene.collisions.latest_snapshot(), scene.collisions.queries(), palpate.m
 print("end")
 """
     run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, cwd=pathlib.Path(__file__).parent
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        cwd=pathlib.Path(__file__).parent,
     )
     assert (run.returncode, run.stdout, run.stderr) == (0, "end\n", "")

@@ -40,9 +40,10 @@ def wheel(tmp_path_factory):
     python = fresh_environment(folder / "builder")
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     run(
-        python, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index",
-        "--wheel-dir", folder, source, env=environment,
-    )  # fmt: skip
+        *(python, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--no-index"),
+        *("--wheel-dir", folder, source),
+        env=environment,
+    )
     (result,) = folder.glob("*.whl")
     return result
 
@@ -77,7 +78,8 @@ def test_the_content(wheel, tmp_path):
 
 def test_it_works_in_a_fresh_environment(wheel, tmp_path):
     python = fresh_environment(tmp_path / "user")
-    environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "LD_LIBRARY_PATH")}
+    hidden = ("PYTHONPATH", "LD_LIBRARY_PATH")
+    environment = {k: v for k, v in os.environ.items() if k not in hidden}
     run(python, "-m", "pip", "install", "--no-index", "--no-deps", wheel, env=environment)
     hello = run(python, SOURCE / "Examples" / "Python" / "hello.py", cwd=tmp_path, env=environment)
     assert "vertex 0 meets triangle 0" in hello

@@ -180,6 +180,8 @@ py::array_t<std::uint32_t> copyOf(std::span<const ElementPair> pairs) {
       {reinterpret_cast<const std::array<std::uint32_t, 2>*>(pairs.data()), pairs.size()});
 }
 
-void protect(py::array& array) { array.attr("setflags")(py::arg("write") = false); }
+void protect(py::array& array) {
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+}
 
 }  // namespace palpate::python

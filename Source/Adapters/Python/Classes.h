@@ -263,7 +263,7 @@ T fromPython(const py::handle& value, const char* name) {
                              py::repr(value).cast<std::string>());
       throw Error(ErrorCode::InvalidSettings, std::string(name) + " is " +
                                                   py::repr(value).cast<std::string>() +
-                                                  ", which is outside its range.");
+                                                  ", which is no valid value.");
     }
   } else {
     return value.cast<T>();

@@ -8,14 +8,14 @@ GeometryId addTriangleMesh(Collisions& self, const py::object& positions,
                            const py::object& triangles) {
   const Positions p(positions, "positions");
   const Elements<3> t(triangles, "triangles");
-  return self.change([&](OctreeBasedCD& d) { return d.addTriangleMesh(p.span(), t.span()); });
+  return self.work([&](OctreeBasedCD& d) { return d.addTriangleMesh(p.span(), t.span()); });
 }
 
 GeometryId addTetrahedralMesh(Collisions& self, const py::object& positions,
                               const py::object& tetrahedra) {
   const Positions p(positions, "positions");
   const Elements<4> t(tetrahedra, "tetrahedra");
-  return self.change([&](OctreeBasedCD& d) { return d.addTetrahedralMesh(p.span(), t.span()); });
+  return self.work([&](OctreeBasedCD& d) { return d.addTetrahedralMesh(p.span(), t.span()); });
 }
 
 GeometryId addLineMesh(Collisions& self, const py::object& positions, const py::object& segments,
@@ -24,7 +24,7 @@ GeometryId addLineMesh(Collisions& self, const py::object& positions, const py::
   const Elements<2> s(segments, "segments");
   const Numbers radii(radius, "radius");
   const bool one = radii.span().size() == 1;
-  return self.change([&](OctreeBasedCD& d) {
+  return self.work([&](OctreeBasedCD& d) {
     return one ? d.addLineMesh(p.span(), s.span(), radii.span()[0])
                : d.addLineMesh(p.span(), s.span(), radii.span());
   });
@@ -34,7 +34,7 @@ GeometryId addPointSet(Collisions& self, const py::object& positions, const py::
   const Positions p(positions, "positions");
   const Numbers radii(radius, "radius");
   const bool one = radii.span().size() == 1;
-  return self.change([&](OctreeBasedCD& d) {
+  return self.work([&](OctreeBasedCD& d) {
     return one ? d.addPointSet(p.span(), radii.span()[0]) : d.addPointSet(p.span(), radii.span());
   });
 }
@@ -66,9 +66,9 @@ void setPositions(Collisions& self, const py::object& geometry, const py::object
                   const py::object& second) {
   const GeometryId id = geometryId(geometry);
   const Positions a(first, "positions");
-  if (second.is_none()) return self.change([&](OctreeBasedCD& d) { d.setPositions(id, a.span()); });
+  if (second.is_none()) return self.work([&](OctreeBasedCD& d) { d.setPositions(id, a.span()); });
   const Positions now(second, "positions now");
-  self.change([&](OctreeBasedCD& d) { d.setPositions(id, a.span(), now.span()); });
+  self.work([&](OctreeBasedCD& d) { d.setPositions(id, a.span(), now.span()); });
 }
 
 /// (pose now), (pose before, pose now) or (rotation, translation).
@@ -246,7 +246,7 @@ now, both ends of the step.)")
             const GeometryId g = geometryId(geometry);
             const Positions p(positions, "positions");
             const Elements<3> t(triangles, "triangles");
-            self.change([&](OctreeBasedCD& d) { d.setTriangles(g, p.span(), t.span()); });
+            self.work([&](OctreeBasedCD& d) { d.setTriangles(g, p.span(), t.span()); });
           },
           py::arg("geometry"), py::arg("positions"), py::arg("triangles"),
           R"(set_triangles(geometry, positions, triangles) -> None
@@ -259,7 +259,7 @@ Sets the topology of a triangle mesh, as after a cut, and its positions at both 
             const GeometryId g = geometryId(geometry);
             const Positions p(positions, "positions");
             const Elements<4> t(tetrahedra, "tetrahedra");
-            self.change([&](OctreeBasedCD& d) { d.setTetrahedra(g, p.span(), t.span()); });
+            self.work([&](OctreeBasedCD& d) { d.setTetrahedra(g, p.span(), t.span()); });
           },
           py::arg("geometry"), py::arg("positions"), py::arg("tetrahedra"),
           R"(set_tetrahedra(geometry, positions, tetrahedra) -> None

@@ -205,7 +205,7 @@ __all__ = [
     "write_capture",
 ]
 
-# Names in messages, in help() and in pickles are those of the package, wherever a class is defined.
+# Names in messages, in help() and in pickles are those of the package.
 for _name in __all__:
     if hasattr(globals()[_name], "__module__") and _name != "AnalyticalGeometry":
         globals()[_name].__module__ = "palpate"

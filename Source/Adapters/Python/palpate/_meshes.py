@@ -21,7 +21,8 @@ def add(collisions: OctreeBasedCD, mesh: Any, radius: npt.ArrayLike = 0.0) -> in
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return _add_faces(collisions, mesh.vertices, [np.asarray(mesh.faces)])
     if not (hasattr(mesh, "points") and hasattr(mesh, "cells")):
-        raise TypeError(f"{type(mesh).__name__} has neither vertices and faces nor points and cells")
+        kind = type(mesh).__name__
+        raise TypeError(f"{kind} has neither vertices and faces nor points and cells")
     points = np.asarray(mesh.points, dtype=np.float64)
     if points.ndim == 2 and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
