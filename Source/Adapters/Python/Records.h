@@ -215,13 +215,21 @@ py::object recordOf(const std::optional<T>& record) {
   return record ? recordOf(*record) : py::none();
 }
 
-/// An array that shows records of an owner, which never change, and keeps the owner alive.
+/// An array that shows records of an owner, which never change, and keeps the owner alive. It goes
+/// to NumPy's own functions, because a frame makes many views: py::array allocates its shape.
 template <HasFields T>
-py::array viewOf(std::span<const T> records, const py::object& owner) {
-  py::array array(
-      Format<T>::get(), std::vector<py::ssize_t>{static_cast<py::ssize_t>(records.size())},
-      std::vector<py::ssize_t>{static_cast<py::ssize_t>(sizeof(T))}, records.data(), owner);
-  protect(array);
+py::object viewOf(std::span<const T> records, const py::handle& owner) {
+  const auto& numpy = py::detail::npy_api::get();
+  const Py_intptr_t size = static_cast<Py_intptr_t>(records.size());
+  static const T kNone{};  // NumPy allocates for null
+  const T* first = records.empty() ? &kNone : records.data();
+  auto array = py::reinterpret_steal<py::object>(numpy.PyArray_NewFromDescr_(
+      numpy.PyArray_Type_, Format<T>::get().release().ptr(), 1, &size, nullptr,
+      const_cast<void*>(static_cast<const void*>(first)), 0, nullptr));
+  if (!array) throw py::error_already_set();
+  // Steals a reference to the owner.
+  if (numpy.PyArray_SetBaseObject_(array.ptr(), owner.inc_ref().ptr()) != 0)
+    throw py::error_already_set();
   return array;
 }
 
