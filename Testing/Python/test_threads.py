@@ -204,6 +204,21 @@ def test_two_objects_that_share_an_executor():
     run_with_limit(frames, frames, frames)
 
 
+def test_predicates_of_objects_that_share_an_executor():
+    executor = palpate.make_thread_pool(3)
+
+    def frames():
+        scene = Balls(rows=16, executor=executor)
+        refuse = palpate.ContactFeaturesKind.EDGE_EDGE
+        scene.collisions.set_contact_predicate(scene.a, scene.b, lambda f: f.kind != refuse)
+        for number in range(10):
+            data = scene.step(number)
+            near = scene.collisions.queries().closest_points(scene.a, scene.positions)
+            assert len(data.edge_edge) == 0 and len(near) == len(scene.positions)
+
+    run_with_limit(frames, frames, frames)
+
+
 def test_another_thread_at_work_on_the_same_object():
     collisions, a, b = big_frame()
     refused = []
