@@ -31,8 +31,6 @@ FUNCTIONS = {
     "appendMotions": "CollisionData.motions()",
 }
 METHODS = {
-    "OctreeBasedCD.contains": "has()",
-    "Snapshot.contains": "has()",
     "CollisionData.contents": "for engines that fill the object",
     "DistanceField.lookup": "for the library",
     "Executor.run": "a Python executor would run all tasks under the GIL",
@@ -52,16 +50,14 @@ CLASSES = {
     "DistanceFieldSettings": "keyword arguments of DistanceField.build()",
     "SimplifySettings": "keyword arguments of simplify()",
     "GuardedVertex": "rows (geometry, vertex)",
-    "ShapeMotion": "RigidMotion",
+    "ContinuousSettings": "keyword arguments of PairSettings",
+    "AutoSettings": "keyword arguments of PairSettings",
+    "LeafSettings": "keyword arguments of PairSettings",
 }
 FIELDS = {
-    "ContactSide.shape": "motion",
-    "VertexTriangleContact.corners": "vertices",
-    "VertexTriangleContact.barycentric": "weights",
-    "VertexTriangleDistance.barycentric": "weights",
-    "InsideVertex.corners": "vertices",
-    "InsideVertex.barycentric": "weights",
-    "TetrahedronPoint.corners": "vertices",
+    "PairSettings.continuous": "time_tolerance",
+    "PairSettings.automatic": "motion_tolerance",
+    "PairSettings.proxy": "widest_normal_cone",
 }
 NESTED = {"LooseOctree.Node": "OctreeNode", "FrameStatistics.Stages": "FrameStages"}
 

@@ -24,9 +24,7 @@ py::array overlapping(const Queries& self, Object geometry, Object shape, Object
   const AnalyticalGeometry value = shapeOf(shape);
   const Pose at = pose.is_none() ? Pose{} : poseOf(pose);
   std::vector<std::uint32_t> elements;
-  self.ask([&](const SpatialQueries& q) {
-    q.overlapping(id, value, at.rotation, at.translation, elements);
-  });
+  self.ask([&](const SpatialQueries& q) { q.overlapping(id, value, at, elements); });
   return copyOf(elements);
 }
 
@@ -38,16 +36,12 @@ py::object contacts(const Queries& self, Object geometry, Object shape, Object p
     auto& tool = shape.cast<Tool&>();
     const Passage passage(tool.gate, true);
     auto data = std::make_shared<CollisionData>();
-    self.askLong([&](const SpatialQueries& q) {
-      q.contacts(id, tool.mesh, at.rotation, at.translation, thickness, *data);
-    });
+    self.askLong([&](const SpatialQueries& q) { q.contacts(id, tool.mesh, at, thickness, *data); });
     return py::cast(data);
   }
   const AnalyticalGeometry value = shapeOf(shape);
   std::vector<ShapeContact> out;
-  self.ask([&](const SpatialQueries& q) {
-    q.contacts(id, value, at.rotation, at.translation, thickness, out);
-  });
+  self.ask([&](const SpatialQueries& q) { q.contacts(id, value, at, thickness, out); });
   return recordsOf(out);
 }
 

@@ -114,10 +114,7 @@ never changes, and its properties are copies.)");
     return g.analytical ? toPython(*g.analytical) : py::none();
   });
   addProperty(geometry, "motion", "A RigidMotion: the poses at both ends of the step.",
-              [](const Geometry& g) {
-                return toPython(
-                    ShapeMotion{g.rotationBefore, g.translationBefore, g.rotation, g.translation});
-              });
+              [](const Geometry& g) { return toPython(g.motion); });
   addProperty(geometry, "field", "The DistanceField, or None.",
               [](const Geometry& g) -> std::optional<DistanceField> {
                 if (g.field) return *g.field;

@@ -78,19 +78,19 @@ inline constexpr auto kFields<Settings> = std::tuple(
 template <>
 inline constexpr const char* kClass<PairSettings> = "PairSettings";
 template <>
-inline constexpr auto kFields<PairSettings> =
-    std::tuple(field("method", &PairSettings::method), field("thickness", &PairSettings::thickness),
-               field("contacts", &PairSettings::contacts),
-               field(
-                   "motion_tolerance", [](auto& s) -> auto& { return s.motionTolerance; }),
-               field("rest_distance", &PairSettings::restDistance),
-               field(
-                   "time_tolerance", [](auto& s) -> auto& { return s.timeTolerance; }),
-               field(
-                   "earliest_time_only", [](auto& s) -> auto& { return s.earliestTimeOnly; }),
-               field("allowed_error", &PairSettings::allowedError),
-               field(
-                   "widest_normal_cone", [](auto& s) -> auto& { return s.widestNormalCone; }));
+inline constexpr auto kFields<PairSettings> = std::tuple(
+    field("method", &PairSettings::method), field("thickness", &PairSettings::thickness),
+    field("contacts", &PairSettings::contacts),
+    field(
+        "motion_tolerance", [](auto& s) -> auto& { return s.automatic.motionTolerance; }),
+    field("rest_distance", &PairSettings::restDistance),
+    field(
+        "time_tolerance", [](auto& s) -> auto& { return s.continuous.timeTolerance; }),
+    field(
+        "earliest_time_only", [](auto& s) -> auto& { return s.continuous.earliestTimeOnly; }),
+    field("allowed_error", &PairSettings::allowedError),
+    field(
+        "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }));
 template <>
 inline constexpr const char* kClass<SurfaceProxySettings> = "SurfaceProxySettings";
 template <>
@@ -274,8 +274,8 @@ T fromPython(const py::handle& value, const char* name) {
 Pose poseOf(const py::handle& pose);
 py::object toPython(const Pose& pose);
 /// None is a body that was never placed.
-ShapeMotion motionOf(const py::handle& motion);
-py::object toPython(const ShapeMotion& motion);
+RigidMotion motionOf(const py::handle& motion);
+py::object toPython(const RigidMotion& motion);
 AnalyticalGeometry shapeOf(const py::handle& shape);
 py::object toPython(const AnalyticalGeometry& shape);
 

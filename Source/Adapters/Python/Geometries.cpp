@@ -80,17 +80,12 @@ void setTransform(Collisions& self, const py::object& geometry, const py::object
     if (second.is_none())
       throw py::type_error("set_transform() takes a Pose, or a translation too.");
     const Pose now = poseOf(poseClass(first, second));
-    return self.change(
-        [&](OctreeBasedCD& d) { d.setTransform(id, now.rotation, now.translation); });
+    return self.change([&](OctreeBasedCD& d) { d.setTransform(id, now); });
   }
   const Pose pose = poseOf(first);
-  if (second.is_none())
-    return self.change(
-        [&](OctreeBasedCD& d) { d.setTransform(id, pose.rotation, pose.translation); });
+  if (second.is_none()) return self.change([&](OctreeBasedCD& d) { d.setTransform(id, pose); });
   const Pose now = poseOf(second);
-  self.change([&](OctreeBasedCD& d) {
-    d.setTransform(id, pose.rotation, pose.translation, now.rotation, now.translation);
-  });
+  self.change([&](OctreeBasedCD& d) { d.setTransform(id, pose, now); });
 }
 
 py::array_t<double> bounds(Collisions& self, const py::object& geometry) {
@@ -111,7 +106,7 @@ py::object surface(Collisions& self, const py::object& geometry) {
 bool has(Collisions& self, const py::object& geometry) {
   try {
     const GeometryId id = geometryId(geometry);
-    return self.read([&](OctreeBasedCD& d) { return d.contains(id); });
+    return self.read([&](OctreeBasedCD& d) { return d.has(id); });
   } catch (const Error& error) {
     if (error.code() != ErrorCode::UnknownGeometry) throw;
     return false;

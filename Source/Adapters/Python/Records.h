@@ -23,8 +23,8 @@ template <>
 inline constexpr auto kFields<VertexTriangleContact> =
     std::tuple(field("vertex", &VertexTriangleContact::vertex),
                field("triangle", &VertexTriangleContact::triangle),
-               field("vertices", &VertexTriangleContact::corners),
-               field("weights", &VertexTriangleContact::barycentric),
+               field("vertices", &VertexTriangleContact::vertices),
+               field("weights", &VertexTriangleContact::weights),
                field("normal", &VertexTriangleContact::normal),
                field("distance", &VertexTriangleContact::distance),
                field("time_of_impact", &VertexTriangleContact::timeOfImpact),
@@ -52,10 +52,13 @@ inline constexpr auto kFields<ShapeShapeContact> = std::tuple(
     field("normal", &ShapeShapeContact::normal), field("distance", &ShapeShapeContact::distance),
     field("time_of_impact", &ShapeShapeContact::timeOfImpact));
 template <>
-inline constexpr auto kFields<SurfacePoint> = std::tuple(
-    field("geometry", &SurfacePoint::geometry), field("element", &SurfacePoint::element),
-    field("vertices", &SurfacePoint::vertices), field("weights", &SurfacePoint::weights),
-    field("position", &SurfacePoint::position), field("distance", &SurfacePoint::distance));
+inline constexpr auto kFields<SurfacePoint> = std::tuple(field("geometry", &SurfacePoint::geometry),
+                                                         field("element", &SurfacePoint::element),
+                                                         field("vertices", &SurfacePoint::vertices),
+                                                         field("weights", &SurfacePoint::weights),
+                                                         field("position", &SurfacePoint::position),
+                                                         field("distance", &SurfacePoint::distance),
+                                                         field("normal", &SurfacePoint::normal));
 template <>
 inline constexpr auto kFields<SignedDistance> = std::tuple(
     field("nearest", &SignedDistance::nearest), field("distance", &SignedDistance::distance));
@@ -91,11 +94,11 @@ inline constexpr auto kFields<PathClearance> =
     std::tuple(field("body", &PathClearance::body), field("distance", &PathClearance::distance),
                field("at", &PathClearance::at), field("nearest", &PathClearance::nearest));
 template <>
-inline constexpr auto kFields<InsideVertex> = std::tuple(
-    field("vertex", &InsideVertex::vertex), field("triangle", &InsideVertex::triangle),
-    field("vertices", &InsideVertex::corners), field("weights", &InsideVertex::barycentric),
-    field("direction", &InsideVertex::direction), field("depth", &InsideVertex::depth),
-    field("decided", &InsideVertex::decided));
+inline constexpr auto kFields<InsideVertex> =
+    std::tuple(field("vertex", &InsideVertex::vertex), field("triangle", &InsideVertex::triangle),
+               field("vertices", &InsideVertex::vertices), field("weights", &InsideVertex::weights),
+               field("direction", &InsideVertex::direction), field("depth", &InsideVertex::depth),
+               field("decided", &InsideVertex::decided));
 template <>
 inline constexpr auto kFields<TrackedVertex> = std::tuple(field("penetration",
                                                                 &TrackedVertex::penetration),
@@ -104,7 +107,7 @@ inline constexpr auto kFields<TrackedVertex> = std::tuple(field("penetration",
 template <>
 inline constexpr auto kFields<TetrahedronPoint> = std::tuple(
     field("tetrahedron", &TetrahedronPoint::tetrahedron),
-    field("vertices", &TetrahedronPoint::corners), field("weights", &TetrahedronPoint::weights));
+    field("vertices", &TetrahedronPoint::vertices), field("weights", &TetrahedronPoint::weights));
 template <>
 inline constexpr auto kFields<EmbeddedVertex> = std::tuple(field("vertex", &EmbeddedVertex::vertex),
                                                            field("at", &EmbeddedVertex::at));
@@ -122,7 +125,7 @@ inline constexpr auto kFields<HeldVertex> = std::tuple(field("geometry", &HeldVe
                                                        field("fraction", &HeldVertex::fraction));
 template <>
 inline constexpr auto kFields<VertexTriangleDistance> =
-    std::tuple(field("weights", &VertexTriangleDistance::barycentric),
+    std::tuple(field("weights", &VertexTriangleDistance::weights),
                field("difference", &VertexTriangleDistance::difference),
                field("normal", &VertexTriangleDistance::normal),
                field("distance", &VertexTriangleDistance::distance),

@@ -26,16 +26,14 @@ py::object toPython(const Pose& pose) {
   return lookedUp<Pose>("palpate", "Pose")(copyOf(pose.rotation), copyOf(pose.translation));
 }
 
-ShapeMotion motionOf(const py::handle& motion) {
+RigidMotion motionOf(const py::handle& motion) {
   if (motion.is_none()) return {};
-  const Pose before = poseOf(motion.attr("before")), now = poseOf(motion.attr("now"));
-  return {before.rotation, before.translation, now.rotation, now.translation};
+  return {poseOf(motion.attr("before")), poseOf(motion.attr("now"))};
 }
 
-py::object toPython(const ShapeMotion& motion) {
-  return lookedUp<ShapeMotion>("palpate", "RigidMotion")(
-      toPython(Pose{motion.rotationBefore, motion.translationBefore}),
-      toPython(Pose{motion.rotation, motion.translation}));
+py::object toPython(const RigidMotion& motion) {
+  return lookedUp<RigidMotion>("palpate", "RigidMotion")(toPython(motion.before),
+                                                         toPython(motion.now));
 }
 
 AnalyticalGeometry shapeOf(const py::handle& shape) {

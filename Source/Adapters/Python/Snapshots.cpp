@@ -45,7 +45,7 @@ cannot be written.)")
           "has",
           [](const Published& self, Object geometry) {
             try {
-              return self.snapshot->contains(geometryId(geometry));
+              return self.snapshot->has(geometryId(geometry));
             } catch (const Error&) {
               return false;  // no 32-bit id
             }
