@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: elements in shapes, contacts and penetrations of bodies.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 #include "Python/Records.h"

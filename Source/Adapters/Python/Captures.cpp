@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: problems, captures and audits.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 #include "Python/Records.h"

@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: distance fields and surface proxies.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

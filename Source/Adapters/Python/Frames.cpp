@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: frames and their statistics.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

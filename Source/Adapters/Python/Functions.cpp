@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: functions on positions.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 #include "Python/Records.h"

@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: geometries of an OctreeBasedCD.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

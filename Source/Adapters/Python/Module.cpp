@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: the extension module.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

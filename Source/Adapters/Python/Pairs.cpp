@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: pairs of an OctreeBasedCD.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

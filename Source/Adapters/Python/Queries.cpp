@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: points and bodies.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 #include "Python/Records.h"

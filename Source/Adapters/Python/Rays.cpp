@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: rays and paths.
+
 #include "Python/Collisions.h"
 #include "Python/Records.h"
 

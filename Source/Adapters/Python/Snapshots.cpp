@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: snapshots.
+
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 

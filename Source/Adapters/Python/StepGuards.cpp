@@ -1,3 +1,5 @@
+// Part of Python/Classes.h: step guards.
+
 #include "Python/Collisions.h"
 #include "Python/Records.h"
 
