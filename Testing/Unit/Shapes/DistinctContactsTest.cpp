@@ -200,7 +200,7 @@ TEST(DistinctContacts, MatchTheDefinition) {
         const CollisionData all = answerOf(Contacts::All), distinct = answerOf(Contacts::Distinct);
         std::vector<ConstraintRow> rows;
         appendRows(all, {0, mesh.positions, moved}, {}, rows,
-                   {before.rotation, before.translation, now.rotation, now.translation});
+                   {{before.rotation, before.translation}, {now.rotation, now.translation}});
         std::vector<ShapeContact> candidates;
         std::vector<double> gaps;
         for (std::size_t i = 0; i < rows.size(); ++i) {
