@@ -39,7 +39,7 @@ struct MeshReadSettings {
 ///   .stl          text and binary
 ///   .vtk          legacy VTK files, versions 1 to 5.1, text and binary: polygonal data and
 ///                 unstructured grids
-///   .vtp, .vtu    VTK's XML files of the same two kinds: text, Base64 and raw, also compressed by
+///   .vtp, .vtu    XML files of VTK, of the same two kinds: text, Base64, raw, also compressed by
 ///                 ZLib or LZ4
 ///   .msh          Gmsh 2.2 and 4.1, text and binary of both byte orders
 ///   .mesh         MEDIT, text
