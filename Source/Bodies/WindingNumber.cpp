@@ -127,10 +127,10 @@ static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
 
 /// Clusters that stand for all triangles that were not summed one by one, as a heap by error.
 struct WindingNumbers::Front {
-  struct Entry {
-    SolidAngleShare share;
+  struct Entry {  // without initial values, so that a search does not write unused ones
+    double value, error;
     OctreeNode node;
-    friend bool operator<(const Entry& l, const Entry& r) { return l.share.error < r.share.error; }
+    friend bool operator<(const Entry& l, const Entry& r) { return l.error < r.error; }
   };
   std::array<Entry, kMostClusters> all;
   std::size_t size = 0;
@@ -144,7 +144,7 @@ struct WindingNumbers::Front {
 
 void WindingNumbers::Front::push(OctreeNode node, const SolidAngleShare& share) {
   PALPATE_ASSERT(size < all.size());
-  all[size++] = {share, node};
+  all[size++] = {share.value, share.error, node};
   std::push_heap(all.data(), all.data() + size);
   sum.add(share);
 }
@@ -152,15 +152,15 @@ void WindingNumbers::Front::push(OctreeNode node, const SolidAngleShare& share) 
 OctreeNode WindingNumbers::Front::popLargestError() {
   PALPATE_ASSERT(size > 0);
   std::pop_heap(all.data(), all.data() + size--);
-  const auto& [share, node] = all[size];
-  sum.value -= share.value;
-  sum.error -= share.error;
+  const auto& [value, error, node] = all[size];
+  sum.value -= value;
+  sum.error -= error;
   return node;
 }
 
 SolidAngleShare WindingNumbers::Front::exactSum() const {
   SolidAngleShare exact;
-  for (std::size_t i = 0; i < size; ++i) exact.add(all[i].share);
+  for (std::size_t i = 0; i < size; ++i) exact.add({all[i].value, all[i].error});
   return exact;
 }
 

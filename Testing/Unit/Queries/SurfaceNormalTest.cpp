@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The normals of faces at angles from the library's own atan2(), and of edges and vertices by
-/// their sums, over all triangles.
+/// The sum of the normals of all triangles that hold the point, at a vertex weighted by their
+/// angles.
 Vector3d truthOf(const Mesh& mesh, const SurfacePoint& at) {
   Vector3d sum = Vector3d::Zero();
   for (const Triangle& t : mesh.triangles) {
