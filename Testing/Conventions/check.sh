@@ -92,7 +92,7 @@ checkPublicHeaders() {
   local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/MeshFiles/Public
     -ISource/Adapters/Vtk/Public -ISource/Adapters/Fcl/Public -isystem "$2") header include
   # The files that a compilation, with these options, reads.
-  reached() { "${compile[@]}" -fsyntax-only -MD -MF /dev/stdout "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
+  reached() { "${compile[@]}" -fsyntax-only -MD -MF - "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
   local allowed files
   allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
     reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
