@@ -407,7 +407,8 @@ TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   std::vector<GeometryId> ids;
   for (const AnalyticalGeometry& shape : kindsOfShape(random)) {
     ids.push_back(collisions.addAnalyticalGeometry(shape));
-    collisions.setTransform(ids.back(), {randomTurn(random), 2 * randomPoint(random, -1, 1)});
+    const Matrix3d turn = randomTurn(random);
+    collisions.setTransform(ids.back(), {turn, randomPoint(random, -1, 1)});
     for (const GeometryId id : ids)
       if (id != ids.back() && !std::holds_alternative<Plane>(shape))
         collisions.addCollisionPair(id, ids.back(), continuousPair(0.05));
@@ -415,8 +416,8 @@ TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
   collisions.detectCollision();
   collisions.advance();
   for (const GeometryId id : ids) {
-    const Vector3d at = 2 * randomPoint(random, -1, 1);
-    collisions.setTransform(id, {randomTurn(random), at});
+    const Matrix3d turn = randomTurn(random);
+    collisions.setTransform(id, {turn, randomPoint(random, -1, 1)});
   }
   collisions.detectCollision();
   EXPECT_TRUE(collisions.auditFailures().empty());
