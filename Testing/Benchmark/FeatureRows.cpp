@@ -30,14 +30,14 @@ class FeatureCandidates {
       : m_threads(1),
         m_id(m_table.add(workload.frames[0][0], workload.task.meshes[0])),
         m_geometry(m_table.at(m_id)) {
-    m_geometry.tree.setSwept(swept);
+    m_geometry.body.tree.setSwept(swept);
   }
 
   void frame(const std::vector<Eigen::Vector3d>& before, const std::vector<Eigen::Vector3d>& now) {
     vertexTriangle = edgeEdge = 0;
     m_table.setPositions(m_id, before, now, m_threads);
     m_table.updateOctrees({}, m_threads);
-    const GeometryOctree& tree = m_geometry.tree;
+    const GeometryOctree& tree = m_geometry.body.tree;
     TreePair trees{&tree.octree(), &tree.octree()};
     setShift(trees, {0, 0, 0}, 0);
     m_floats = {tree.floats(), tree.floats(), nullptr, nullptr, trees.shiftLower, trees.shiftUpper};
@@ -61,7 +61,7 @@ class FeatureCandidates {
  private:
   static void receive(void* context, std::span<const ElementPair> pairs) {
     auto& self = *static_cast<FeatureCandidates*>(context);
-    const MeshTopology& topology = self.m_geometry.mesh.topology;
+    const MeshTopology& topology = self.m_geometry.body.mesh.topology;
     findFeaturePairs(topology, topology, &self.m_floats, pairs, self.m_features);
     self.vertexTriangle += self.m_features.vertexTriangle.size();
     self.edgeEdge += self.m_features.edgeEdge.size();

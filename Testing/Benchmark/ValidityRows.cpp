@@ -4,7 +4,7 @@
 // third is the number of pairs times the cost of one. The whole frame is given beside it.
 #include "Rows.h"
 
-#include "CollisionDetection/GeometryChecks.h"
+#include "Bodies/InputChecks.h"
 #include "Mesh/Motion.h"
 #include "Math/MotionBound.h"
 #include "NarrowPhase/IntersectionFilter.h"
