@@ -5,6 +5,7 @@
 #include <dlfcn.h>
 
 #include <deque>
+#include <vector>
 
 namespace palpate {
 
@@ -15,11 +16,13 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
   const CollisionData& data = next(this, a, b);
   if (settings().engine == Engine::BruteForce) return data;
   static std::deque<CollisionData> kept;  // references stay
-  kept.push_back(data);
-  std::erase_if(kept.back().contents().edgeEdge, [](const EdgeEdgeContact& contact) {
+  CollisionData::Parts parts = data.parts();
+  std::vector<EdgeEdgeContact> edges(parts.edgeEdge.begin(), parts.edgeEdge.end());
+  std::erase_if(edges, [](const EdgeEdgeContact& contact) {
     return contact.weightA > 0.4 && contact.weightA < 0.6;
   });
-  return kept.back();
+  parts.edgeEdge = edges;
+  return kept.emplace_back(parts);
 }
 
 }  // namespace palpate

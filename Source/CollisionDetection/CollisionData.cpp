@@ -34,35 +34,95 @@ class Hash {
 
 }  // namespace
 
+CollisionData::CollisionData() noexcept = default;
+CollisionData::CollisionData(const CollisionData& other)
+    : m_contents(other.m_contents ? std::make_unique<Contents>(*other.m_contents) : nullptr) {}
+CollisionData::CollisionData(CollisionData&&) noexcept = default;
+CollisionData& CollisionData::operator=(const CollisionData& other) {
+  return *this = CollisionData(other);
+}
+CollisionData& CollisionData::operator=(CollisionData&&) noexcept = default;
+CollisionData::~CollisionData() = default;
+
+CollisionData::CollisionData(const Parts& parts) {
+  const auto listOf = [](auto span) {
+    return CountedVector<typename decltype(span)::value_type>(span.begin(), span.end());
+  };
+  Contents::of(*this) = {{},
+                         listOf(parts.vertexTriangle),
+                         listOf(parts.triangleVertex),
+                         listOf(parts.edgeEdge),
+                         listOf(parts.intersectingTriangles),
+                         listOf(parts.shape),
+                         listOf(parts.shapeShape),
+                         parts.earliestTimeOfImpact,
+                         parts.errorBound,
+                         parts.validity};
+}
+
+const CollisionData::Contents& CollisionData::read() const {
+  static const Contents none;
+  return m_contents ? *m_contents : none;
+}
+
+CollisionData::Parts CollisionData::parts() const {
+  return {vertexTriangle(),
+          triangleVertex(),
+          edgeEdge(),
+          intersectingTriangles(),
+          shape(),
+          shapeShape(),
+          read().earliestTimeOfImpact,
+          errorBound(),
+          validity()};
+}
+
+std::span<const VertexTriangleContact> CollisionData::vertexTriangle() const {
+  return read().vertexTriangle;
+}
+std::span<const VertexTriangleContact> CollisionData::triangleVertex() const {
+  return read().triangleVertex;
+}
+std::span<const EdgeEdgeContact> CollisionData::edgeEdge() const { return read().edgeEdge; }
+std::span<const ElementPair> CollisionData::intersectingTriangles() const {
+  return read().intersectingTriangles;
+}
+std::span<const ShapeContact> CollisionData::shape() const { return read().shape; }
+std::span<const ShapeShapeContact> CollisionData::shapeShape() const { return read().shapeShape; }
+double CollisionData::errorBound() const { return read().errorBound; }
+const Validity& CollisionData::validity() const { return read().validity; }
+
 double CollisionData::earliestTimeOfImpact() const {
-  double earliest = m_contents.earliestTimeOfImpact;
-  forEachTimed(m_contents, [&](const auto& list) {
+  const Contents& contents = read();
+  double earliest = contents.earliestTimeOfImpact;
+  forEachTimed(contents, [&](const auto& list) {
     for (const auto& contact : list) earliest = std::min(earliest, contact.timeOfImpact);
   });
   return earliest;
 }
 
 std::uint64_t CollisionData::hash() const {
+  const Contents& contents = read();
   Hash hash;
-  for (const auto* list : {&m_contents.vertexTriangle, &m_contents.triangleVertex}) {
+  for (const auto* list : {&contents.vertexTriangle, &contents.triangleVertex}) {
     hash.add(list->size());
     for (const VertexTriangleContact& c : *list)
       hash.add(c.vertex, c.triangle, c.weights, c.normal, c.distance, c.timeOfImpact,
                static_cast<std::uint64_t>(c.feature));
   }
-  hash.add(m_contents.edgeEdge.size());
-  for (const EdgeEdgeContact& c : m_contents.edgeEdge)
+  hash.add(contents.edgeEdge.size());
+  for (const EdgeEdgeContact& c : contents.edgeEdge)
     hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal,
              static_cast<std::uint64_t>(c.featureA) << 8 | static_cast<std::uint64_t>(c.featureB));
-  hash.add(m_contents.intersectingTriangles.size());
-  for (const ElementPair& p : m_contents.intersectingTriangles)
+  hash.add(contents.intersectingTriangles.size());
+  for (const ElementPair& p : contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
-  for (const ShapeContact& c : m_contents.shape)
+  for (const ShapeContact& c : contents.shape)
     hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,
              c.pointOnShape, c.normal, c.distance, c.timeOfImpact);
-  for (const ShapeShapeContact& c : m_contents.shapeShape)
+  for (const ShapeShapeContact& c : contents.shapeShape)
     hash.add(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
-  if (const double earliest = m_contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
+  if (const double earliest = contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }
 

@@ -77,7 +77,7 @@ void FieldWork::join(Jobs jobs, const FrameJoin& join) const {
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeField(record, contents);
   results.assess(record, false, join.statistics);
   countContacts(0, contents);

@@ -131,7 +131,7 @@ GeometryId GeometryTable::add(const AnalyticalGeometry& analytical) {
 GeometryId GeometryTable::add(std::shared_ptr<const DistanceField> field) {
   const GeometryId id = nextId();
   if (!field) throw Error(ErrorCode::InvalidSettings, nameOf(id) + ": the field is null", id);
-  field->lookup();  // throws if it was moved from
+  static_cast<void>(field->isClosed());  // throws if it was moved from
   MeshTopology topology;
   topology.type = GeometryType::Field;
   auto geometry = make({}, std::move(topology));

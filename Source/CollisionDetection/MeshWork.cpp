@@ -268,7 +268,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   // the step starts intersecting only Intersection knows the side.
   const std::size_t intersectionCount = results.order(record, preferBodies(join, preferred));
   join.statistics.exactDecisions += pierced.exactDecisions;
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
   const bool nearby =
       std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });

@@ -314,7 +314,7 @@ SpatialQueries OctreeBasedCD::queries() const {
   read();
   const StandardFloatingPoint standard;
   m_implementation->querySource->updateOctrees();
-  return SpatialQueries(m_implementation->querySource);
+  return SpatialQueries::Source::queries(m_implementation->querySource);
 }
 
 void OctreeBasedCD::publish(double time) {

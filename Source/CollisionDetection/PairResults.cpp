@@ -46,11 +46,12 @@ void PairResults::sortFacts(const PairRecord& record) {
 
 std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {
   PALPATE_ASSERT(preferred <= m_found.size());
-  return orderContacts(m_found, preferred, m_orderScratch, record.next.contents());
+  return orderContacts(m_found, preferred, m_orderScratch,
+                       CollisionData::Contents::of(record.next));
 }
 
 void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& statistics) {
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   if (!record.guarded)
@@ -62,7 +63,8 @@ void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& stati
 
 void PairResults::keepFirstImpacts(PairRecord& record, double end) {
   if (record.pair.settings.contacts == Contacts::Distinct)
-    m_firstImpacts.keep(record.meshes(), end, m_orderScratch, record.next.contents());
+    m_firstImpacts.keep(record.meshes(), end, m_orderScratch,
+                        CollisionData::Contents::of(record.next));
 }
 
 void keepDistinct(const PairRecord& record, DistinctContacts& distinct,

@@ -48,7 +48,8 @@ class PairResults {
   void keepFirstImpacts(PairRecord&, double end);
   /// Contacts::Distinct for a shape.
   void keepDistinct(PairRecord& record) {
-    palpate::keepDistinct(record, m_distinctContacts, record.next.contents().shape);
+    palpate::keepDistinct(record, m_distinctContacts,
+                          CollisionData::Contents::of(record.next).shape);
   }
 
   /// Of work on meshes.

@@ -63,7 +63,7 @@ void PairRecord::releaseMemory() {
   fieldScratch.reset();
   if (!candidatesVersion.isValid()) candidates.clear();
   releaseSpare(candidates);
-  CollisionData::Contents& kept = data.contents();
+  CollisionData::Contents& kept = CollisionData::Contents::of(data);
   forEachTimed(kept, [](auto& list) { releaseSpare(list); });
   releaseSpare(kept.intersectingTriangles);
 }

@@ -110,7 +110,7 @@ void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
   m_particles.describe(jobs, contents);
   results.assess(record, false, join.statistics);

@@ -29,7 +29,7 @@ void ProxyWork::runByBruteForce(JobScratch& scratch) {
 
 void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   contents.vertexTriangle.clear();
   contents.triangleVertex.clear();
   contents.edgeEdge.clear();

@@ -63,7 +63,7 @@ void ShapeWork::join(Jobs jobs, const FrameJoin& join) const {
   }
   results.sortFacts(record);
   results.order(record);
-  CollisionData::Contents& contents = record.next.contents();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
   results.assess(record, false, join.statistics);
   if (record.plan.kind == PairKind::MeshAndShape) results.keepDistinct(record);

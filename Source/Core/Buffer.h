@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
+#include "Core/CountedVector.h"
 
 #include <cstddef>
 #include <type_traits>

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
 #include <palpate/FrameStatistics.h>
+
+#include "Core/CountedVector.h"
 
 #include <array>
 #include <atomic>

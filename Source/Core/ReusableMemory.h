@@ -1,8 +1,7 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
-
 #include "Core/Assert.h"
+#include "Core/CountedVector.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -19,15 +19,6 @@
 
 namespace palpate {
 
-struct DistanceField::Implementation {
-  explicit Implementation(FieldCells newCells) : cells(std::move(newCells)), lookup(cells) {}
-  Implementation(const Implementation&) = delete;
-  Implementation& operator=(const Implementation&) = delete;
-
-  const FieldCells cells;
-  const FieldLookup lookup;
-};
-
 namespace {
 
 void checkPoint(const Eigen::Vector3d& point, const char* name) {
@@ -100,8 +91,6 @@ void DistanceField::values(std::span<const Eigen::Vector3d> points, std::span<do
     if (!isWithinRange(points[i])) checkPoint(points[i], ("point " + std::to_string(i)).c_str());
   field.lookup.values(points, out.data());
 }
-
-const FieldLookup& DistanceField::lookup() const { return valid().lookup; }
 
 void DistanceField::save(const std::filesystem::path& path) const {
   const Implementation& field = valid();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <palpate/DistanceField.h>
+
 #include "Math/StableLength.h"
 #include "Core/Assert.h"
 
@@ -11,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -220,6 +223,18 @@ class FieldLookup {
 
   const FieldCells& m_cells;
   FieldFrame m_frame;
+};
+
+struct DistanceField::Implementation {
+  explicit Implementation(FieldCells newCells) : cells(std::move(newCells)), lookup(cells) {}
+  Implementation(const Implementation&) = delete;
+  Implementation& operator=(const Implementation&) = delete;
+
+  /// Throws if the field was moved from.
+  static const FieldLookup& lookupOf(const DistanceField& field) { return field.valid().lookup; }
+
+  const FieldCells cells;
+  const FieldLookup lookup;
 };
 
 }  // namespace palpate

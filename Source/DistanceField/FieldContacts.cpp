@@ -27,7 +27,7 @@ constexpr std::size_t kValuesAtOnce = 128;
 }  // namespace
 
 PlacedField::PlacedField(const DistanceField& field, const Positions& body)
-    : m_field(field), m_lookup(field.lookup()) {
+    : m_field(field), m_lookup(DistanceField::Implementation::lookupOf(field)) {
   if (!body.isPlaced()) return;
   m_pose = {orthonormal(body.transform().rotation), body.transform().translation};
   m_turned = (body.transform().rotation - m_pose.rotation).norm();

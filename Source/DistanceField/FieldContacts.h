@@ -16,6 +16,8 @@
 
 namespace palpate {
 
+class FieldLookup;
+
 /// A distance field in the world.
 class PlacedField {
  public:

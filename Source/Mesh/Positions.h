@@ -1,10 +1,10 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
 #include <palpate/Types.h>
 
 #include "Mesh/Revision.h"
 #include "Core/Assert.h"
+#include "Core/CountedVector.h"
 
 #include <Eigen/Core>
 

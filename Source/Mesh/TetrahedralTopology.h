@@ -1,7 +1,8 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
 #include <palpate/TetrahedralMesh.h>
+
+#include "Core/CountedVector.h"
 
 #include <Eigen/Core>
 

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <palpate/CollisionData.h>
 #include <palpate/Settings.h>
 
+#include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "Shapes/ShapeContacts.h"

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
 #include <palpate/Settings.h>
 
 #include "Queries/PairTraversal.h"
@@ -8,6 +7,7 @@
 #include "Bodies/Body.h"
 #include "Octree/PointQueries.h"
 #include "Math/TriangleIntersection.h"
+#include "Core/CountedVector.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>

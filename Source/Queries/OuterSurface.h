@@ -1,9 +1,8 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
-
 #include "Queries/PointDistances.h"
 #include "Bodies/Body.h"
+#include "Core/CountedVector.h"
 
 #include <Eigen/Core>
 

@@ -171,7 +171,7 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
     throw Error(ErrorCode::InvalidCall, "this PenetrationTracker was moved from");
   Implementation& all = *m_implementation;
   queries.findInsideVertices(all.vertices, all.body, all.inside);
-  SpatialQueries::Source& source = queries.valid();
+  SpatialQueries::Source& source = SpatialQueries::Source::of(queries);
   const StandardFloatingPoint standard;
   const Body &vertices = source.at(all.vertices), &body = source.at(all.body);
   const std::size_t size = all.inside.size(), parts = (size + kGrain - 1) / kGrain;

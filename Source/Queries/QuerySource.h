@@ -99,6 +99,11 @@ class SpatialQueries::Source {
       : m_pool(std::move(pool)) {}
   virtual ~Source() = default;
 
+  static SpatialQueries queries(std::shared_ptr<Source> source) {
+    return SpatialQueries(std::move(source));
+  }
+  static Source& of(const SpatialQueries& queries) { return queries.valid(); }
+
   /// A number for the present state of all geometries. 0: the octrees are not up to date, or the
   /// owner or the snapshot is gone.
   virtual std::uint64_t state() const = 0;

@@ -116,7 +116,7 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Pose& placem
   sorted.validity.effectiveThickness = thickness;
   sorted.validity.atEnd =
       sorted.vertexTriangle.size() + sorted.triangleVertex.size() + sorted.edgeEdge.size();
-  std::swap(out.contents(), sorted);
+  std::swap(CollisionData::Contents::of(out), sorted);
 }
 
 }  // namespace palpate

@@ -16,8 +16,6 @@
 
 namespace palpate {
 
-namespace {}  // namespace
-
 bool GeometryCopy::isCurrent(const Body& original) const {
   return m_version.isCurrent(original.state()) && geometry.name == original.name &&
          geometry.tree.updates() == original.tree.updates();
@@ -82,6 +80,7 @@ class Snapshot::Contents : public SpatialQueries::Source {
   }
   const SpatialQueries& queries() const { return *m_queries; }
   double time() const { return m_time; }
+  const Snapshot& snapshot() const { return m_snapshot; }
 
  protected:
   std::vector<GeometryCopy*> m_geometries;  ///< by ascending ids
@@ -94,6 +93,7 @@ class Snapshot::Contents : public SpatialQueries::Source {
 
  private:
   const Threads m_thread{1};
+  const Snapshot m_snapshot{*this};
 };
 
 /// One snapshot, with the memory of its shared_ptr's control block.
@@ -111,14 +111,13 @@ class SnapshotPool::Slot : public Snapshot::Contents, public CountedObject {
     m_octreeSettings = frame.octreeSettings();
     m_time = time;
     m_state.store(number, std::memory_order_relaxed);
-    m_queries.emplace(std::move(self));
+    m_queries = Source::queries(std::move(self));
   }
   void release() {
     m_queries.reset();
     m_state.store(0, std::memory_order_release);
   }
 
-  const Snapshot snapshot{*this};
   alignas(std::max_align_t) std::byte controlBlock[128];
 };
 
@@ -220,7 +219,7 @@ std::shared_ptr<const Snapshot> SnapshotPool::take(SpatialQueries::Source& frame
   }
   // Nothing below throws.
   slot.start({shared_from_this(), &slot}, frame, ++m_last, time);
-  return {&slot.snapshot, [](const Snapshot*) {},
+  return {&slot.snapshot(), [](const Snapshot*) {},
           SlotAllocator<Snapshot>(shared_from_this(), slot)};
 }
 

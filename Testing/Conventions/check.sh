@@ -53,7 +53,7 @@ checkIncludes() {
           fault "$file: $module may not include ${include#\"}"
           ;;
         "<palpate/"*)
-          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform|CountedVector|FrameStatistics)\.h$ ]] ||
+          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform|FrameStatistics)\.h$ ]] ||
             fault "$file: Core may include Public's plain types only, not ${include#<}"
           ;;
       esac

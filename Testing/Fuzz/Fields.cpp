@@ -38,7 +38,8 @@ std::vector<Eigen::Vector3d> pointsOf(const FieldCells& cells) {
 }
 
 void check(const DistanceField& field) {
-  const std::vector<Eigen::Vector3d> points = pointsOf(field.lookup().cells());
+  const std::vector<Eigen::Vector3d> points =
+      pointsOf(DistanceField::Implementation::lookupOf(field).cells());
   std::vector<double> values(points.size());
   field.values(points, values);
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -22,8 +22,6 @@ FUNCTIONS = {
     "copyPositions": "NumPy converts",
     "elementsOf": "NumPy arrays go in as they are",
     "appendCells": "fills structs of a C++ simulator",
-    "allocateCounted": "memory of C++ containers",
-    "freeCounted": "memory of C++ containers",
     "stencil": "CollisionData.stencils()",
     "appendRows": "CollisionData.constraint_rows() and rows()",
     "forEachEntry": "CollisionData.rows()",
@@ -31,21 +29,20 @@ FUNCTIONS = {
     "appendMotions": "CollisionData.motions()",
 }
 METHODS = {
-    "CollisionData.contents": "for engines that fill the object",
-    "DistanceField.lookup": "for the library",
+    "CollisionData.parts": "the properties of CollisionData",
     "Executor.run": "a Python executor would run all tasks under the GIL",
     "ConstraintRow.gap": "jacobian @ x - offsets",
 }
 # Structs that are no class in Python.
 CLASSES = {
     "ElementPair": "(n, 2) arrays, or records",
+    "CollisionData.Parts": "for engines of your own in C++",
     "TriangleMeshView": "two arguments",
     "AuditFailure": "palpate.AuditFailure",
     "CollisionProblem": "ProblemGeometry, ProblemPair",
     "Stencil": "Stencils",
     "Ray": "origin, direction, t_min, t_max",
     "CellTypes": "fills structs of a C++ simulator",
-    "CountedAllocator": "memory of C++ containers",
     "TimeOfImpactSettings": "keyword arguments",
     "DistanceFieldSettings": "keyword arguments of DistanceField.build()",
     "SimplifySettings": "keyword arguments of simplify()",

@@ -101,7 +101,7 @@ std::string unsupportedReason(const Body& a, const Body& b, const PairSettings& 
   return "";
 }
 
-void addTriangles(const Body& a, const Body& b, CountedVector<ElementPair>& pairs) {
+void addTriangles(const Body& a, const Body& b, std::vector<ElementPair>& pairs) {
   for (const Body* body : {&a, &b})
     if (static_cast<const Model&>(*body->geometry).num_tris == 0) return;
   // Without enable_contact (false) FCL reports each pair of triangles once, else several times.
@@ -119,7 +119,7 @@ void addTriangles(const Body& a, const Body& b, CountedVector<ElementPair>& pair
 
 /// Appends the deepest contact of collide() if the bodies overlap, else that of distance().
 void addContact(const Body& a, const Body& b, double thickness,
-                CountedVector<ShapeShapeContact>& contacts) {
+                std::vector<ShapeShapeContact>& contacts) {
   fcl::CollisionResultd overlap;
   fcl::collide(a.geometry.get(), a.place(), b.geometry.get(), b.place(),
                fcl::CollisionRequestd(100, true), overlap);
@@ -217,17 +217,20 @@ void FclEngine::detectCollision() {
   std::map<std::pair<GeometryId, GeometryId>, CollisionData> answers;
   for (const auto& [a, b, settings] : pairs()) {
     const Body &x = m_implementation->bodies[a], &y = m_implementation->bodies[b];
-    CollisionData::Contents contents;
-    contents.validity.method = settings.method;
+    std::vector<ElementPair> triangles;
+    std::vector<ShapeShapeContact> contacts;
     try {
       if (x.isMesh())
-        addTriangles(x, y, contents.intersectingTriangles);
+        addTriangles(x, y, triangles);
       else
-        addContact(x, y, settings.thickness, contents.shapeShape);
+        addContact(x, y, settings.thickness, contacts);
     } catch (const std::exception& fault) {
       throw Error(ErrorCode::NotAvailable, nameOf(a, b) + ": FCL failed: " + fault.what(), a);
     }
-    answers[{a, b}] = CollisionData(std::move(contents));
+    Validity validity;
+    validity.method = settings.method;
+    answers[{a, b}] = CollisionData(CollisionData::Parts{
+        .intersectingTriangles = triangles, .shapeShape = contacts, .validity = validity});
   }
   m_implementation->answers = std::move(answers);
 }

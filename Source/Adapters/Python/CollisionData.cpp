@@ -127,31 +127,23 @@ py::array motions(const CollisionData& data, const py::object& a, const py::obje
 }
 
 py::tuple state(const CollisionData& data) {
-  CollisionData copy(data);
-  const CollisionData::Contents& contents = copy.contents();
+  const CollisionData::Parts parts = data.parts();
   return py::make_tuple(recordsOf(data.vertexTriangle()), recordsOf(data.triangleVertex()),
                         recordsOf(data.edgeEdge()), recordsOf(data.intersectingTriangles()),
                         recordsOf(data.shape()), recordsOf(data.shapeShape()),
-                        contents.earliestTimeOfImpact, contents.errorBound, contents.validity);
+                        parts.earliestTimeOfImpact, parts.errorBound, parts.validity);
 }
 
 std::shared_ptr<CollisionData> ofState(const py::tuple& state) {
-  CollisionData::Contents contents;
-  const auto take = [&](auto& list, std::size_t index) {
-    const auto structs =
-        structsIn<typename std::remove_reference_t<decltype(list)>::value_type>(state[index]);
-    list.assign(structs.begin(), structs.end());
-  };
-  take(contents.vertexTriangle, 0);
-  take(contents.triangleVertex, 1);
-  take(contents.edgeEdge, 2);
-  take(contents.intersectingTriangles, 3);
-  take(contents.shape, 4);
-  take(contents.shapeShape, 5);
-  contents.earliestTimeOfImpact = state[6].cast<double>();
-  contents.errorBound = state[7].cast<double>();
-  contents.validity = state[8].cast<Validity>();
-  return std::make_shared<CollisionData>(std::move(contents));
+  const auto vertexTriangle = structsIn<VertexTriangleContact>(state[0]);
+  const auto triangleVertex = structsIn<VertexTriangleContact>(state[1]);
+  const auto edgeEdge = structsIn<EdgeEdgeContact>(state[2]);
+  const auto intersectingTriangles = structsIn<ElementPair>(state[3]);
+  const auto shape = structsIn<ShapeContact>(state[4]);
+  const auto shapeShape = structsIn<ShapeShapeContact>(state[5]);
+  return std::make_shared<CollisionData>(CollisionData::Parts{
+      vertexTriangle, triangleVertex, edgeEdge, intersectingTriangles, shape, shapeShape,
+      state[6].cast<double>(), state[7].cast<double>(), state[8].cast<Validity>()});
 }
 
 bool equal(const CollisionData& a, const CollisionData& b) {

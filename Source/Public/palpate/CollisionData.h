@@ -1,6 +1,5 @@
 #pragma once
 
-#include <palpate/CountedVector.h>
 #include <palpate/Distance.h>
 #include <palpate/Export.h>
 #include <palpate/Types.h>
@@ -11,6 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 
 namespace palpate {
@@ -158,48 +158,49 @@ PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 /// Errors   none.
 class PALPATE_EXPORT CollisionData {
  public:
-  struct Contents {
-    CountedVector<VertexTriangleContact> vertexTriangle, triangleVertex;
-    CountedVector<EdgeEdgeContact> edgeEdge;
-    CountedVector<ElementPair> intersectingTriangles;
-    CountedVector<ShapeContact> shape;
-    CountedVector<ShapeShapeContact> shapeShape;
-    double earliestTimeOfImpact =
-        std::numeric_limits<double>::infinity();  ///< only with
-                                                  ///< ContinuousSettings::earliestTimeOnly
+  /// The parts of an answer, for engines of your own. Lists are in the order above.
+  struct Parts {
+    std::span<const VertexTriangleContact> vertexTriangle{}, triangleVertex{};
+    std::span<const EdgeEdgeContact> edgeEdge{};
+    std::span<const ElementPair> intersectingTriangles{};
+    std::span<const ShapeContact> shape{};
+    std::span<const ShapeShapeContact> shapeShape{};
+    /// Of a contact that no list has: ContinuousSettings::earliestTimeOnly.
+    double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
     double errorBound = 0.0;
-    Validity validity;
+    Validity validity{};
   };
 
-  CollisionData() = default;
-  explicit CollisionData(Contents contents) : m_contents(std::move(contents)) {}
+  CollisionData() noexcept;              ///< no contacts
+  explicit CollisionData(const Parts&);  ///< copies them
+  CollisionData(const CollisionData&);
+  CollisionData(CollisionData&&) noexcept;
+  CollisionData& operator=(const CollisionData&);
+  CollisionData& operator=(CollisionData&&) noexcept;
+  ~CollisionData();
+
+  Parts parts() const;  ///< the spans are those of the functions below
 
   /// Vertices of the first geometry with triangles, segments or points of the second.
-  std::span<const VertexTriangleContact> vertexTriangle() const {
-    return m_contents.vertexTriangle;
-  }
+  std::span<const VertexTriangleContact> vertexTriangle() const;
   /// Triangles, segments or points of the first geometry with vertices of the second. Empty for a
   /// geometry with itself.
-  std::span<const VertexTriangleContact> triangleVertex() const {
-    return m_contents.triangleVertex;
-  }
+  std::span<const VertexTriangleContact> triangleVertex() const;
   /// Edges of the first geometry with edges of the second.
-  std::span<const EdgeEdgeContact> edgeEdge() const { return m_contents.edgeEdge; }
+  std::span<const EdgeEdgeContact> edgeEdge() const;
   /// Pairs of triangles that intersect at the step's end, from Method::Intersection, also as part
   /// of Auto. Each pair has a contact unless a predicate refuses it: its own, or that of a vertex
   /// behind the surface, which may be with another triangle. There is one exception for a mesh with
   /// itself: two triangles with a common vertex that intersect only where an edge of one pierces
   /// the other have no contact of their own.
-  std::span<const ElementPair> intersectingTriangles() const {
-    return m_contents.intersectingTriangles;
-  }
+  std::span<const ElementPair> intersectingTriangles() const;
   /// Vertices, edges and triangles with an analytical shape, or with a body by
   /// Method::DistanceField or Method::Proxy. Such an answer has no other contacts. If Auto answers
   /// by Proxy, a particle that touches several triangles in the step may have several contacts.
-  std::span<const ShapeContact> shape() const { return m_contents.shape; }
+  std::span<const ShapeContact> shape() const;
   /// Two analytical shapes with each other: one contact if they are at most the thickness apart,
   /// with Method::Continuous at some time of the step.
-  std::span<const ShapeShapeContact> shapeShape() const { return m_contents.shapeShape; }
+  std::span<const ShapeShapeContact> shapeShape() const;
   /// Fraction of the step: the least timeOfImpact of all contacts, or infinity without contacts. 1
   /// if all contacts come from methods that test the step's end. With
   /// ContinuousSettings::earliestTimeOnly it is the time of the first contact, although no list has
@@ -216,21 +217,22 @@ class PALPATE_EXPORT CollisionData {
   /// Proxy          the largest proven distance between the planes that answered and the surface,
   ///                and what rounding adds. A particle is missing or reported in excess only if its
   ///                distance is within this of the limit.
-  double errorBound() const { return m_contents.errorBound; }
+  double errorBound() const;
 
   /// Whether this answer can be trusted, and why not.
-  const Validity& validity() const { return m_contents.validity; }
+  const Validity& validity() const;
 
   /// Two answers with the same bits have the same hash, on every machine. It includes the ids,
   /// weights, normals, distances, times and features of all contacts in their order, and no part of
   /// validity().
   std::uint64_t hash() const;
 
-  /// For engines that fill this object.
-  Contents& contents() { return m_contents; }
+  struct Contents;  ///< not part of the interface
 
  private:
-  Contents m_contents;
+  const Contents& read() const;
+
+  std::unique_ptr<Contents> m_contents;  ///< null: no contacts
 };
 
 }  // namespace palpate

@@ -13,8 +13,6 @@
 
 namespace palpate {
 
-class FieldLookup;
-
 /// Settings of DistanceField::build(). A value out of range throws InvalidSettings.
 struct DistanceFieldSettings {
   /// L, positive: what value() may be off by, in the band. If it exceeds the band, the band takes
@@ -110,11 +108,9 @@ class PALPATE_EXPORT DistanceField {
   /// names the file and the byte.
   static DistanceField load(const std::filesystem::path&);
 
-  /// For the library: the cells.
-  const FieldLookup& lookup() const;
+  struct Implementation;  ///< not part of the interface
 
  private:
-  struct Implementation;
   explicit DistanceField(std::shared_ptr<const Implementation>);
   const Implementation& valid() const;
   std::shared_ptr<const Implementation> m_implementation;

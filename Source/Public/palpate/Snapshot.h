@@ -50,13 +50,13 @@ class PALPATE_EXPORT Snapshot {
   /// Errors   IndexOutOfRange; InvalidSettings for a time that is not finite.
   Eigen::Vector3d position(GeometryId, std::uint32_t vertex, double time = 1.0) const;
 
-  /// For OctreeBasedCD::publish() only.
-  class Contents;
-  explicit Snapshot(const Contents& contents) : m_contents(contents) {}
+  class Contents;  ///< not part of the interface
   Snapshot(const Snapshot&) = delete;
   Snapshot& operator=(const Snapshot&) = delete;
 
  private:
+  explicit Snapshot(const Contents& contents) : m_contents(contents) {}
+
   const Contents& m_contents;
 };
 

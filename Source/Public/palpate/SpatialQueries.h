@@ -359,12 +359,10 @@ class PALPATE_EXPORT SpatialQueries {
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body,
                                                   const Eigen::Vector3d& point) const;
 
-  /// For OctreeBasedCD::queries() only.
-  class Source;
-  explicit SpatialQueries(std::shared_ptr<Source>);
+  class Source;  ///< not part of the interface
 
  private:
-  friend class PenetrationTracker;
+  explicit SpatialQueries(std::shared_ptr<Source>);
   Source& valid() const;  ///< throws InvalidCall
 
   std::shared_ptr<Source> m_source;

@@ -50,7 +50,9 @@ struct AuditedPair {
                                      const AuditSettings& settings = kEverything,
                                      std::uint64_t frame = 1) const {
     std::vector<AuditFailure> out;
-    audit(record, CollisionData(contents), settings, frame, out);
+    CollisionData data;
+    CollisionData::Contents::of(data) = contents;
+    audit(record, data, settings, frame, out);
     return out;
   }
 };
@@ -84,7 +86,8 @@ struct Scene {
   const TriangleMesh& a() const { return audited.a.body.mesh; }
   const TriangleMesh& b() const { return audited.b.body.mesh; }
   CollisionData::Contents found() const {
-    return CollisionData(detection.collisionData(pair.a, pair.b)).contents();
+    CollisionData data = detection.collisionData(pair.a, pair.b);
+    return CollisionData::Contents::of(data);
   }
   std::vector<AuditFailure> failures(const CollisionData::Contents& contents,
                                      const AuditSettings& auditSettings = kEverything,
@@ -168,7 +171,8 @@ TEST(Audit, FindsFaultsBetweenTwoShapes) {
   detection.addAnalyticalGeometry(Box{{0, 0, 2.5}, {1, 1, 1}});
   detection.addCollisionPair(pair.a, pair.b, settings);
   detection.detectCollision();
-  const auto good = CollisionData(detection.collisionData(pair.a, pair.b)).contents();
+  CollisionData data = detection.collisionData(pair.a, pair.b);
+  const CollisionData::Contents good = CollisionData::Contents::of(data);
   ASSERT_EQ(good.shapeShape.size(), 1u);
   EXPECT_TRUE(audited.failures(good).empty());
   const auto expectFault = [&](const CollisionData::Contents& faulty, Fault fault) {

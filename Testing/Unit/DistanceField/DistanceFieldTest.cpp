@@ -46,7 +46,7 @@ std::size_t expectWithinBound(Random& random, const Mesh& mesh, const DistanceFi
     EXPECT_TRUE(holds) << "at " << points[i].transpose() << ": " << value << ", exact " << d
                        << ", bound " << field.errorBound() << ", band " << field.band();
     EXPECT_EQ(value, field.value(points[i]));
-    const double bound = field.lookup().distanceBound(points[i]);
+    const double bound = DistanceField::Implementation::lookupOf(field).distanceBound(points[i]);
     EXPECT_GE(bound, value);
     if (d > 0) {
       EXPECT_LE(bound, isInBand ? d + field.errorBound() : d);

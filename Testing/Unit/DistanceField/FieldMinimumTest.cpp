@@ -46,8 +46,8 @@ struct Feature {
 /// The law of findDeepPoint(), against values at many points of the feature.
 void checkDeepPoint(const DistanceField& field, const Feature& feature, double target,
                     double tolerance, std::size_t& found) {
-  const auto deep =
-      findDeepPoint(field.lookup(), feature.corners, feature.radii, target, tolerance);
+  const auto deep = findDeepPoint(DistanceField::Implementation::lookupOf(field), feature.corners,
+                                  feature.radii, target, tolerance);
   const double rounding = 0x1p-19 * field.band();  // neighbouring cells differ by half of it
 
   if (deep) {
@@ -104,7 +104,7 @@ TEST(FieldMinimum, FindsTheDeepestPointOnBordersOfCells) {
   const Mesh mesh = boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25});
   const DistanceField field = DistanceField::build({mesh.positions, mesh.triangles},
                                                    {.errorBound = 0.01, .band = 0.3, .threads = 1});
-  const FieldCells& cells = field.lookup().cells();
+  const FieldCells& cells = DistanceField::Implementation::lookupOf(field).cells();
   const double unit = std::ldexp(1.0, cells.exponent);
   Random random(2);
   std::size_t found = 0;

@@ -10,6 +10,7 @@
 #include "Common/Replayed.h"
 #include "Common/TestGeometry.h"
 #include "Validity/Support.h"
+#include "NarrowPhase/CollisionContents.h"
 
 #include <gtest/gtest.h>
 
@@ -183,7 +184,8 @@ TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
 
 /// The vertices of the two geometries are exchanged.
 CollisionData swapped(const CollisionData& data) {
-  CollisionData::Contents contents;
+  CollisionData result;
+  CollisionData::Contents& contents = CollisionData::Contents::of(result);
   contents.earliestTimeOfImpact = data.earliestTimeOfImpact();
   contents.vertexTriangle.assign(data.triangleVertex().begin(), data.triangleVertex().end());
   contents.triangleVertex.assign(data.vertexTriangle().begin(), data.vertexTriangle().end());
@@ -201,7 +203,7 @@ CollisionData swapped(const CollisionData& data) {
   sort(contents.vertexTriangle, [](const auto& c) { return std::tuple(c.vertex, c.triangle); });
   sort(contents.triangleVertex, [](const auto& c) { return std::tuple(c.triangle, c.vertex); });
   sort(contents.edgeEdge, [](const auto& c) { return std::tuple(c.edgeA, c.edgeB); });
-  return CollisionData(contents);
+  return result;
 }
 
 TEST(GeometryTypes, SwappingGeometriesSwapsContacts) {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <palpate/Export.h>
-
 #include <cstddef>
 #include <limits>
 #include <new>
@@ -13,8 +11,8 @@ namespace palpate {
 /// code it is like that of operator new, and counts toward nothing.
 ///
 /// Errors   MemoryLimit; std::bad_alloc.
-PALPATE_EXPORT void* allocateCounted(std::size_t bytes, std::size_t alignment);
-PALPATE_EXPORT void freeCounted(void* memory, std::size_t bytes, std::size_t alignment) noexcept;
+void* allocateCounted(std::size_t bytes, std::size_t alignment);
+void freeCounted(void* memory, std::size_t bytes, std::size_t alignment) noexcept;
 
 /// std::allocator over allocateCounted().
 template <class T>
@@ -38,8 +36,7 @@ struct CountedAllocator {
   }
 };
 
-/// The std::vector of everything that an OctreeBasedCD holds. Your copy of it counts toward
-/// nothing.
+/// The std::vector of everything that an OctreeBasedCD holds.
 template <class T>
 using CountedVector = std::vector<T, CountedAllocator<T>>;
 

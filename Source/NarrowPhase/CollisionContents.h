@@ -1,0 +1,31 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+
+#include "Core/CountedVector.h"
+#include "Core/MemoryBudget.h"
+
+#include <limits>
+#include <memory>
+
+namespace palpate {
+
+/// What a CollisionData holds.
+struct CollisionData::Contents : CountedObject {
+  CountedVector<VertexTriangleContact> vertexTriangle, triangleVertex;
+  CountedVector<EdgeEdgeContact> edgeEdge;
+  CountedVector<ElementPair> intersectingTriangles;
+  CountedVector<ShapeContact> shape;
+  CountedVector<ShapeShapeContact> shapeShape;
+  double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
+  double errorBound = 0.0;
+  Validity validity;
+
+  /// Makes them if `data` has none.
+  static Contents& of(CollisionData& data) {
+    if (!data.m_contents) data.m_contents = std::make_unique<Contents>();
+    return *data.m_contents;
+  }
+};
+
+}  // namespace palpate
