@@ -140,9 +140,11 @@ VtpText contactsVtp(World& world) {
 VtpText octreeVtp(const LooseOctree& octree) {
   VtpText file;
   std::vector<double> depths, elements, geometries;
-  for (const auto id : octree.nodes()) {
-    const LooseOctree::Node node = octree.node(id);
-    if (node.elements.empty()) continue;
+  std::vector<LooseOctree::Node> nodes;
+  for (const GeometryId geometry : octree.geometries())
+    for (const LooseOctree::Node& node : octree.nodes(geometry))
+      if (!node.elements.empty()) nodes.push_back(node);
+  for (const LooseOctree::Node& node : nodes) {
     const auto first = static_cast<std::uint32_t>(file.points.size());
     using Box = Eigen::AlignedBox3d;
     for (int corner = 0; corner < 8; ++corner)  // bit 0: x, 1: y, 2: z

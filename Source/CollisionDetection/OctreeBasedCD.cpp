@@ -361,7 +361,7 @@ std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, Geometr
   return record.candidates;
 }
 
-const LooseOctree& OctreeBasedCD::octree() const { return *read().octree; }
+const LooseOctree& OctreeBasedCD::octree() const { return read().shownOctrees.view; }
 
 const FrameStatistics& OctreeBasedCD::statistics() const { return read().statistics; }
 

@@ -22,9 +22,7 @@ OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
       budget(MemoryBudget::make(settings.memoryLimit)),
       threads(newSettings.threads, newSettings.executor),
       querySource(std::make_shared<QuerySource>(*this)),
-      latestSnapshot(budget) {
-  updateOctreeView();
-}
+      latestSnapshot(budget) {}
 
 OctreeBasedCD::Implementation::~Implementation() {
   querySource->close();
@@ -64,7 +62,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   const MemoryScope memory(MemoryStage::Octrees);
   using Update = LooseOctree::Update;
   octreesState = 0;
-  state->trees.clear();  // they are invalid until the update is complete
+  shownOctrees.trees.clear();  // they are invalid until the update is complete
   if (!hasUpdates) updates = {};
   const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
   for (const auto& geometry : geometries.all()) {
@@ -99,7 +97,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   updateOctreeView();
   if (!skips) octreesState = geometries.state();
 #ifdef PALPATE_VALIDATE
-  PALPATE_ASSERT(octree->validate().empty());
+  PALPATE_ASSERT(shownOctrees.view.validate().empty());
 #endif
   if (explicitly) setStatistics(updates);
 }
@@ -118,19 +116,12 @@ bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
 }
 
 void OctreeBasedCD::Implementation::updateOctreeView() {
-  if (!state) {
-    state = std::make_shared<LooseOctree::State>();
-    octree.emplace(state);
-  }
-  state->trees.clear();
-  std::uint32_t firstNode = 0;
+  shownOctrees.trees.clear();
   for (const auto& geometry : geometries.all()) {
     const GeometryOctree& tree = geometry->body.tree;
     if (geometry->skipsOctree || !tree.isValid() || tree.octree().size() == 0) continue;
-    state->trees.push_back({geometry->body.id, &tree.octree(), tree.frame().origin,
-                            tree.frame().scale, tree.lastUpdate, tree.bytesBesidesOctree(),
-                            firstNode});
-    firstNode += static_cast<std::uint32_t>(tree.octree().pool().used() * 8);
+    shownOctrees.trees.push_back({geometry->body.id, &tree.octree(), tree.frame().origin,
+                                  tree.frame().scale, tree.lastUpdate, tree.bytesBesidesOctree()});
   }
 }
 

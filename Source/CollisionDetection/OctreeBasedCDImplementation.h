@@ -45,7 +45,7 @@ struct OctreeBasedCD::Implementation {
   FrameStatistics statistics;  ///< of the last frame or explicit update
   FrameStatistics updates;     ///< of the updates since the last frame
   bool hasUpdates = false;
-  std::optional<LooseOctree> octree;
+  LooseOctree::State shownOctrees;  ///< what octree() shows
   std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
   std::shared_ptr<QuerySource> querySource;
@@ -117,8 +117,6 @@ struct OctreeBasedCD::Implementation {
   void detect(const GuardedPairs& guarded);
 
   void detect();
-
-  std::shared_ptr<LooseOctree::State> state;
 };
 
 [[noreturn]] void throwMovedFrom();

@@ -3,6 +3,7 @@
 #include <palpate/LooseOctree.h>
 
 #include "Octree/Octree.h"
+#include "Core/CountedVector.h"
 
 #include <cstdint>
 #include <string>
@@ -18,10 +19,10 @@ struct LooseOctree::State {
     Eigen::Vector3d origin;  ///< position = origin + float / scale
     double scale;
     Update lastUpdate;
-    std::size_t otherBytes;       ///< memory of the geometry's floats
-    std::uint32_t firstNode = 0;  ///< node ids of this tree start here
+    std::size_t otherBytes;  ///< memory of the geometry's floats
   };
   CountedVector<Tree> trees;  ///< by ascending geometry id; only built trees with elements
+  const LooseOctree view{*this};
 };
 
 /// Describes each invariant that does not hold in a sentence. cells: also check that elements are

@@ -1,13 +1,13 @@
 #include <palpate/LooseOctree.h>
 
-#include <palpate/Error.h>
-
 #include "Octree/Forest.h"
 #include "Core/FloatingPoint.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 
 namespace palpate {
 
@@ -52,75 +52,56 @@ CellOfNode cellOf(const Octree& octree, OctreeNode node) {
   return {cube, static_cast<int>(path.size())};
 }
 
-std::vector<LooseOctree::NodeId> LooseOctree::nodes(GeometryId geometry) const {
-  std::vector<NodeId> ids;
-  if (const Tree* tree = treeOf(*m_state, geometry))
-    forEachNode(*tree->octree, 0, 0,
-                [&](OctreeNode node, int) { ids.push_back(NodeId{tree->firstNode + node}); });
-  return ids;
-}
+namespace {
 
-std::vector<LooseOctree::NodeId> LooseOctree::nodes() const {
-  std::vector<NodeId> ids;
-  for (const Tree& tree : m_state->trees)
-    for (const NodeId id : nodes(tree.geometry)) ids.push_back(id);
-  return ids;
-}
-
-std::optional<LooseOctree::NodeId> LooseOctree::root(GeometryId geometry) const {
-  const Tree* tree = treeOf(*m_state, geometry);
-  return tree ? std::optional(NodeId{tree->firstNode}) : std::nullopt;
-}
-
-LooseOctree::Node LooseOctree::node(NodeId id) const {
-  const StandardFloatingPoint standard;
-  const auto index = static_cast<std::uint32_t>(id);
-  const auto next =
-      std::upper_bound(m_state->trees.begin(), m_state->trees.end(), index,
-                       [](std::uint32_t i, const Tree& t) { return i < t.firstNode; });
-  if (next == m_state->trees.begin())
-    throw Error(ErrorCode::IndexOutOfRange,
-                "octree node " + std::to_string(index) + " does not exist");
-  const Tree& tree = *std::prev(next);
+/// Appends a node and those below it.
+void appendNodes(const Tree& tree, OctreeNode node, const CellOfNode& cell, std::uint32_t parent,
+                 std::vector<LooseOctree::Node>& out) {
   const Octree& octree = *tree.octree;
-  const OctreeNode node = index - tree.firstNode;
-  if (node >= octree.pool().used() * kChildren || octree.isEmpty(node))
-    throw Error(ErrorCode::IndexOutOfRange,
-                "octree node " + std::to_string(index) + " does not exist or is empty");
-  const auto [cube, depth] = cellOf(octree, node);
-
-  Node result;
-  result.geometry = tree.geometry;
-  result.depth = depth;
-  result.bounds = cubeInScene(tree, cube.lower, cube.edge);
+  const auto& [cube, depth] = cell;
+  const auto place = static_cast<std::uint32_t>(out.size());
   std::array<double, 3> lower = cube.lower;
   for (double& l : lower) l -= cube.edge * 0.5;
-  result.looseBounds = cubeInScene(tree, lower, 2 * cube.edge);
   const FloatBox box = octree.box(node);
+  Eigen::AlignedBox3d fitted;
   for (int k = 0; k < 3; ++k) {
-    result.fittedBox.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);
-    result.fittedBox.max()[k] = nextUp(tree.origin[k] + box.upper[k] / tree.scale);
+    fitted.min()[k] = nextDown(tree.origin[k] + box.lower[k] / tree.scale);
+    fitted.max()[k] = nextUp(tree.origin[k] + box.upper[k] / tree.scale);
   }
-  result.geometries = std::uint64_t{1} << (static_cast<std::uint32_t>(tree.geometry) % 64);
-  if (node != 0) result.parent = NodeId{tree.firstNode + octree.parent(blockOf(node))};
-  const OctreeNode first = octree.firstChild(node);
-  result.leaf = first == 0;
-  for (unsigned slot = 0; !result.leaf && slot < kChildren; ++slot)
-    if (!octree.isEmpty(first + slot))
-      result.children[slot] = NodeId{tree.firstNode + first + slot};
   const auto [begin, end] = octree.ownRange(node);
-  result.elements = octree.order().subspan(begin, end - begin);
-  return result;
+  out.push_back({tree.geometry, depth, cubeInScene(tree, cube.lower, cube.edge),
+                 cubeInScene(tree, lower, 2 * cube.edge), fitted, parent,
+                 octree.order().subspan(begin, end - begin)});
+  const OctreeNode first = octree.firstChild(node);
+  for (unsigned slot = 0; first != 0 && slot < kChildren; ++slot)
+    if (!octree.isEmpty(first + slot))
+      appendNodes(tree, first + slot, {cube.child(slot), depth + 1}, place, out);
+}
+
+}  // namespace
+
+std::vector<LooseOctree::Node> LooseOctree::nodes(GeometryId geometry) const {
+  const StandardFloatingPoint standard;
+  std::vector<Node> nodes;
+  if (const Tree* tree = treeOf(m_state, geometry))
+    appendNodes(*tree, 0, cellOf(*tree->octree, 0), kNoElement, nodes);
+  return nodes;
+}
+
+std::vector<GeometryId> LooseOctree::geometries() const {
+  std::vector<GeometryId> ids;
+  for (const Tree& tree : m_state.trees) ids.push_back(tree.geometry);
+  return ids;
 }
 
 LooseOctree::Update LooseOctree::lastUpdate(GeometryId geometry) const {
-  const Tree* tree = treeOf(*m_state, geometry);
+  const Tree* tree = treeOf(m_state, geometry);
   return tree ? tree->lastUpdate : Update::Unchanged;
 }
 
 OctreeStatistics LooseOctree::statistics() const {
   OctreeStatistics statistics;
-  for (const Tree& tree : m_state->trees) {
+  for (const Tree& tree : m_state.trees) {
     const Octree& octree = *tree.octree;
     statistics.blocksInUse += octree.pool().used();
     statistics.blocksFree += octree.pool().free();
@@ -148,7 +129,7 @@ OctreeStatistics LooseOctree::statistics() const {
 
 std::vector<std::string> LooseOctree::validate() const {
   std::vector<std::string> failures;
-  for (const Tree& tree : m_state->trees)
+  for (const Tree& tree : m_state.trees)
     for (const std::string& failure :
          palpate::validate(*tree.octree, tree.lastUpdate == Update::Rebuilt))
       failures.push_back("geometry " + std::to_string(static_cast<std::uint32_t>(tree.geometry)) +

@@ -264,9 +264,11 @@ def test_candidates_statistics_and_octrees():
     collisions.release_memory()
     octree = collisions.octree()
     assert octree.validate() == []
-    root = octree.node(octree.root(a))
-    assert root.geometry == a and root.parent is None and root.bounds.shape == (2, 3)
-    assert octree.nodes(a)[0] == octree.root(a)
+    nodes = octree.nodes(a)
+    assert nodes[0].geometry == a and nodes[0].parent is None and nodes[0].bounds.shape == (2, 3)
+    assert all(node.parent < i for i, node in enumerate(nodes[1:], 1))
+    assert sorted(e for node in nodes for e in node.elements) == list(range(len(scene.triangles)))
+    assert octree.geometries() == [a, b]
     assert octree.statistics().elements == 2 * len(scene.triangles)
     assert isinstance(octree.last_update(b), palpate.LooseOctreeUpdate)
 

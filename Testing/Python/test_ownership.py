@@ -38,8 +38,8 @@ def test_old_arrays_stay_while_frames_go_on():
             queries.closest_points(scene.b, points),
             snapshot.queries().closest_points(scene.b, points),
             data.constraint_rows(scene.positions, scene.positions),
-            collisions.octree().nodes(),
-            collisions.octree().node(collisions.octree().root(scene.a)).elements,
+            collisions.octree().nodes(scene.a)[0].bounds,
+            collisions.octree().nodes(scene.a)[-1].elements,
         ]
         if number == 0:
             first = data.vertex_triangle[0]  # a single record holds its array

@@ -85,8 +85,9 @@ TEST_F(ParaView, ReadsOctreeCells) {
   const LooseOctree& octree = world.detection().octree();
   const vtkSmartPointer<vtkPolyData> data = read(octreeVtp(octree));
   std::vector<LooseOctree::Node> nodes;
-  for (const auto id : octree.nodes())
-    if (!octree.node(id).elements.empty()) nodes.push_back(octree.node(id));
+  for (const GeometryId geometry : octree.geometries())
+    for (const LooseOctree::Node& node : octree.nodes(geometry))
+      if (!node.elements.empty()) nodes.push_back(node);
   ASSERT_EQ(data->GetNumberOfLines(), static_cast<vtkIdType>(12 * nodes.size()));
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     for (int line = 0; line < 12; ++line) {

@@ -19,28 +19,27 @@ struct Octrees {
 py::array_t<double> boxOf(const Eigen::AlignedBox3d& box) {
   return copyOf(std::vector<Eigen::Vector3d>{box.min(), box.max()});
 }
-py::object idOf(const std::optional<LooseOctree::NodeId>& id) {
-  if (!id) return py::none();
-  return py::int_(static_cast<std::uint32_t>(*id));
-}
-
-py::array_t<std::uint32_t> nodes(const Octrees& self, const py::object& geometry) {
-  const std::vector<LooseOctree::NodeId> ids = self.read([&](const LooseOctree& octree) {
-    return geometry.is_none() ? octree.nodes() : octree.nodes(geometryId(geometry));
-  });
-  return copyOf(std::span(reinterpret_cast<const std::uint32_t*>(ids.data()), ids.size()));
-}
-
-py::object node(const Octrees& self, const py::object& id) {
-  const LooseOctree::NodeId wanted{elementIndex(id, "node")};
+py::list nodes(const Octrees& self, const py::object& geometry) {
+  const GeometryId id = geometryId(geometry);
   return self.read([&](const LooseOctree& octree) {
-    const LooseOctree::Node n = octree.node(wanted);
-    py::tuple children(n.children.size());
-    for (std::size_t i = 0; i < n.children.size(); ++i) children[i] = idOf(n.children[i]);
-    return lookedUp<LooseOctree::Node>("palpate", "OctreeNode")(
-        static_cast<std::uint32_t>(n.geometry), n.depth, boxOf(n.bounds), boxOf(n.looseBounds),
-        boxOf(n.fittedBox), n.geometries, idOf(n.parent), children, copyOf(n.elements), n.leaf);
+    py::list list;
+    for (const LooseOctree::Node& n : octree.nodes(id)) {
+      const py::object parent =
+          n.parent == kNoElement ? py::object(py::none()) : py::int_(n.parent);
+      list.append(lookedUp<LooseOctree::Node>("palpate", "OctreeNode")(
+          static_cast<std::uint32_t>(n.geometry), n.depth, boxOf(n.bounds), boxOf(n.looseBounds),
+          boxOf(n.fittedBox), parent, copyOf(n.elements)));
+    }
+    return list;
   });
+}
+
+py::list geometries(const Octrees& self) {
+  py::list list;
+  for (const GeometryId id :
+       self.read([](const LooseOctree& octree) { return octree.geometries(); }))
+    list.append(static_cast<std::uint32_t>(id));
+  return list;
 }
 
 }  // namespace
@@ -49,20 +48,14 @@ void addOctree(py::module_& module, CollisionsClass& collisions) {
   py::class_<Octrees>(module, "LooseOctree",
                       R"(A view of the octrees of the last update, for diagnostics and display.
 
-There is one octree for each geometry with elements. Each update changes what it shows, and node ids
-are valid until the next update. What its methods return are copies.)")
-      .def("nodes", &nodes, py::arg("geometry") = py::none(),
-           R"(nodes(geometry=None) -> numpy.ndarray
+There is one octree for each geometry with elements. Each update changes what it shows. What its
+methods return are copies.)")
+      .def("nodes", &nodes, py::arg("geometry"),
+           R"(nodes(geometry) -> list[OctreeNode]
 
-(n,) ids of the nodes in use of one geometry, or of all. A parent comes before its children.)")
-      .def(
-          "root",
-          [](const Octrees& self, const py::object& geometry) {
-            const GeometryId id = geometryId(geometry);
-            return idOf(self.read([&](const LooseOctree& octree) { return octree.root(id); }));
-          },
-          py::arg("geometry"), "root(geometry) -> int | None\n\nNone if there are no nodes.")
-      .def("node", &node, py::arg("node"), "node(node) -> OctreeNode\n\nA copy of a node.")
+The nodes that have elements in their subtree. A parent comes before its children.)")
+      .def("geometries", &geometries,
+           "geometries() -> list[int]\n\nThe geometries with nodes, ascending.")
       .def(
           "last_update",
           [](const Octrees& self, const py::object& geometry) {

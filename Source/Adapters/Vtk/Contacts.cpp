@@ -58,12 +58,13 @@ void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProbl
   }
 }
 
-std::vector<LooseOctree::NodeId> cellsOf(const LooseOctree& octree, const FeaturePair& pair) {
+std::vector<LooseOctree::Node> cellsOf(const LooseOctree& octree, const FeaturePair& pair) {
   constexpr int kMostLevels = 2;
-  std::vector<LooseOctree::NodeId> chosen;
+  std::vector<LooseOctree::Node> chosen;
   for (const auto& [mesh, vertices] : pair.features) {
-    for (const auto id : octree.nodes(mesh->id)) {
-      const auto elements = octree.node(id).elements;
+    const std::vector<LooseOctree::Node> nodes = octree.nodes(mesh->id);
+    for (std::uint32_t place = 0; place < nodes.size(); ++place) {
+      const auto elements = nodes[place].elements;
       const auto holds = [&, &corners = vertices, &body = *mesh](std::uint32_t element) {
         if (body.type == GeometryType::Points) return element == corners.front();
         const Triangle& t = body.triangles[element];
@@ -73,19 +74,20 @@ std::vector<LooseOctree::NodeId> cellsOf(const LooseOctree& octree, const Featur
       };
       if (std::none_of(elements.begin(), elements.end(), holds)) continue;
       int levels = 0;
-      for (std::optional<LooseOctree::NodeId> up = id; up && levels < kMostLevels;
-           up = octree.node(*up).parent, ++levels)
-        chosen.push_back(*up);
+      for (std::uint32_t up = place; up != kNoElement && levels < kMostLevels;
+           up = nodes[up].parent, ++levels)
+        chosen.push_back(nodes[up]);
       break;
     }
   }
   return chosen;
 }
 
-std::vector<LooseOctree::NodeId> cellsWithElements(const LooseOctree& octree) {
-  std::vector<LooseOctree::NodeId> chosen;
-  for (const auto id : octree.nodes())
-    if (!octree.node(id).elements.empty()) chosen.push_back(id);
+std::vector<LooseOctree::Node> cellsWithElements(const LooseOctree& octree) {
+  std::vector<LooseOctree::Node> chosen;
+  for (const GeometryId geometry : octree.geometries())
+    for (const LooseOctree::Node& node : octree.nodes(geometry))
+      if (!node.elements.empty()) chosen.push_back(node);
   return chosen;
 }
 

@@ -34,9 +34,9 @@ struct ContactGlyphs {
 };
 
 /// The node that holds the element of each feature, and the node above it.
-std::vector<LooseOctree::NodeId> cellsOf(const LooseOctree&, const FeaturePair&);
+std::vector<LooseOctree::Node> cellsOf(const LooseOctree&, const FeaturePair&);
 
 /// All nodes that hold elements themselves.
-std::vector<LooseOctree::NodeId> cellsWithElements(const LooseOctree&);
+std::vector<LooseOctree::Node> cellsWithElements(const LooseOctree&);
 
 }  // namespace palpate::vtk

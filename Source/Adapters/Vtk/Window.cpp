@@ -222,14 +222,13 @@ void Window::Implementation::drawBodies() {
 
 void Window::Implementation::drawCells() const {
   const LooseOctree& octree = detection.octree();
-  std::vector<LooseOctree::NodeId> chosen;
+  std::vector<LooseOctree::Node> chosen;
   if (cells != Cells::OfContact)
     chosen = cellsWithElements(octree);
   else if (nearest)
     chosen = cellsOf(octree, *nearest);
   Glyphs cubes;
-  for (const auto id : chosen) {
-    const LooseOctree::Node node = octree.node(id);
+  for (const LooseOctree::Node& node : chosen) {
     const Mesh& mesh = problem.geometries[indices.at(node.geometry)];
     const Pose& pose = mesh.motion.now;
     cubes.add(pose(node.bounds.center()),

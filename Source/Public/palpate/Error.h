@@ -15,8 +15,8 @@ namespace palpate {
 enum class ErrorCode {
   NonFinitePosition,   ///< A position is NaN, infinite or beyond kLargestMeasure.
   WrongPositionCount,  ///< The number of positions differs from the number of vertices.
-  /// An index names a vertex, element or octree node that does not exist. Or a segment or
-  /// tetrahedron names one vertex twice.
+  /// An index names a vertex or element that does not exist. Or a segment or tetrahedron names one
+  /// vertex twice.
   IndexOutOfRange,
   UnknownGeometry,    ///< The geometry was never added, or was removed.
   UnknownPair,        ///< The pair was never added, was removed, or was added in the other order.

@@ -5,10 +5,8 @@
 
 #include <Eigen/Geometry>
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,47 +25,35 @@ struct OctreeStatistics {
   std::size_t bytes = 0;  ///< memory of boxes, keys, nodes and scratch
 };
 
-/// A view of the octrees of the last update, for diagnostics and display. There is one octree for
-/// each geometry that has elements; analytical shapes have none.
+/// A view of the octrees of the last update, for diagnostics and display. Each geometry with
+/// elements has one; analytical shapes have none.
 ///
-/// The tree's root follows its geometry, so that a body that moves as a whole keeps its cells. If
-/// setTransform() placed the geometry, the tree and all its boxes are in the body's frame. See
-/// Docs/Algorithms/LooseOctree.md.
-///
-/// Units    boxes are in L.
-/// Valid    as long as the OctreeBasedCD to which it belongs. Each update changes what it shows;
-///          node ids are valid until the next update. It cannot be copied. If an exception ended an
-///          update, the geometries concerned have no nodes until the next update.
+/// Units    L. If setTransform() placed the geometry, boxes are in the body's frame.
+/// Valid    as long as the OctreeBasedCD to which it belongs. Each update changes what it shows. If
+///          an exception ended an update, the geometries concerned have no nodes until the next
+///          one.
 /// Threads  as const functions of OctreeBasedCD, but not while queries() updates octrees.
+/// Source   Docs/Algorithms/LooseOctree.md.
 class PALPATE_EXPORT LooseOctree {
  public:
-  enum class NodeId : std::uint32_t {};
   enum class Update { Rebuilt, Refitted, Unchanged };
 
-  /// A node, copied. Its element span is valid until the next update.
   struct Node {
     GeometryId geometry;
     int depth;                        ///< root: 0
     Eigen::AlignedBox3d bounds;       ///< the cell's cube
     Eigen::AlignedBox3d looseBounds;  ///< the cube doubled about its centre
-    /// encloses all elements of the subtree; float, rounded outward
-    Eigen::AlignedBox3d fittedBox;
-    /// set of geometries in the subtree: bit (geometry id mod 64) of each
-    std::uint64_t geometries;
-    std::optional<NodeId> parent;
-    /// by octant (bit 0: x, bit 1: y, bit 2: z); empty children are absent
-    std::array<std::optional<NodeId>, 8> children;
-    std::span<const std::uint32_t> elements;  ///< ids of the elements in this node itself
-    bool leaf;
+    Eigen::AlignedBox3d fittedBox;    ///< encloses the subtree's elements; floats, rounded outward
+    std::uint32_t parent;             ///< its place in the list; kNoElement for the root
+    std::span<const std::uint32_t> elements;  ///< in this node itself; valid until the next update
   };
 
-  /// The nodes in use of one geometry, or of all geometries by geometry id. A parent comes before
-  /// its children. Empty for a geometry without nodes, or an unknown one.
-  std::vector<NodeId> nodes(GeometryId) const;
-  std::vector<NodeId> nodes() const;
-  std::optional<NodeId> root(GeometryId) const;  ///< none if the geometry has no nodes
-  Node node(NodeId) const;              ///< throws IndexOutOfRange if the node does not exist
-  Update lastUpdate(GeometryId) const;  ///< what the last update did to its tree
+  /// The nodes of one geometry that have elements in their subtree. A parent comes before its
+  /// children. Empty for a geometry without nodes, or an unknown one.
+  /// Cost     linear in the nodes.
+  std::vector<Node> nodes(GeometryId) const;
+  std::vector<GeometryId> geometries() const;  ///< those with nodes, ascending
+  Update lastUpdate(GeometryId) const;         ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
   /// Checks every invariant of the trees. Each element is in exactly one node and within the fitted
@@ -79,14 +65,14 @@ class PALPATE_EXPORT LooseOctree {
   /// Cost     linear in the elements.
   std::vector<std::string> validate() const;
 
-  /// For OctreeBasedCD only.
-  struct State;
-  explicit LooseOctree(std::shared_ptr<const State> state) : m_state(std::move(state)) {}
+  struct State;  ///< not part of the interface
   LooseOctree(const LooseOctree&) = delete;
   LooseOctree& operator=(const LooseOctree&) = delete;
 
  private:
-  std::shared_ptr<const State> m_state;
+  explicit LooseOctree(const State& state) : m_state(state) {}
+
+  const State& m_state;
 };
 PALPATE_EXPORT const char* toString(LooseOctree::Update) noexcept;  ///< its name, or "unknown"
 

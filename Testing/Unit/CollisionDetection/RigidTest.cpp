@@ -551,8 +551,8 @@ TEST(Rigid, OctreeIsNotUpdated) {
   collisions.detectCollision();
   const auto boxes = [&] {
     std::vector<Vector3d> all;
-    for (const LooseOctree::NodeId node : collisions.octree().nodes(body))
-      all.push_back(collisions.octree().node(node).fittedBox.min());
+    for (const LooseOctree::Node& node : collisions.octree().nodes(body))
+      all.push_back(node.fittedBox.min());
     return all;
   };
   const std::vector<Vector3d> built = boxes();

@@ -24,10 +24,8 @@ using testing::Mesh;
 /// of each node counts as another one.
 void corrupt(const OctreeBasedCD& detection, GeometryId geometry) {
   const LooseOctree& octree = detection.octree();
-  for (const LooseOctree::NodeId id : octree.nodes(geometry)) {
-    const auto elements = octree.node(id).elements;
-    if (elements.size() > 1) const_cast<std::uint32_t&>(elements[0]) = elements[1];
-  }
+  for (const LooseOctree::Node& node : octree.nodes(geometry))
+    if (node.elements.size() > 1) const_cast<std::uint32_t&>(node.elements[0]) = node.elements[1];
   ASSERT_FALSE(octree.validate().empty());
 }
 

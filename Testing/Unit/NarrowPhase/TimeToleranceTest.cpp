@@ -267,8 +267,8 @@ TEST(EarliestTime, PredicateThatThrowsLeavesTheOctreesCorrect) {
   };
   const auto boxes = [&] {
     std::vector<Eigen::AlignedBox3d> all;
-    for (const auto node : detection.octree().nodes())
-      all.push_back(detection.octree().node(node).fittedBox);
+    for (const LooseOctree::Node& node : detection.octree().nodes(id))
+      all.push_back(node.fittedBox);
     return all;
   };
   const double time = frame();

@@ -1,47 +1,48 @@
-#include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <vector>
 
 namespace palpate {
 namespace {
 
-bool exists(const LooseOctree& octree, std::uint32_t node) {
-  try {
-    octree.node(LooseOctree::NodeId{node});
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::IndexOutOfRange);
-    return false;
-  }
-  return true;
-}
-
-TEST(LooseOctree, HasTheNodesThatItListsAndNoOthers) {
+TEST(LooseOctree, ListsTheNodesOfEachGeometryFromTheRoot) {
   OctreeBasedCD detection;
   detection.update();
-  EXPECT_TRUE(detection.octree().nodes().empty());
-  EXPECT_FALSE(exists(detection.octree(), 0));
+  EXPECT_TRUE(detection.octree().geometries().empty());
   testing::Random random(51);
+  std::vector<GeometryId> ids;
   for (const std::size_t size : {40u, 3000u}) {
     const testing::Mesh mesh = testing::soup(random, size, 0.05);
-    detection.addTriangleMesh(mesh.positions, mesh.triangles);
+    ids.push_back(detection.addTriangleMesh(mesh.positions, mesh.triangles));
   }
+  detection.addAnalyticalGeometry(Sphere{});
   detection.update();
   const LooseOctree& octree = detection.octree();
-  const std::vector<LooseOctree::NodeId> nodes = octree.nodes();
-  const auto ids = static_cast<std::uint32_t>(octree.statistics().nodesAllocated) + 100;
-  std::size_t found = 0;
-  for (std::uint32_t node = 0; node < ids; ++node) {
-    const bool isListed =
-        std::find(nodes.begin(), nodes.end(), LooseOctree::NodeId{node}) != nodes.end();
-    ASSERT_EQ(exists(octree, node), isListed) << node;
-    found += isListed;
+  EXPECT_EQ(octree.geometries(), ids);
+  const OctreeStatistics statistics = octree.statistics();
+  std::size_t nodes = 0, elements = 0;
+  for (const GeometryId id : ids) {
+    const std::vector<LooseOctree::Node> list = octree.nodes(id);
+    ASSERT_FALSE(list.empty());
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      EXPECT_EQ(list[i].geometry, id);
+      elements += list[i].elements.size();
+      if (i == 0) {
+        EXPECT_EQ(list[i].parent, kNoElement);
+        EXPECT_EQ(list[i].depth, 0);
+      } else {
+        ASSERT_LT(list[i].parent, i);
+        EXPECT_EQ(list[i].depth, list[list[i].parent].depth + 1);
+      }
+    }
+    nodes += list.size();
   }
-  EXPECT_EQ(found, nodes.size());
+  EXPECT_EQ(nodes, statistics.nodesInUse);
+  EXPECT_EQ(elements, statistics.elements);
 }
 
 TEST(LooseOctree, HasNothingOfAnUnknownGeometry) {
@@ -52,7 +53,6 @@ TEST(LooseOctree, HasNothingOfAnUnknownGeometry) {
   detection.update();
   const GeometryId unknown{99};
   EXPECT_TRUE(detection.octree().nodes(unknown).empty());
-  EXPECT_FALSE(detection.octree().root(unknown).has_value());
   EXPECT_EQ(detection.octree().lastUpdate(unknown), LooseOctree::Update::Unchanged);
 }
 

@@ -30,8 +30,7 @@ using TreeContents = std::set<std::pair<std::vector<double>, std::vector<std::ui
 
 TreeContents treeOf(const OctreeBasedCD& detection, GeometryId geometry) {
   TreeContents tree;
-  for (const LooseOctree::NodeId id : detection.octree().nodes(geometry)) {
-    const LooseOctree::Node node = detection.octree().node(id);
+  for (const LooseOctree::Node& node : detection.octree().nodes(geometry)) {
     std::vector<std::uint32_t> elements(node.elements.begin(), node.elements.end());
     std::sort(elements.begin(), elements.end());
     const Eigen::Vector3d low = node.bounds.min(), high = node.bounds.max();
@@ -51,8 +50,9 @@ TEST(Octree, HoldsEachElementOnceWithinItsLooseBounds) {
       ASSERT_EQ(detection.octree().lastUpdate(id), kRebuilt);
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
       std::vector<int> holders(size, 0);
-      for (const auto node : detection.octree().nodes()) {
-        const LooseOctree::Node n = detection.octree().node(node);
+      const std::vector<LooseOctree::Node> nodes = detection.octree().nodes(id);
+      ASSERT_EQ(nodes.front().parent, kNoElement);
+      for (const LooseOctree::Node& n : nodes) {
         for (const std::uint32_t t : n.elements) {
           ++holders[t];
           for (const std::uint32_t corner : mesh.triangles[t]) {
@@ -60,15 +60,12 @@ TEST(Octree, HoldsEachElementOnceWithinItsLooseBounds) {
             EXPECT_TRUE(n.fittedBox.contains(mesh.positions[corner]));
           }
         }
-        if (n.parent) {
-          const LooseOctree::Node parent = detection.octree().node(*n.parent);
-          EXPECT_EQ(parent.depth + 1, n.depth);
-          EXPECT_TRUE(parent.fittedBox.contains(n.fittedBox));
-          EXPECT_NE(std::find(parent.children.begin(), parent.children.end(), node),
-                    parent.children.end());
-        } else {
-          EXPECT_EQ(detection.octree().root(id), node);
-        }
+        if (&n == &nodes.front()) continue;
+        ASSERT_LT(n.parent, &n - nodes.data());
+        const LooseOctree::Node& parent = nodes[n.parent];
+        EXPECT_EQ(parent.depth + 1, n.depth);
+        EXPECT_TRUE(parent.fittedBox.contains(n.fittedBox));
+        EXPECT_TRUE(parent.bounds.contains(n.bounds.center()));
       }
       EXPECT_TRUE(std::all_of(holders.begin(), holders.end(), [](int n) { return n == 1; }));
     }
@@ -131,9 +128,13 @@ TEST(Octree, KeepsMaxDepthAndMaxElementsPerLeaf) {
       EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
       EXPECT_LE(detection.octree().statistics().deepestLevel, depth);
       // A leaf has more elements only at the maximum depth, or if all are as large as its cell.
-      for (const auto node : detection.octree().nodes(id)) {
-        const LooseOctree::Node n = detection.octree().node(node);
-        if (n.leaf && n.depth < depth && n.elements.size() > static_cast<std::size_t>(leaf)) {
+      const std::vector<LooseOctree::Node> nodes = detection.octree().nodes(id);
+      std::vector<bool> isLeaf(nodes.size(), true);
+      for (const LooseOctree::Node& n : nodes)
+        if (n.parent != kNoElement) isLeaf[n.parent] = false;
+      for (const LooseOctree::Node& n : nodes) {
+        if (isLeaf[static_cast<std::size_t>(&n - nodes.data())] && n.depth < depth &&
+            n.elements.size() > static_cast<std::size_t>(leaf)) {
           for (const std::uint32_t t : n.elements) {
             Eigen::AlignedBox3d box;
             for (const std::uint32_t corner : mesh.triangles[t]) box.extend(mesh.positions[corner]);
@@ -177,7 +178,7 @@ TEST(Octree, UpdatesWithItsGeometryAndReportsHow) {
   EXPECT_EQ(detection.statistics().refittedOctrees, 1u);
   EXPECT_EQ(detection.statistics().unchangedOctrees, 1u);
   EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-  const auto root = detection.octree().node(*detection.octree().root(moving));
+  const LooseOctree::Node root = detection.octree().nodes(moving).front();
   for (const Eigen::Vector3d& p : positions) EXPECT_TRUE(root.fittedBox.contains(p));
 }
 

@@ -167,18 +167,18 @@ class ContactSide(NamedTuple):
 
 
 class OctreeNode(NamedTuple):
-    """A node of an octree. Boxes are (2, 3): the lower and the upper corner, L."""
+    """A node of an octree. Boxes are (2, 3): the lower and the upper corner, L.
+
+    parent: its place in the list of nodes; None for the root.
+    """
 
     geometry: int
     depth: int
     bounds: FloatArray
     loose_bounds: FloatArray
     fitted_box: FloatArray
-    geometries: int
     parent: int | None
-    children: tuple[int | None, ...]
     elements: IndexArray
-    leaf: bool
 
 
 class AuditFailure(NamedTuple):
