@@ -21,24 +21,16 @@ constexpr auto startCandidates = [](PairWork& work, const FrameStart& frame) -> 
   return meshes ? meshes->startCandidates(frame) : 0;
 };
 
-/// Whether a job's candidates are those of the traversal, which stay in its sink.
-bool staysInSink(const PairWork& work) { return !std::get<MeshWork>(work).isFiltered(); }
-
-std::span<const ElementPair> candidatesOf(const PairWork& work, const JobScratch& job) {
-  return staysInSink(work) ? job.sink.kept() : std::span<const ElementPair>(job.candidates);
-}
-
 }  // namespace
 
 /// startOf(work, frame): starts a pair's work and returns its number of jobs.
 template <class Start>
-void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
-                  bool keepsCandidates, Start&& startOf) {
+void Frame::start(std::span<PairRecord* const> records, const Threads& threads, Start&& startOf) {
   const MemoryScope memory(MemoryStage::Pairs);
   m_pairs.clear();
   m_places.clear();
   m_nodePairs.clear();
-  const FrameStart frame{threads, keepsCandidates, m_nodePairs, m_stack};
+  const FrameStart frame{threads, m_nodePairs, m_stack};
   for (PairRecord* record : records) {
     record->earliest = std::numeric_limits<double>::infinity();
     m_pairs.push_back({record, workOf(*record), m_places.size()});
@@ -52,48 +44,9 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads,
   }
 }
 
-void Frame::collect(std::span<PairRecord* const> records, const Threads& threads,
-                    FrameStatistics& statistics) {
-  Stopwatch watch;
-  start(records, threads, false, startCandidates);
-  threads.forEach(m_places.size(), [&](std::size_t i) {
-    const auto [pair, job] = m_places[i];
-    const PairWork& work = m_pairs[pair].work;
-    JobScratch& scratch = *m_jobs[i];
-    if (staysInSink(work)) {
-      scratch.sink.start(nullptr, nullptr);
-      return std::get<MeshWork>(work).traverseJob(job, scratch);
-    }
-    std::get<MeshWork>(work).forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      scratch.candidates.insert(scratch.candidates.end(), pairs.begin(), pairs.end());
-    });
-  });
-  for (const Pair& pair : m_pairs) {
-    PairRecord& record = *pair.record;
-    std::size_t size = 0;
-    for (const auto& job : jobsOf(pair)) size += candidatesOf(pair.work, *job).size();
-    record.candidatesSorted = false;
-    record.candidateCount = size;
-    if (pair.jobCount == 1 && staysInSink(pair.work))
-      m_jobs[pair.firstJob]->sink.takeKept(record.candidates);
-    else
-      record.candidates.resize(size);
-  }
-  threads.forEach(m_places.size(), [&](std::size_t i) {
-    const Pair& pair = m_pairs[m_places[i].pair];
-    const auto found = candidatesOf(pair.work, *m_jobs[i]);  // empty where the record took them
-    ElementPair* place = pair.record->candidates.data();
-    for (const auto& job : jobsOf(pair).first(m_places[i].job))
-      place += candidatesOf(pair.work, *job).size();
-    std::copy(found.begin(), found.end(), place);
-  });
-  for (PairRecord* record : records) record->candidatesVersion.commit(record->state());
-  statistics.milliseconds.pairs = watch.lap();
-}
-
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
-  start(records, threads, false, startCandidates);
+  start(records, threads, startCandidates);
   std::mutex mutex;
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Pair& pair = m_pairs[m_places[i].pair];
@@ -135,7 +88,7 @@ void Frame::runRounds(const Threads& threads) {
 }
 
 /// Writes a pair's results and adds what its jobs counted.
-void Frame::join(Pair& pair, const FrameJoin& join, bool keepsCandidates) {
+void Frame::join(Pair& pair, const FrameJoin& join) {
   PALPATE_ASSERT(pair.firstJob + pair.jobCount <= m_jobs.size());
   const MemoryScope memory(MemoryStage::Results);
   PairRecord& record = *pair.record;
@@ -154,13 +107,12 @@ void Frame::join(Pair& pair, const FrameJoin& join, bool keepsCandidates) {
   }
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
   record.statistics.exactDecisions += join.statistics.exactDecisions - exactBefore;
-  if (keepsCandidates) record.candidatesVersion.commit(record.state());
 }
 
-void Frame::detect(std::span<PairRecord* const> records, const Settings& settings,
-                   const Threads& threads, FrameStatistics& statistics) {
+void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
+                   FrameStatistics& statistics) {
   Stopwatch watch;
-  start(records, threads, settings.keepCandidates, [](PairWork& work, const FrameStart& frame) {
+  start(records, threads, [](PairWork& work, const FrameStart& frame) {
     return std::visit([&](auto& each) { return each.start(frame); }, work);
   });
   runRounds(threads);
@@ -179,37 +131,23 @@ void Frame::detect(std::span<PairRecord* const> records, const Settings& setting
 
   for (Pair& pair : m_pairs) {
     PairRecord& record = *pair.record;
-    if (settings.keepCandidates) {
-      record.candidates.clear();
-      for (const auto& job : jobsOf(pair))
-        record.candidates.insert(record.candidates.end(), job->candidates.begin(),
-                                 job->candidates.end());
-    }
-    record.candidatesSorted = false;
-    join(pair, {threads, settings.engine, statistics, m_results}, settings.keepCandidates);
+    join(pair, {threads, Engine::Octree, statistics, m_results});
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
     statistics.milliseconds.order += spent;
   }
 }
 
-void Frame::detectByBruteForce(std::span<PairRecord* const> records, const Settings& settings,
-                               FrameStatistics& statistics) {
+void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatistics& statistics) {
   const Threads oneThread(1);
   for (PairRecord* record : records) {
     Stopwatch watch;
     const double before = statistics.milliseconds.total();
-    start({&record, 1}, oneThread, false,
-          [](PairWork&, const FrameStart&) { return std::size_t{1}; });
+    start({&record, 1}, oneThread, [](PairWork&, const FrameStart&) { return std::size_t{1}; });
     Pair& pair = m_pairs.front();
     std::visit([&](auto& work) { work.runByBruteForce(*m_jobs.front()); }, pair.work);
-    if (settings.keepCandidates && record->hasCandidates())
-      findCandidatesByBruteForce(record->meshes(), record->candidates);
-    else
-      record->candidates.clear();
-    record->candidatesSorted = true;
     statistics.milliseconds.narrowPhase += watch.lap();
-    join(pair, {oneThread, settings.engine, statistics, m_results}, settings.keepCandidates);
+    join(pair, {oneThread, Engine::BruteForce, statistics, m_results});
     statistics.milliseconds.order += watch.lap();
     record->statistics.milliseconds = statistics.milliseconds.total() - before;
   }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <palpate/FrameStatistics.h>
-#include <palpate/Settings.h>
 
 #include "CollisionDetection/JobScratch.h"
 #include "CollisionDetection/PairResults.h"
@@ -21,16 +20,13 @@ namespace palpate {
 /// is left to its PairWork. Its scratch remembers its peak.
 class Frame {
  public:
-  /// Writes the candidates of each pair, unsorted, to its record.
-  void collect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
   using BatchFunction = void (*)(void* context, const CollisionPair&, std::span<const ElementPair>);
   /// Passes the candidates of each pair to a function, batch by batch, one call at a time.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
-  /// Writes the contacts of each pair, sorted, to PairRecord::next. With Settings::keepCandidates
-  /// it also writes the candidates to the record.
-  void detect(std::span<PairRecord* const>, const Settings&, const Threads&, FrameStatistics&);
+  /// Writes the contacts of each pair, sorted, to PairRecord::next.
+  void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
   /// Writes the same results, found by testing every feature against every other.
-  void detectByBruteForce(std::span<PairRecord* const>, const Settings&, FrameStatistics&);
+  void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&);
 
  private:
   struct Pair {
@@ -44,12 +40,12 @@ class Frame {
     std::size_t pair, job;
   };
   template <class Start>
-  void start(std::span<PairRecord* const>, const Threads&, bool keepsCandidates, Start&&);
+  void start(std::span<PairRecord* const>, const Threads&, Start&&);
   Jobs jobsOf(const Pair& pair) const {
     return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
   }
   void runRounds(const Threads&);
-  void join(Pair&, const FrameJoin&, bool keepsCandidates);
+  void join(Pair&, const FrameJoin&);
 
   std::vector<Pair> m_pairs;
   std::vector<Place> m_places;  ///< of the jobs in use

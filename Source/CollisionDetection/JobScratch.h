@@ -24,7 +24,6 @@ struct JobScratch : CountedObject {
   bool nearby = false;               ///< some boxes overlap at the thickness of the traversal
   bool intersectionsMissed = false;  ///< they were not looked for in every batch
   std::size_t candidateCount = 0;
-  Buffer<ElementPair> candidates;  ///< if they are kept
   ProxyHits hits;
   double milliseconds = 0, narrowMilliseconds = 0;
 
@@ -38,7 +37,6 @@ struct JobScratch : CountedObject {
     intersections.clear();
     nearby = intersectionsMissed = false;
     candidateCount = 0;
-    candidates.clear();
     hits.count = 0;
     milliseconds = narrowMilliseconds = 0;
   }
@@ -50,7 +48,6 @@ using Jobs = std::span<const std::unique_ptr<JobScratch>>;
 /// What start() of a pair's work needs of the frame.
 struct FrameStart {
   const Threads& threads;
-  bool keepsCandidates;
   Buffer<NodePair>& nodePairs;  ///< of the traversals of all pairs
   TraversalStack& stack;
 };

@@ -53,16 +53,10 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
   return floats;
 }
 
-bool sharesVertex(const Triangle& s, const Triangle& t) {
-  return std::any_of(s.begin(), s.end(),
-                     [&](std::uint32_t v) { return v == t[0] || v == t[1] || v == t[2]; });
-}
-
 }  // namespace
 
 std::size_t MeshWork::start(const FrameStart& frame) {
-  m_keepsCandidates = frame.keepsCandidates;
-  return startTraversal(frame, true, frame.keepsCandidates ? BoxFrame::World : BoxFrame::Body);
+  return startTraversal(frame, true, BoxFrame::Body);
 }
 
 std::size_t MeshWork::startCandidates(const FrameStart& frame) {
@@ -201,11 +195,6 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
       findContacts(meshes, pairs, scratch.contacts);
     scratch.narrowMilliseconds += watch.lap();
   }
-  if (!m_keepsCandidates) return;
-  const CountedVector<Triangle>& triangles = meshes.a.topology.triangles;
-  for (const ElementPair pair : pairs)
-    if (!meshes.self() || !sharesVertex(triangles[pair.a], triangles[pair.b]))
-      scratch.candidates.push_back(pair);
 }
 
 /// Auto: finds intersections at the step's end.

@@ -66,7 +66,6 @@ class MeshWork {
   std::size_t preferBodies(const FrameJoin&, std::size_t preferred) const;
 
   PairRecord* m_record;
-  bool m_keepsCandidates = false;
   TreePair m_trees{};
   FloatPair m_floats{};
   double m_thickness = 0;  ///< L: of the boxes that the pair's method compares

@@ -276,11 +276,6 @@ void OctreeBasedCD::update() {
   all->withinLimit([&] { all->update(true); });
 }
 
-void OctreeBasedCD::collectCandidates() {
-  const Implementation::ChangeGuard all(m_implementation);
-  all->withinLimit([&] { all->collect(); });
-}
-
 void OctreeBasedCD::detectCollision() {
   const Implementation::ChangeGuard all(m_implementation);
   all->withinLimit([&] { all->detect(); });
@@ -308,6 +303,15 @@ void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFuncti
     findCandidatesByBruteForce(record->meshes(), candidates);
     if (!candidates.empty()) function(context, record->pair, candidates);
   }
+}
+
+std::vector<ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) {
+  std::vector<ElementPair> pairs;
+  forEachCandidate(a, b, [&](std::span<const ElementPair> batch) {
+    pairs.insert(pairs.end(), batch.begin(), batch.end());
+  });
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
 }
 
 SpatialQueries OctreeBasedCD::queries() const {
@@ -339,26 +343,6 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
                 nameOf(*record.a, *record.b) + " has no results yet: call detectCollision() first",
                 a);
   return record.data;
-}
-
-std::span<const ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) const {
-  read();
-  Implementation& all = *m_implementation;
-  PairRecord& record = all.pairs.at(all.geometries, a, b);
-  checkCandidates(record);
-  if (!record.candidatesVersion.isValid())
-    throw Error(ErrorCode::NotAvailable,
-                nameOf(*record.a, *record.b) +
-                    " has no candidates: call collectCandidates(), or set "
-                    "Settings::keepCandidates before detectCollision()",
-                a);
-  const std::lock_guard lock(all.sorting);
-  const MemoryScope memory(all.budget, MemoryStage::Pairs);
-  if (!record.candidatesSorted)
-    orderPairs(record.candidates, record.a->body.mesh.topology.triangles.size(),
-               all.sortingScratch);
-  record.candidatesSorted = true;
-  return record.candidates;
 }
 
 const LooseOctree& OctreeBasedCD::octree() const { return read().shownOctrees.view; }

@@ -31,7 +31,6 @@ OctreeBasedCD::Implementation::~Implementation() {
 
 void OctreeBasedCD::Implementation::releaseMemory() {
   frame = Frame();
-  sortingScratch = {};
   for (const auto& geometry : geometries.all()) {
     geometry->body.tree.releaseMemory();
     geometry->step.releaseMemory();
@@ -72,7 +71,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   }
   Stopwatch watch;
   for (const auto& record : records) {
-    planStep(*record, detecting, !settings.keepCandidates);
+    planStep(*record, detecting);
     if (record->plan.swept())
       for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
   }
@@ -125,13 +124,11 @@ void OctreeBasedCD::Implementation::updateOctreeView() {
   }
 }
 
-std::span<PairRecord* const> OctreeBasedCD::Implementation::outdatedPairs(
-    PairRecord::Derived PairRecord::*version) {
+std::span<PairRecord* const> OctreeBasedCD::Implementation::outdatedPairs() {
   selectedPairs.clear();
   for (const auto& record : pairs.records())
-    if (record->collides() && !((*record).*version).isCurrent(record->state()))
+    if (record->collides() && !record->dataVersion.isCurrent(record->state()))
       selectedPairs.push_back(record.get());
-  for (PairRecord* record : selectedPairs) record->candidatesVersion.invalidate();
   return selectedPairs;
 }
 
@@ -141,31 +138,6 @@ const Threads& OctreeBasedCD::Implementation::threadsFor(
   std::size_t found = 0;
   for (const PairRecord* record : records) found += record->candidateCount;
   return geometries.wasUpdatedByOneThread() && found < kFew ? singleThread : threads;
-}
-
-void OctreeBasedCD::Implementation::collect() {
-  const MemoryScope memory(MemoryStage::Pairs);
-  update();
-  FrameStatistics next = updates;
-  const auto records = outdatedPairs(&PairRecord::candidatesVersion);
-  if (settings.engine == Engine::Octree) {
-    frame.collect(records, threadsFor(records), next);
-  } else {
-    for (PairRecord* record : records) {
-      if (record->hasCandidates())
-        findCandidatesByBruteForce(record->meshes(), record->candidates);
-      else
-        record->candidates.clear();
-      record->candidatesSorted = true;
-      record->candidatesVersion.commit(record->state());
-    }
-  }
-  for (const auto& record : pairs.records()) {
-    if (!record->collides()) record->commitNoCandidates();
-    next.candidatePairs += record->candidates.size();
-  }
-  setStatistics(next);
-  hasUpdates = false;
 }
 
 bool OctreeBasedCD::Implementation::updateProxies(std::span<PairRecord* const> records) {
@@ -184,22 +156,19 @@ void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
   for (const auto& record : guarded)
     if (record->collides() && !record->dataVersion.isCurrent(record->state()))
       selectedPairs.push_back(record.get());
-  Settings withoutCandidates = settings;
-  withoutCandidates.keepCandidates = false;
   if (settings.engine == Engine::Octree)
-    frame.detect(selectedPairs, withoutCandidates, threads, unused);
+    frame.detect(selectedPairs, threads, unused);
   else
-    frame.detectByBruteForce(selectedPairs, withoutCandidates, unused);
+    frame.detectByBruteForce(selectedPairs, unused);
   for (PairRecord* record : selectedPairs) record->commit();
 }
 
 void OctreeBasedCD::Implementation::detect() {
   const MemoryScope memory(MemoryStage::Pairs);
   update(false, true);
-  for (const auto& record : pairs.records())
-    if (!settings.keepCandidates) planByFieldIfProven(*record, settings.engine);
+  for (const auto& record : pairs.records()) planByFieldIfProven(*record, settings.engine);
   FrameStatistics next = updates;
-  const auto records = outdatedPairs(&PairRecord::dataVersion);
+  const auto records = outdatedPairs();
   for (const auto& record : pairs.records()) record->statistics = {};
   for (PairRecord* record : records)
     record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
@@ -208,13 +177,13 @@ void OctreeBasedCD::Implementation::detect() {
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
   if (settings.engine == Engine::Octree)
-    frame.detect(records, settings, threads, next);
+    frame.detect(records, threads, next);
   else
-    frame.detectByBruteForce(records, settings, next);
+    frame.detectByBruteForce(records, next);
   for (PairRecord* record : records) record->commit();
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
-      record->commitEmpty(settings.keepCandidates);
+      record->commitEmpty();
     const CollisionData& data = record->data;
     record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
     next.contacts += record->statistics.contacts;

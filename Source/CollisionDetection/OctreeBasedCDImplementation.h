@@ -10,7 +10,6 @@
 #include "CollisionDetection/StepSource.h"
 #include "Queries/QuerySource.h"
 #include "Queries/SnapshotPool.h"
-#include "NarrowPhase/Order.h"
 #include "Octree/Forest.h"
 #include "Core/FloatingPoint.h"
 #include "Core/MemoryBudget.h"
@@ -53,8 +52,6 @@ struct OctreeBasedCD::Implementation {
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
-  std::mutex sorting;  ///< locked while candidatePairs(), a const call, sorts candidates
-  PairOrderScratch sortingScratch;
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
@@ -92,7 +89,7 @@ struct OctreeBasedCD::Implementation {
               bool skips);
 
   bool needsNoOctree(const PairRecord& record) const {
-    return record.kind() == PairKind::Proxy || (!settings.keepCandidates && mayUseLeaves(record));
+    return record.kind() == PairKind::Proxy || mayUseLeaves(record);
   }
 
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
@@ -103,13 +100,11 @@ struct OctreeBasedCD::Implementation {
 
   /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
   /// empty.
-  std::span<PairRecord* const> outdatedPairs(PairRecord::Derived PairRecord::*version);
+  std::span<PairRecord* const> outdatedPairs();
 
   /// Returns `singleThread` if one thread has refitted the octrees and few candidates are expected:
   /// other threads would wait for the data longer than they could help.
   const Threads& threadsFor(std::span<PairRecord* const> records) const;
-
-  void collect();
 
   bool updateProxies(std::span<PairRecord* const> records);
 

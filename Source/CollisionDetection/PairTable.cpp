@@ -61,24 +61,15 @@ void PairRecord::commit() noexcept {
 void PairRecord::releaseMemory() {
   next = {};
   fieldScratch.reset();
-  if (!candidatesVersion.isValid()) candidates.clear();
-  releaseSpare(candidates);
   CollisionData::Contents& kept = CollisionData::Contents::of(data);
   forEachTimed(kept, [](auto& list) { releaseSpare(list); });
   releaseSpare(kept.intersectingTriangles);
 }
 
-void PairRecord::commitEmpty(bool keepsCandidates) noexcept {
+void PairRecord::commitEmpty() noexcept {
   next = {};
   commit();
   trust.forget();
-  candidates.clear();
-  if (keepsCandidates) candidatesVersion.commit(state());
-}
-
-void PairRecord::commitNoCandidates() noexcept {
-  candidates.clear();
-  candidatesVersion.commit(state());
 }
 
 namespace {
@@ -180,7 +171,6 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   record.pair.settings = m_pairs[record.index].settings = settings;
   planWithoutMotion(record);
   record.settingsRevision = m_revisions.next();
-  record.candidatesVersion.invalidate();
 }
 
 void PairTable::checkRigid(const Geometry& geometry) const {

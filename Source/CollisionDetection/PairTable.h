@@ -71,10 +71,9 @@ struct PairRecord : CountedObject {
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// Commits an empty result, for a pair that does not collide.
-  void commitEmpty(bool keepsCandidates) noexcept;
-  void commitNoCandidates() noexcept;  ///< for a pair that does not collide
+  void commitEmpty() noexcept;
 
-  void releaseMemory();  ///< keeps the result, and candidates that are valid
+  void releaseMemory();  ///< keeps the result
 
   /// How the settings have the pair answered. Auto's plan of a frame may have another kind.
   PairKind kind() const {
@@ -113,9 +112,6 @@ struct PairRecord : CountedObject {
   std::size_t candidateCount = 0;  ///< number of candidates when last found
   PairStatistics statistics;       ///< of the last detection
   std::unique_ptr<FieldScratch> fieldScratch;
-  Buffer<ElementPair> candidates;  ///< unsorted until candidatePairs() is called
-  Derived candidatesVersion;
-  bool candidatesSorted = false;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest
   std::shared_ptr<const SurfaceProxy> proxy;  ///< of b, for PairKind::Proxy; pairs may share it

@@ -18,7 +18,7 @@ bool mayUseLeaves(const PairRecord& record) {
          reach <= b.proxySettings.reach;
 }
 
-void planStep(PairRecord& record, bool detecting, bool leavesAllowed) {
+void planStep(PairRecord& record, bool detecting) {
   const PairSettings& settings = record.pair.settings;
   const PairKind kind = record.kind();
   const bool moves = (detecting || settings.method == Method::Auto) && kind != PairKind::Proxy &&
@@ -26,8 +26,7 @@ void planStep(PairRecord& record, bool detecting, bool leavesAllowed) {
   if (moves)
     for (Geometry* geometry : {record.a, record.b}) geometry->motion.update(*geometry);
   record.plan = planOf(settings, record.a->inStep(), record.b->inStep(), moves);
-  if (detecting && leavesAllowed && mayUseLeaves(record))
-    record.plan = planByLeaves(settings, record.plan);
+  if (detecting && mayUseLeaves(record)) record.plan = planByLeaves(settings, record.plan);
 }
 
 void planByFieldIfProven(PairRecord& record, Engine engine) {

@@ -19,7 +19,7 @@ bool mayUseLeaves(const PairRecord&);
 /// Plans by the motion in the step, which it updates. detecting: contacts are wanted; otherwise
 /// only the motion on which candidates depend is included. Whether the boxes of both octrees have
 /// to enclose the step is then PairPlan::swept().
-void planStep(PairRecord&, bool detecting, bool leavesAllowed);
+void planStep(PairRecord&, bool detecting);
 
 /// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
 /// nothing touched in the step. The octrees must be updated.

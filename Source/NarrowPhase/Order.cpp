@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <numeric>
 
 namespace palpate {
 
@@ -61,28 +60,6 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
 }
 
 }  // namespace
-
-void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch& scratch) {
-  PALPATE_ASSERT(
-      std::all_of(pairs.begin(), pairs.end(), [&](const ElementPair& p) { return p.a < firsts; }));
-  if (pairs.size() < firsts / 8) {  // the counters would cost more than they save
-    std::sort(pairs.begin(), pairs.end());
-    return;
-  }
-  Buffer<std::uint32_t>& next = scratch.places;  // per a: where its next pair goes; at last its end
-  next.assign(firsts, 0);
-  for (const ElementPair& pair : pairs) ++next[pair.a];
-  std::exclusive_scan(next.begin(), next.end(), next.begin(), 0u);
-  scratch.pairs.resize(pairs.size());
-  for (const ElementPair& pair : pairs) scratch.pairs[next[pair.a]++] = pair;
-  auto begin = scratch.pairs.begin();
-  for (const std::uint32_t place : next) {
-    const auto end = scratch.pairs.begin() + place;
-    std::sort(begin, end, [](const ElementPair& l, const ElementPair& r) { return l.b < r.b; });
-    begin = end;
-  }
-  std::copy(scratch.pairs.begin(), scratch.pairs.end(), pairs.begin());
-}
 
 std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t preferred,
                           OrderScratch& scratch, CollisionData::Contents& out) {

@@ -45,15 +45,6 @@ struct OrderScratch {
   std::array<Buffer<std::uint8_t>, 3> preferred;
 };
 
-struct PairOrderScratch {
-  Buffer<std::uint32_t> places;
-  Buffer<ElementPair> pairs;
-};
-
-/// Sorts by (a, b), where every a is below `firsts`.
-/// Cost     two passes over the pairs and one over `firsts` counters.
-void orderPairs(Buffer<ElementPair>& pairs, std::size_t firsts, PairOrderScratch&);
-
 /// Collects the buffers' contacts, sorted by element ids, each once. The first `preferred` buffers
 /// have precedence over the others where both have a contact of the same elements. Returns the
 /// number of contacts from preferred buffers.

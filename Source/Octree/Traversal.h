@@ -23,8 +23,8 @@ struct NodePair {
   OctreeNode a, b;
 };
 
-/// Receives the pairs that were found. They are passed to a function in batches, or kept until
-/// taken if there is no function. start() discards earlier pairs; it is required after an
+/// Receives the pairs that were found. They are passed to a function in batches, or kept if
+/// there is no function. start() discards earlier pairs; it is required after an
 /// exception.
 class PairSink {
  public:
@@ -60,13 +60,6 @@ class PairSink {
     }
   }
   std::span<const ElementPair> kept() const { return std::span(m_pairs).first(m_size); }
-  /// Swaps the kept pairs with a buffer, which is filled next time.
-  void takeKept(Buffer<ElementPair>& pairs) {
-    PALPATE_ASSERT(!m_function);
-    m_pairs.resize(m_size);
-    m_pairs.swap(pairs);
-    m_size = 0;
-  }
   std::size_t total() const { return m_total + m_size; }
   std::size_t bytes() const { return m_pairs.capacity() * sizeof(ElementPair); }
 

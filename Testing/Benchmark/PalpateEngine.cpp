@@ -1,6 +1,9 @@
 #include "PalpateEngine.h"
 
+#include "Measure.h"
+
 #include <optional>
+#include <vector>
 
 namespace palpate::benchmark {
 namespace {
@@ -26,6 +29,7 @@ class PalpateEngine : public BroadPhase {
     m_task = task;
     m_scene.emplace(task, positions, m_update);
     m_lists.prepare(task.pairs.size(), 1);
+    m_sorted.resize(task.pairs.size());
   }
 
   void update(const Positions& positions) override {
@@ -35,10 +39,8 @@ class PalpateEngine : public BroadPhase {
 
   void collide() override {
     if (m_order == PairOrder::Sorted) {
-      m_scene->detection.collectCandidates();
-      // Sorted on the first call.
       for (std::size_t pair = 0; pair < m_task.pairs.size(); ++pair)
-        m_scene->detection.candidatePairs(first(pair), second(pair));
+        m_sorted[pair] = m_scene->detection.candidatePairs(first(pair), second(pair));
       return;
     }
     m_lists.clear();
@@ -50,9 +52,7 @@ class PalpateEngine : public BroadPhase {
   }
 
   std::vector<ElementPair> candidates(std::size_t pair) const override {
-    if (m_order == PairOrder::Found) return m_lists.sorted(pair);
-    const auto pairs = m_scene->detection.candidatePairs(first(pair), second(pair));
-    return {pairs.begin(), pairs.end()};
+    return m_order == PairOrder::Found ? m_lists.sorted(pair) : m_sorted[pair];
   }
 
  private:
@@ -69,6 +69,7 @@ class PalpateEngine : public BroadPhase {
   Task m_task;
   std::optional<PalpateScene> m_scene;
   PairLists m_lists;
+  std::vector<std::vector<ElementPair>> m_sorted;
 };
 
 }  // namespace
@@ -92,6 +93,17 @@ void PalpateScene::setPositions(const Positions& positions) {
 
 std::unique_ptr<BroadPhase> makePalpate(OctreeUpdate update, PairOrder order) {
   return std::make_unique<PalpateEngine>(update, order);
+}
+
+FrameStatistics findCandidates(OctreeBasedCD& detection) {
+  detection.update();
+  FrameStatistics statistics = detection.statistics();
+  const double start = now();
+  detection.forEachCandidate([&](const CollisionPair&, std::span<const ElementPair> batch) {
+    statistics.candidatePairs += batch.size();
+  });
+  statistics.milliseconds.pairs = now() - start;
+  return statistics;
 }
 
 }  // namespace palpate::benchmark

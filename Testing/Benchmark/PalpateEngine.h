@@ -8,7 +8,7 @@ namespace palpate::benchmark {
 
 enum class PairOrder {
   Found,  ///< forEachCandidate(), in the order found, as the baselines deliver them
-  Sorted  ///< collectCandidates() and candidatePairs()
+  Sorted  ///< candidatePairs()
 };
 
 /// Palpate as a user calls it. All other settings are the defaults.
@@ -24,5 +24,8 @@ struct PalpateScene {
   OctreeBasedCD detection;
   std::vector<GeometryId> ids;
 };
+
+/// update() and forEachCandidate(): their times, and the number of pairs.
+FrameStatistics findCandidates(OctreeBasedCD&);
 
 }  // namespace palpate::benchmark

@@ -50,10 +50,10 @@ void stageRow(Report& report, const Workload& workload, OctreeUpdate update, int
   for (int repetition = 0; repetition < repetitions; ++repetition) {
     for (std::size_t frame = 0; frame < workload.frames.size(); ++frame) {
       scene.setPositions(workload.frames[frame]);
-      scene.detection.collectCandidates();
+      const FrameStatistics statistics = findCandidates(scene.detection);
       if (frame == 0) continue;
-      samples.add(scene.detection.statistics().milliseconds);
-      pairs.push_back(static_cast<double>(scene.detection.statistics().candidatePairs));
+      samples.add(statistics.milliseconds);
+      pairs.push_back(static_cast<double>(statistics.candidatePairs));
     }
   }
   const double perTriangle = 1e6 / static_cast<double>(workload.triangles());
@@ -238,10 +238,9 @@ void smallToolRows(Report& report, const RowOptions& options) {
           tool[i] = 5 * edge * sphere.positions[i] + centre;
         const double start = now();
         scene.detection.setPositions(scene.ids[1], tool);
-        scene.detection.collectCandidates();
+        pairs = static_cast<double>(findCandidates(scene.detection).candidatePairs);
         scene.detection.advance();
         samples.push_back(now() - start);
-        pairs = static_cast<double>(scene.detection.statistics().candidatePairs);
       }
       return median(samples);
     };
@@ -279,11 +278,10 @@ void scaleRows(Report& report, const RowOptions& options) {
       PalpateScene scene(workload.task, workload.frames[0], update);
       for (const Positions& frame : workload.frames) {
         scene.setPositions(frame);
-        scene.detection.collectCandidates();
+        pairs = static_cast<double>(findCandidates(scene.detection).candidatePairs) / triangles;
       }
       bytes[update == OctreeUpdate::Rebuild] =
           static_cast<double>(scene.detection.octree().statistics().bytes) / triangles;
-      pairs = static_cast<double>(scene.detection.statistics().candidatePairs) / triangles;
     }
     const double speedUp[] = {ratio(timings[0], timings[2]), ratio(timings[1], timings[3])};
     report.line({name, tenths(timings[0].total * 1e6 / triangles),

@@ -47,7 +47,7 @@ scenes::Scene restingSheets() {
 class ValidityCost {
  public:
   ValidityCost(const scenes::Scene& scene, const PairSettings& settings)
-      : m_scene(scene), m_settings(settings), m_detection({.threads = 1, .keepCandidates = true}) {
+      : m_scene(scene), m_settings(settings), m_detection({.threads = 1}) {
     m_before = m_now = at(0);
     for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
       m_ids.push_back(m_detection.addTriangleMesh(m_now[m], scene.meshes[m].triangles));
@@ -118,7 +118,7 @@ class ValidityCost {
     }
     return spent;
   }
-  std::span<const ElementPair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
+  std::vector<ElementPair> candidatesOf(const std::pair<std::size_t, std::size_t>& pair) {
     return m_detection.candidatePairs(m_ids[pair.first], m_ids[pair.second]);
   }
   /// The initial intersection check: its number of pairs, times the cost per candidate.

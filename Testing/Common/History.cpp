@@ -337,7 +337,6 @@ void RandomHistory::query() {
     case 0:
       return m_collisions.update();
     case 1:
-      return m_collisions.collectCandidates();
     case 2:
       return m_collisions.detectCollision();
     case 3: {
@@ -461,8 +460,6 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
 
 void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,
                                       const std::map<GeometryId, GeometryId>& ids) {
-  m_collisions.collectCandidates();
-  bruteForce.collectCandidates();
   for (const Pair& pair : m_pairs) {
     if (m_bodies.at(pair.a).shape || m_bodies.at(pair.b).shape) continue;
     const auto found = m_collisions.candidatePairs(pair.a, pair.b),

@@ -410,14 +410,12 @@ TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
   }
 }
 
-/// Exact methods answer what a field does not know: filters by side, candidates, and inside.
+/// Exact methods answer what a field does not know: filters by side, and inside.
 TEST(AllowedError, FieldsDoNotAnswerInsideNorOneSidedGeometries) {
   const Body box = bodyOf(boxMesh({-1, -1, -1}, {1, 1, 1}));
   const Mesh small = sphere(8, 10, Vector3d::Zero(), 0.3);
-  const auto reasonAt = [&](double x, bool isOneSided, bool keepsCandidates) {
-    Settings settings = settingsOf(Engine::Octree);
-    settings.keepCandidates = keepsCandidates;
-    OctreeBasedCD detection(settings);
+  const auto reasonAt = [&](double x, bool isOneSided) {
+    OctreeBasedCD detection(settingsOf(Engine::Octree));
     Points before = small.positions, now = small.positions;
     for (Vector3d& p : before) p.x() += x;
     for (Vector3d& p : now) p.x() += x + 1e-3;
@@ -430,11 +428,10 @@ TEST(AllowedError, FieldsDoNotAnswerInsideNorOneSidedGeometries) {
     detection.detectCollision();
     return detection.collisionData(other, body).validity().reason;
   };
-  EXPECT_EQ(reasonAt(1.36, false, false), MethodReason::AllowedError);
-  EXPECT_EQ(reasonAt(1.36, true, false), MethodReason::Slow);
-  EXPECT_EQ(reasonAt(1.36, false, true), MethodReason::Slow);
-  EXPECT_EQ(reasonAt(0, false, false), MethodReason::Slow);
-  EXPECT_EQ(reasonAt(5, false, false), MethodReason::AllowedError);
+  EXPECT_EQ(reasonAt(1.36, false), MethodReason::AllowedError);
+  EXPECT_EQ(reasonAt(1.36, true), MethodReason::Slow);
+  EXPECT_EQ(reasonAt(0, false), MethodReason::Slow);
+  EXPECT_EQ(reasonAt(5, false), MethodReason::AllowedError);
 }
 
 TEST(AllowedError, SteadyFramesThatAFieldAnswersAllocateNothing) {

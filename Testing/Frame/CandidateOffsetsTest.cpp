@@ -40,7 +40,6 @@ void count(const Mesh& a, const Mesh& b, const PairSettings& settings, const Vec
   for (PairRun* run : {&octree, &oracle}) {
     run->detection().setPositions(run->a(), firstBefore, first.positions);
     run->detection().setPositions(run->b(), secondBefore, second.positions);
-    run->detection().collectCandidates();
   }
   for (const CollisionPair& pair : octree.detection().pairs()) {
     const auto found = octree.detection().candidatePairs(pair.a, pair.b),

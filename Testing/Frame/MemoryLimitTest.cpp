@@ -18,9 +18,8 @@
 namespace palpate::testing {
 namespace {
 
-Settings limited(int threads, std::size_t memoryLimit, bool keepCandidates = true) {
+Settings limited(int threads, std::size_t memoryLimit) {
   Settings settings = settingsOf(Engine::Octree, threads);
-  settings.keepCandidates = keepCandidates;
   settings.memoryLimit = memoryLimit;
   return settings;
 }
@@ -83,7 +82,7 @@ TEST_P(MemoryLimit, StatesWhatIsAllocated) {
     }
     const auto snapshot = scene.detection.latestSnapshot();
     scene.query(snapshot->queries());
-    scene.detection.collectCandidates();
+    scene.detection.forEachCandidate([](auto&&...) {});
     check("candidates");
     const MemoryUse& use = scene.detection.statistics().memory;
     EXPECT_EQ(use.total, use.geometries + use.octrees + use.pairs + use.narrowPhase + use.results +
@@ -240,7 +239,7 @@ TEST(MemoryUse, AFrameWithTooManyContactsIsRefused) {
 TEST(MemoryUse, SpareMemoryIsGivenBackFirst) {
   const Mesh a = fan(100, 0), b = fan(100, 1);
   const auto frames = [&](std::size_t limit, std::size_t& least, std::size_t& most) {
-    OctreeBasedCD detection(limited(1, limit, false));
+    OctreeBasedCD detection(limited(1, limit));
     const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles);
     std::vector<GeometryId> others;
     Positions away = b.positions;

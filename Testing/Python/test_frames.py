@@ -243,7 +243,7 @@ def test_tetrahedral_meshes():
 
 
 def test_candidates_statistics_and_octrees():
-    scene = Balls(keep_candidates=True)
+    scene = Balls()
     collisions, a, b = scene.collisions, scene.a, scene.b
     scene.step(20)
     kept = collisions.candidate_pairs(a, b)
@@ -253,7 +253,6 @@ def test_candidates_statistics_and_octrees():
     collisions.for_each_candidate(lambda pair, batch: pairs.append((pair.a, len(batch))))
     assert sorted(map(tuple, np.concatenate(batches).tolist())) == list(map(tuple, kept.tolist()))
     assert sum(count for _, count in pairs) == len(kept)
-    collisions.collect_candidates()
     assert np.array_equal(collisions.candidate_pairs(b, a), kept)
     scene.step(21)
     statistics = collisions.statistics()

@@ -70,11 +70,12 @@ inline constexpr auto kFields<AuditSettings> = std::tuple(
 template <>
 inline constexpr const char* kClass<Settings> = "Settings";
 template <>
-inline constexpr auto kFields<Settings> = std::tuple(
-    field("octree", &Settings::octree), field("engine", &Settings::engine),
-    field("threads", &Settings::threads), field("keep_candidates", &Settings::keepCandidates),
-    field("audit", &Settings::audit), field("executor", &Settings::executor),
-    field("memory_limit", &Settings::memoryLimit));
+inline constexpr auto kFields<Settings> = std::tuple(field("octree", &Settings::octree),
+                                                     field("engine", &Settings::engine),
+                                                     field("threads", &Settings::threads),
+                                                     field("audit", &Settings::audit),
+                                                     field("executor", &Settings::executor),
+                                                     field("memory_limit", &Settings::memoryLimit));
 template <>
 inline constexpr const char* kClass<PairSettings> = "PairSettings";
 template <>

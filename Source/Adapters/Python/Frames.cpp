@@ -14,10 +14,6 @@ void addFrames(CollisionsClass& collisions) {
           "update", [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.update(); }); },
           "update() -> None\n\nBrings octrees to the positions now. Others do so themselves.")
       .def(
-          "collect_candidates",
-          [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.collectCandidates(); }); },
-          "collect_candidates() -> None\n\nFills candidate_pairs() of every pair.")
-      .def(
           "detect_collision",
           [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.detectCollision(); }); },
           R"(detect_collision() -> None

@@ -135,13 +135,14 @@ A copy of the answer of the last detection, in the order in which the pair was a
           "candidate_pairs",
           [](Collisions& self, Object first, Object second) {
             const GeometryId a = geometryId(first), b = geometryId(second);
-            return self.read([&](OctreeBasedCD& d) { return copyOf(d.candidatePairs(a, b)); });
+            std::vector<ElementPair> pairs;
+            self.work([&](OctreeBasedCD& d) { pairs = d.candidatePairs(a, b); });
+            return copyOf(pairs);
           },
           py::arg("a"), py::arg("b"),
           R"(candidate_pairs(a, b) -> numpy.ndarray
 
-(n, 2) elements whose boxes overlap, of the last collect_candidates(), or of detect_collision() with
-Settings.keep_candidates.)")
+(n, 2) elements whose boxes overlap, ascending. Updates octrees if needed.)")
       .def(
           "pair_statistics",
           [](Collisions& self, Object first, Object second) {

@@ -8,7 +8,7 @@ namespace palpate {
 struct MemoryUse {
   std::size_t geometries = 0;  ///< topologies, positions, pairs
   std::size_t octrees = 0;     ///< with the floats from which their boxes come, and leaves of Proxy
-  std::size_t pairs = 0;       ///< the search for candidate pairs, and candidatePairs()
+  std::size_t pairs = 0;       ///< the search for candidate pairs
   std::size_t narrowPhase = 0;  ///< from candidates to unsorted contacts
   std::size_t results = 0;      ///< the results of all pairs, and what sorts them
   std::size_t queries = 0;      ///< of SpatialQueries, also those of snapshots
@@ -17,7 +17,7 @@ struct MemoryUse {
 };
 
 /// Times and counts of one frame, over all geometries and pairs. A frame is one detectCollision()
-/// or collectCandidates() with the updates before it.
+/// with the updates before it.
 struct FrameStatistics {
   /// Wall-clock milliseconds of the frame. Where threads work on two stages at once, the time is
   /// divided in proportion to their work.
@@ -36,8 +36,8 @@ struct FrameStatistics {
   /// vertices that belong to no enabled element, so that no pair tests them
   std::size_t untestedVertices = 0;
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
-  /// Element pairs that the narrow phase received. Fewer for two placed bodies whose candidates are
-  /// not kept: their boxes are compared in the frame of one body.
+  /// Element pairs that the narrow phase received. Fewer than those of forEachCandidate() for two
+  /// placed bodies: their boxes are compared in the frame of one body.
   std::size_t candidatePairs = 0;
   /// vertex-triangle and edge-edge pairs that the candidates own. Intersection decides each
   /// triangle pair as a whole and counts none.

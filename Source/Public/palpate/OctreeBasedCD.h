@@ -23,6 +23,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace palpate {
 
@@ -281,26 +282,29 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   /// Brings boxes and octrees to the positions now. Functions that need them do this themselves.
   void update();
-  /// Runs the broad phase of every pair, for a narrow phase of your own. It fills candidatePairs()
-  /// and updates octrees if needed.
-  void collectCandidates();
   /// Runs the broad phase and the narrow phase of every pair, and updates octrees if needed. Pairs
   /// for which nothing changed since the last detection keep their answer. A steady frame allocates
   /// no memory, except for integers of exact arithmetic (Docs/Guarantees.md, "Memory").
   ///
   /// Errors   whatever a predicate or executor throws; InvalidSettings if an executor's run()
   ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool()).
-  ///          Predicates apart, update(), collectCandidates(), forEachCandidate() and queries()
-  ///          throw the same.
+  ///          Predicates apart, update(), forEachCandidate() and queries() throw the same.
   void detectCollision();
 
-  /// Passes the candidate pairs of (a, b) to f(std::span<const ElementPair>) in batches. The
-  /// batches are unsorted. Calls of f come one at a time, but from several threads. With
-  /// Engine::Octree memory does not grow with the number of pairs. Updates octrees if needed. (a,
-  /// b) may be in either order.
+  /// Passes the candidate pairs of (a, b), for a narrow phase of your own, to
+  /// f(std::span<const ElementPair>) in batches. They are all pairs of enabled elements whose boxes
+  /// overlap, each box inflated by half the thickness and by the largest radius of its geometry.
+  /// Auto may add to the thickness (Validity::effectiveThickness), and for Intersection it is 0. If
+  /// the method needs the motion in the step, the boxes enclose the whole step. Outward rounding
+  /// may add pairs. Updates octrees if needed. (a, b) may be in either order.
   ///
-  /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f
-  ///          calls a function of this object; whatever f throws.
+  /// Order    none. Of a pair, `a` is of the first geometry with which the pair was added. For a
+  ///          geometry with itself each unordered pair once, a < b, and no pair with a common
+  ///          vertex.
+  /// Threads  calls of f come one at a time, but from several threads.
+  /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f calls a function
+  ///          of this object; whatever f throws.
+  /// Cost     with Engine::Octree memory does not grow with the number of pairs.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
     const CollisionPair pair{a, b, {}};
@@ -322,6 +326,9 @@ class PALPATE_EXPORT OctreeBasedCD {
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
+
+  /// The pairs of forEachCandidate() as a list, ascending.
+  std::vector<ElementPair> candidatePairs(GeometryId a, GeometryId b);
 
   /// Spatial queries at the positions now. Updates octrees if needed. While it does, the
   /// LooseOctree of octree() changes, so that no other thread may read it.
@@ -351,19 +358,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
-  /// The candidate pairs of the last collectCandidates(), or of the last detectCollision() with
-  /// Settings::keepCandidates. They are all pairs of enabled elements whose boxes overlap, each box
-  /// inflated by half the thickness and by the largest radius of its geometry. Auto may add to the
-  /// thickness (Validity::effectiveThickness), and for Intersection it is 0. If the method needs
-  /// the motion in the step, the boxes enclose the whole step. Outward rounding may add pairs. (a,
-  /// b) may be in either order.
-  ///
-  /// Order    by (a, b), with `a` of the first geometry with which the pair was added. For a
-  ///          geometry with itself each unordered pair once, a < b, and no pair with a common
-  ///          vertex.
-  /// Errors   UnknownPair; NotAvailable for a pair with a shape, or if no candidates were kept.
-  /// Cost     the first call after a frame sorts the pairs.
-  std::span<const ElementPair> candidatePairs(GeometryId a, GeometryId b) const;
   /// The octrees of all geometries, as of the last update. The reference is valid as long as this
   /// object; each update changes what it shows.
   const LooseOctree& octree() const;
@@ -375,8 +369,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///
   /// Errors   none for lack of memory: what needs a smaller copy then stays as it is.
   void releaseMemory();
-  /// Times and counts of the last detectCollision() or collectCandidates() with the updates before
-  /// it, or of a later update(). queries() does not change them.
+  /// Times and counts of the last detectCollision() with the updates before it, or of a later
+  /// update(). queries() does not change them.
   const FrameStatistics& statistics() const;
   /// Time and counts of one pair in the last detectCollision(). (a, b) may be in either order.
   ///

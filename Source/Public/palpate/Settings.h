@@ -73,9 +73,6 @@ struct Settings {
   /// the system refuses to start so many, the threads that started do the work. Results do not
   /// depend on it.
   int threads = 0;
-  /// Whether detectCollision() also fills candidatePairs(). This costs memory for the pairs, and
-  /// candidatePairs() sorts them.
-  bool keepCandidates = false;
   AuditSettings audit{};
   /// Runs the work of a frame on at most `threads` of its threads. Several objects may share one
   /// executor. Null: the object makes its own thread pool. Results do not depend on it. A

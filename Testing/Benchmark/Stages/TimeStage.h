@@ -8,7 +8,7 @@
 namespace palpate::benchmark {
 
 enum class Through {
-  Pairs,    ///< update() and collectCandidates()
+  Pairs,    ///< update() and forEachCandidate()
   Contacts  ///< detectCollision()
 };
 

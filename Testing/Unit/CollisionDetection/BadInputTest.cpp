@@ -426,7 +426,7 @@ TEST(BadInput, CollisionData) {
 }
 
 TEST(BadInput, CandidatePairs) {
-  const auto ask = [](const Scene& scene, GeometryId a, GeometryId b) {
+  const auto ask = [](Scene& scene, GeometryId a, GeometryId b) {
     scene.collisions.candidatePairs(a, b);
   };
   expectKnown([&](Scene& scene, GeometryId id) { ask(scene, scene.tool, id); });

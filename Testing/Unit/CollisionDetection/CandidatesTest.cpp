@@ -80,7 +80,7 @@ void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector
   }
   Random random(7);
   for (int frame = 0; frame < 4; ++frame) {
-    for (OctreeBasedCD* engine : engines) engine->collectCandidates();
+    octree.update();
     EXPECT_EQ(octree.octree().validate(), std::vector<std::string>{});
     expectComplete(octree.candidatePairs(ids[0][0], ids[0][1]),
                    oracle.candidatePairs(ids[1][0], ids[1][1]));

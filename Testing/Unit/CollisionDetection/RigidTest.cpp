@@ -94,7 +94,7 @@ class RigidRun {
   }
   OctreeBasedCD& collisions() { return m_collisions; }
   const CollisionData& data() const { return m_collisions.collisionData(m_a, m_b); }
-  std::span<const ElementPair> candidates() const { return m_collisions.candidatePairs(m_a, m_b); }
+  std::vector<ElementPair> candidates() { return m_collisions.candidatePairs(m_a, m_b); }
   GeometryId body() const { return m_body; }
 
  private:
@@ -148,21 +148,18 @@ std::vector<Settings> boundsSettings(int threads = 1) {
 std::size_t expectAsPositions(Random& random, const TestGeometry& body, const TestGeometry& other,
                               const PairSettings& pair, const RigidCase& run) {
   const std::vector<Place> places = placesOf(random, run.way);
-  // Boxes are compared in the world if candidates are kept, else in the frame of a body.
-  const auto runOf = [&](Settings settings, bool keepsCandidates, bool byTransform) {
-    settings.keepCandidates = keepsCandidates;
+  const auto runOf = [&](const Settings& settings, bool byTransform) {
     return RigidRun(settings, body, other, pair, run.bodyFirst, byTransform);
   };
   std::vector<RigidRun> rigid;
-  for (const bool keepsCandidates : {true, false})
-    for (const int threads : {1, 2})
-      rigid.push_back(runOf(settingsOf(Engine::Octree, threads), keepsCandidates, true));
+  for (const int threads : {1, 2})
+    rigid.push_back(runOf(settingsOf(Engine::Octree, threads), true));
   if (run.bothRigid)
     for (const int threads : {1, 2})
       for (const Settings& settings : boundsSettings(threads))
-        rigid.push_back(runOf(settings, false, true));
-  rigid.push_back(runOf(settingsOf(Engine::BruteForce), true, true));
-  RigidRun truth = runOf(settingsOf(Engine::Octree), true, false);
+        rigid.push_back(runOf(settings, true));
+  rigid.push_back(runOf(settingsOf(Engine::BruteForce), true));
+  RigidRun truth = runOf(settingsOf(Engine::Octree), false);
   for (RigidRun& one : rigid) run.setUp(one.collisions(), one.body());
   run.setUp(truth.collisions(), truth.body());
   std::size_t contacts = 0;
@@ -183,12 +180,9 @@ std::size_t expectAsPositions(Random& random, const TestGeometry& body, const Te
       expectSameRows(Rows(one.data()), expected);
       expectSameValidity(one.data().validity(), truth.data().validity(),
                          10 + place.translation.norm() + largest);
-      if (!one.collisions().settings().keepCandidates) continue;
-      EXPECT_TRUE(std::equal(candidates.begin(), candidates.end(), one.candidates().begin(),
-                             one.candidates().end()));
+      EXPECT_EQ(candidates, one.candidates());
     }
-    EXPECT_TRUE(std::includes(truth.candidates().begin(), truth.candidates().end(),
-                              candidates.begin(), candidates.end()));
+    EXPECT_TRUE(std::ranges::includes(truth.candidates(), candidates));
     for (std::size_t i = 0; i < rigid.size(); i += 2) rigid[i].collisions().releaseMemory();
   }
   return contacts;
@@ -284,10 +278,8 @@ TEST(Rigid, ContactsBeginAtTheSameThickness) {
       for (const Method method : {Method::Proximity, Method::Auto}) {
         const auto with = [&](const Settings& settings, double thickness, bool byTransform,
                               auto&& use) {
-          Settings inBodyFrame = settings;
-          inBodyFrame.keepCandidates = false;
-          RigidRun run(inBodyFrame, floor, other, {method, thickness, Contacts::All},
-                       repeat % 3 == 0, byTransform);
+          RigidRun run(settings, floor, other, {method, thickness, Contacts::All}, repeat % 3 == 0,
+                       byTransform);
           run.frame(place, byTransform ? &above : nullptr,
                     byTransform ? other.positions : above(other.positions));
           return use(run.data());

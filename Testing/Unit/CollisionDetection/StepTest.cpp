@@ -82,7 +82,6 @@ TEST_F(Step, EndsByAdvanceOnly) {
   for (int round = 0; round < 3; ++round) {
     EXPECT_EQ(candidates(), 1u);
     m_detection.update();
-    m_detection.collectCandidates();
     EXPECT_EQ(m_detection.candidatePairs(m_id, other).size(), 1u);
     m_detection.detectCollision();
     EXPECT_EQ(m_detection.collisionData(m_id, other).vertexTriangle().size(), 3u);
@@ -326,7 +325,7 @@ TEST_F(Step, HasNoContactsBeforeADetection) {
   const auto ask = [&] { m_detection.collisionData(m_id, other); };
   m_detection.addCollisionPair(m_id, other, {.method = Method::Proximity, .thickness = 0.5});
   EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
-  m_detection.collectCandidates();
+  m_detection.candidatePairs(m_id, other);
   EXPECT_EQ(codeOf(ask), ErrorCode::NotAvailable);
   m_detection.detectCollision();
   EXPECT_FALSE(m_detection.collisionData(m_id, other).vertexTriangle().empty());

@@ -24,16 +24,15 @@ TEST(SimdPath, EveryPathGivesTheSameCandidates) {
     settings.thickness = 0.01;
     detection.addCollisionPair(idA, idB, settings);
     detection.addCollisionPair(idA, idA, settings);
-    detection.collectCandidates();
     const auto pairs = detection.candidatePairs(idA, idB), own = detection.candidatePairs(idA, idA);
     EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
     if (first.empty()) {
-      first.assign(pairs.begin(), pairs.end());
-      self.assign(own.begin(), own.end());
+      first = pairs;
+      self = own;
       EXPECT_GT(first.size(), 100u);
     }
-    EXPECT_TRUE(std::equal(pairs.begin(), pairs.end(), first.begin(), first.end()));
-    EXPECT_TRUE(std::equal(own.begin(), own.end(), self.begin(), self.end()));
+    EXPECT_EQ(pairs, first);
+    EXPECT_EQ(own, self);
   }
   useSimdPath("");
 }

@@ -45,8 +45,7 @@ struct Answer {
   std::vector<ElementPair> candidates;
 };
 
-Answer answer(Settings settings, const Case& c) {
-  settings.keepCandidates = true;
+Answer answer(const Settings& settings, const Case& c) {
   OctreeBasedCD detection(settings);
   const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
                    b = c.self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
@@ -59,10 +58,8 @@ Answer answer(Settings settings, const Case& c) {
   }
   detection.setContactPredicate(a, b, c.predicate);
   detection.detectCollision();
-  const auto candidates = detection.candidatePairs(a, b);
-  return {Rows(detection.collisionData(a, b)),
-          detection.collisionData(a, b).validity(),
-          {candidates.begin(), candidates.end()}};
+  const CollisionData& data = detection.collisionData(a, b);
+  return {Rows(data), data.validity(), detection.candidatePairs(a, b)};
 }
 
 /// The contacts by brute force. Expects the same from octrees.
@@ -383,7 +380,6 @@ TEST(Filters, GroupsAndMasksSelectThePairs) {
       EXPECT_FALSE(run.data().validity().trusted);
       detection.setCollisionFilter(run.b(), {4, 0});
       EXPECT_EQ(detect(), Rows());
-      detection.collectCandidates();
       EXPECT_TRUE(detection.candidatePairs(run.a(), run.b()).empty());
       std::size_t candidates = 0;
       detection.forEachCandidate(run.a(), run.b(),
@@ -532,7 +528,6 @@ TEST(Filters, CollectingCandidatesLeavesContactsUnchanged) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ThreeSheets scene(engine);
     scene.detection.setCollisionFilter(scene.ids[0], {2, 2, Sidedness::Both});
-    scene.detection.collectCandidates();
     EXPECT_TRUE(scene.detection.candidatePairs(scene.ids[0], scene.ids[1]).empty());
     EXPECT_THROW((void)scene.contacts(0), Error);
     scene.detection.setCollisionFilter(scene.ids[0], {});
@@ -540,7 +535,7 @@ TEST(Filters, CollectingCandidatesLeavesContactsUnchanged) {
     const std::size_t count = scene.contacts(0);
     EXPECT_GT(count, 0u);
     scene.detection.setCollisionFilter(scene.ids[0], {2, 2, Sidedness::Both});
-    scene.detection.collectCandidates();
+    scene.detection.candidatePairs(scene.ids[0], scene.ids[1]);
     EXPECT_EQ(scene.contacts(0), count);
     scene.detection.detectCollision();
     EXPECT_EQ(scene.contacts(0), 0u);

@@ -198,9 +198,7 @@ TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {
           EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
           const double earliest = detection.collisionData(first, second).earliestTimeOfImpact();
           detection.setPositions(first, a.positions, nowA);
-          detection.collectCandidates();
-          const auto found = detection.candidatePairs(first, second);
-          candidates.assign(found.begin(), found.end());
+          candidates = detection.candidatePairs(first, second);
           return earliest;
         };
         std::vector<ElementPair> expected;

@@ -129,7 +129,7 @@ TEST(SpatialQueries, StayValidThroughDetectionsAndPairs) {
         collisions.addCollisionPair(scene.ball, scene.open, {Method::Continuous, 0.1});
       },
       [&] { collisions.detectCollision(); },
-      [&] { collisions.collectCandidates(); },
+      [&] { collisions.forEachCandidate([](auto&&...) {}); },
       [&] { collisions.update(); },
       [&] {
         collisions.setDisabledElements(scene.ball, std::vector<std::uint32_t>{0, 1, 2});

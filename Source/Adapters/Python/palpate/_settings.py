@@ -72,7 +72,6 @@ class Settings:
     octree           OctreeSettings
     engine           an Engine or its name; both give the same contacts
     threads          threads of a frame, in [0, 1024]; 0: one per core
-    keep_candidates  whether detect_collision() also fills candidate_pairs()
     audit            AuditSettings
     executor         runs the work of a frame; None: a thread pool of its own. A pickle has none.
     memory_limit     bytes that the object may allocate; 0: no limit
@@ -81,7 +80,6 @@ class Settings:
     octree: OctreeSettings = field(default_factory=OctreeSettings)
     engine: Engine | EngineName = Engine.OCTREE
     threads: int = 0
-    keep_candidates: bool = False
     audit: AuditSettings = field(default_factory=AuditSettings)
     executor: Executor | None = None
     memory_limit: int = 0
