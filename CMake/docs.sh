@@ -39,5 +39,6 @@ export PALPATE_VERSION PALPATE_DOXYGEN_XML=$out/doxygen/xml
 doxygen "$out/Doxyfile"
 mkdir "$out/source/reference"
 find Source -path '*Public/palpate/*.h' | sort | xargs python3 Docs/Site/reference.py "$out/doxygen/xml" "$out/source/reference"
+python3 -B Docs/Site/pythonReference.py "$out/source/reference/python"
 sphinx-build -W --keep-going -q -b html -c Docs/Site "$out/source" "$out/html"
 echo "The documentation is in build/docs/html/index.html."
