@@ -8,7 +8,7 @@ build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libg
 python="python3-dev pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel
   python3-pytest python3-mypy mypy"
 test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
-  clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium"
+  clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"
 figures="python3 python3-matplotlib python3-pil"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev

@@ -1,8 +1,8 @@
 """Plans a needle's path: 2,000 straight paths to a target in an organ are tested and ranked.
 
 A path must enter the organ once, and nothing else. The best one has the largest clearance from the
-vessels and the rib. With matplotlib a picture is written to the file that the command line names;
-without, the ranking is printed only. Lengths are in mm.
+vessels and the rib, and is the shortest of equal ones. With matplotlib a picture is written to the
+file that the command line names; without, the ranking is printed only. Lengths are in mm.
 
     python3 needle.py [needle.png]
 """
@@ -22,6 +22,8 @@ PATHS = 2000
 NEEDLE_RADIUS = 0.6
 MARGIN = 1.0  # the least clearance that is accepted
 TARGET = np.array([12.0, -8.0, -10.0])
+RIB = (-80, 10, 62), (80, 25, 58)
+BEST = 10  # paths that are listed and drawn
 
 
 @dataclass
@@ -31,6 +33,8 @@ class Scene:
     vessels: int
     rib: int
     centre_lines: list[Floats]
+    organ_positions: Floats
+    organ_triangles: npt.NDArray[np.int64]
 
 
 def organ_mesh(rows: int = 24) -> tuple[Floats, npt.NDArray[np.int64]]:
@@ -61,9 +65,9 @@ def vessel_tree(random: np.random.Generator) -> list[Floats]:
     t = np.linspace(0, 1, 20)[:, None]
     trunk = np.hstack([-50 + 90 * t, 10 * np.sin(4 * t), -4 + 6 * t])
     lines = [trunk]
-    for start in range(3, 18, 3):
-        direction = random.normal(size=3) * [0.4, 1, 0.8]
-        direction *= 30 / np.linalg.norm(direction)
+    for start in range(2, 19):
+        direction = random.normal(size=3) * [0.5, 1, 1]
+        direction *= 34 / np.linalg.norm(direction)
         bend = random.normal(size=3) * 6
         lines.append(trunk[start] + t * direction + t**2 * bend)
     return lines
@@ -71,7 +75,8 @@ def vessel_tree(random: np.random.Generator) -> list[Floats]:
 
 def build(random: np.random.Generator) -> Scene:
     collisions = palpate.OctreeBasedCD()
-    organ = collisions.add_triangle_mesh(*organ_mesh())
+    positions, triangles = organ_mesh()
+    organ = collisions.add_triangle_mesh(positions, triangles)
     lines = vessel_tree(random)
     segments, radii, first = [], [], 0
     for number, line in enumerate(lines):
@@ -82,8 +87,8 @@ def build(random: np.random.Generator) -> Scene:
     vessels = collisions.add_line_mesh(
         np.concatenate(lines), np.concatenate(segments), np.concatenate(radii)
     )
-    rib = collisions.add_analytical_geometry(palpate.Capsule((-80, 10, 62), (80, 25, 58), 6))
-    return Scene(collisions, organ, vessels, rib, lines)
+    rib = collisions.add_analytical_geometry(palpate.Capsule(*RIB, 6))
+    return Scene(collisions, organ, vessels, rib, lines, positions, triangles)
 
 
 def entry_points(random: np.random.Generator) -> Floats:
@@ -107,30 +112,88 @@ def clearances(scene: Scene, entries: Floats) -> Floats:
     return result
 
 
+def ranked(entries: Floats, clearance: Floats) -> npt.NDArray[np.int64]:
+    """By clearance to a tenth of a millimetre; of equal ones the shorter path comes first."""
+    order: npt.NDArray[np.int64] = np.lexsort(
+        (np.linalg.norm(entries - TARGET, axis=1), -np.round(clearance, 1))
+    )
+    return order
+
+
 def draw(scene: Scene, entries: Floats, clearance: Floats, file: str) -> bool:
-    """Writes a picture; False without matplotlib."""
+    """Writes a picture of the best paths and a map of all entries; False without matplotlib."""
     try:
         import matplotlib
     except ImportError:
         return False
     matplotlib.use("Agg")
     from matplotlib import pyplot
+    from matplotlib.colors import Normalize
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    axes = pyplot.figure(figsize=(8, 7)).add_subplot(projection="3d")
-    for line in scene.centre_lines:
-        axes.plot(*line.T, color="firebrick", linewidth=2)
-    axes.plot(*np.array([[-80, 10, 62], [80, 25, 58]]).T, color="tan", linewidth=6)
+    best = ranked(entries, clearance)[:BEST]
     possible = clearance >= MARGIN
-    axes.scatter(*entries[~possible].T, color="lightgrey", s=3)
-    dots = axes.scatter(*entries[possible].T, c=clearance[possible], s=8, cmap="viridis")
-    pyplot.colorbar(dots, ax=axes, label="clearance of the path (mm)", shrink=0.7)
-    best = entries[np.argmax(clearance)]
-    axes.plot(*np.array([best, TARGET]).T, color="black", linewidth=2)
-    axes.set_xlabel("x (mm)")
-    axes.set_ylabel("y (mm)")
-    axes.set_zlabel("z (mm)")
-    axes.set_title(f"{possible.sum()} of {len(entries)} paths keep {MARGIN} mm clear")
-    pyplot.savefig(file, dpi=110)
+    figure = pyplot.figure(figsize=(12, 5.6))
+    colours, scale = pyplot.get_cmap("viridis"), Normalize(MARGIN, clearance.max())
+
+    axes = figure.add_axes((-0.02, -0.06, 0.5, 1.06), projection="3d", computed_zorder=False)
+    axes.plot_trisurf(
+        *scene.organ_positions.T,
+        triangles=scene.organ_triangles,
+        color="#d9a19a",
+        alpha=0.13,
+        shade=False,
+        linewidth=0,
+        zorder=1,
+    )
+    for line, width in zip(scene.centre_lines, [5] + [2.5] * len(scene.centre_lines)):
+        axes.plot(*line.T, color="firebrick", linewidth=width, solid_capstyle="round", zorder=2)
+    paths = np.stack([entries, np.broadcast_to(TARGET, entries.shape)], axis=1)
+    for chosen, width, alpha in ((np.flatnonzero(possible), 0.5, 0.15), (best, 2.5, 1.0)):
+        axes.add_collection3d(
+            Line3DCollection(
+                paths[chosen],
+                colors=colours(scale(clearance[chosen])),
+                linewidths=width,
+                alpha=alpha,
+                zorder=4,
+            )
+        )
+    axes.plot(*np.transpose(RIB), color="tan", linewidth=9, solid_capstyle="round", zorder=3)
+    axes.scatter(*TARGET, color="black", s=45, zorder=5)
+    axes.text(*(TARGET - [0, 0, 9]), "target", ha="center", va="top", zorder=6)
+    axes.text(*(np.array(RIB[0]) + [0, 0, 9]), "rib", ha="left", zorder=6)
+    vessel = scene.centre_lines[0][0] + [-2, 0, 0]
+    axes.text(*vessel, "vessels", ha="right", va="center", color="firebrick", zorder=6)
+    axes.view_init(elev=14, azim=-62)
+    axes.set_box_aspect(np.ptp([[-75, -60, -45], [75, 60, 95]], axis=0), zoom=1.35)
+    axes.set(xlim=(-75, 75), ylim=(-60, 60), zlim=(-45, 95))
+    axes.set_axis_off()
+    title = f"The {BEST} best of {len(entries)} paths to the target"
+    figure.text(0.02, 0.93, title, fontsize=13, weight="bold")
+
+    plan = figure.add_axes((0.53, 0.1, 0.38, 0.78))
+    plan.scatter(*entries[~possible, :2].T, color="#d8d8d8", s=7)
+    dots = plan.scatter(
+        *entries[possible, :2].T, c=clearance[possible], s=16, cmap=colours, norm=scale
+    )
+    plan.scatter(*entries[best, :2].T, facecolors="none", edgecolors="black", s=60)
+    plan.annotate(
+        "best",
+        entries[best[0], :2],
+        xytext=(-45, -4),
+        textcoords="offset points",
+        weight="bold",
+        arrowprops={"arrowstyle": "-"},
+    )
+    plan.set_aspect("equal")
+    plan.set(xlabel="x (mm)", ylabel="y (mm)", xlim=(-115, 85))
+    for side in ("top", "right"):
+        plan.spines[side].set_visible(False)
+    figure.colorbar(dots, ax=plan, label="clearance of the path (mm)", shrink=0.8)
+    title = f"Entries from above: {possible.sum()} keep {MARGIN:g} mm clear, the grey ones do not"
+    figure.text(0.53, 0.93, title, fontsize=11)
+    figure.savefig(file, dpi=110)
     return True
 
 
@@ -144,11 +207,11 @@ def main() -> None:
     possible = int((clearance >= MARGIN).sum())
     print(f"{len(entries)} paths tested in {1000 * seconds:.0f} ms")
     print(f"{possible} keep at least {MARGIN} mm clear of vessels and rib; the best are:")
-    for rank, number in enumerate(np.argsort(-clearance)[:5], start=1):
+    for rank, number in enumerate(ranked(entries, clearance)[:BEST], start=1):
         x, y, z = entries[number]
         length = np.linalg.norm(entries[number] - TARGET)
         print(
-            f"{rank}. entry ({x:5.1f}, {y:5.1f}, {z:5.1f}), length {length:5.1f} mm,"
+            f"{rank:2}. entry ({x:5.1f}, {y:5.1f}, {z:5.1f}), length {length:5.1f} mm,"
             f" clearance {clearance[number]:4.1f} mm"
         )
     if len(sys.argv) > 1:

@@ -46,4 +46,5 @@ def test_every_public_name_has_an_entry():
         if "." in name:
             kind = "property" if isinstance(value, property) else "method"
         assert f".. py:{kind}:: {name.rsplit('.', 1)[-1]}" in text
-        assert pythonReference.reStructured(value.__doc__, "      " if "." in name else "   ") in text
+        indent = 6 * " " if "." in name else 3 * " "
+        assert pythonReference.reStructured(value.__doc__, indent) in text
