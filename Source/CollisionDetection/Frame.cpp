@@ -66,7 +66,7 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
   }
 }
 
-void Frame::runRounds(const Threads& threads) {
+void Frame::runRounds(const Threads& threads, Trace* trace) {
   for (int round = 0;; ++round) {
     bool any = false;
     for (Pair& pair : m_pairs) {
@@ -76,10 +76,18 @@ void Frame::runRounds(const Threads& threads) {
     }
     if (!any) return;
     PALPATE_ASSERT(round < 3);
+    const TraceSpan roundSpan(trace, "round");
+    const std::size_t firstEvent = trace ? trace->reserve(m_places.size()) : 0;
     threads.forEach(m_places.size(), [&](std::size_t i) {
       const Pair& pair = m_pairs[m_places[i].pair];
       if (!pair.runs) return;
       Stopwatch watch;
+      const CollisionPair& ids = pair.record->pair;
+      const TraceSpan span(trace, firstEvent + i,
+                           {.name = "job",
+                            .a = ids.a,
+                            .b = ids.b,
+                            .job = static_cast<std::uint32_t>(m_places[i].job)});
       std::visit([&](const auto& work) { work.run(round, m_places[i].job, *m_jobs[i]); },
                  pair.work);
       m_jobs[i]->milliseconds += watch.lap();
@@ -110,12 +118,15 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
 }
 
 void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
-                   FrameStatistics& statistics) {
+                   FrameStatistics& statistics, Trace* trace) {
   Stopwatch watch;
-  start(records, threads, [](PairWork& work, const FrameStart& frame) {
-    return std::visit([&](auto& each) { return each.start(frame); }, work);
-  });
-  runRounds(threads);
+  {
+    const TraceSpan span(trace, "start");
+    start(records, threads, [](PairWork& work, const FrameStart& frame) {
+      return std::visit([&](auto& each) { return each.start(frame); }, work);
+    });
+  }
+  runRounds(threads, trace);
   double all = 0, narrow = 0;
   for (const Pair& pair : m_pairs)
     for (const auto& job : jobsOf(pair)) {
@@ -131,6 +142,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
 
   for (Pair& pair : m_pairs) {
     PairRecord& record = *pair.record;
+    const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
     join(pair, {threads, Engine::Octree, statistics, m_results});
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
@@ -138,10 +150,12 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
   }
 }
 
-void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatistics& statistics) {
+void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatistics& statistics,
+                               Trace* trace) {
   const Threads oneThread(1);
   for (PairRecord* record : records) {
     Stopwatch watch;
+    const TraceSpan span(trace, "brute force", record->pair.a, record->pair.b);
     const double before = statistics.milliseconds.total();
     start({&record, 1}, oneThread, [](PairWork&, const FrameStart&) { return std::size_t{1}; });
     Pair& pair = m_pairs.front();

@@ -8,6 +8,7 @@
 #include "CollisionDetection/PairWork.h"
 #include "Octree/Traversal.h"
 #include "Core/Threads.h"
+#include "Core/Trace.h"
 
 #include <cstddef>
 #include <memory>
@@ -24,9 +25,10 @@ class Frame {
   /// Passes the candidates of each pair to a function, batch by batch, one call at a time.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
   /// Writes the contacts of each pair, sorted, to PairRecord::next.
-  void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&);
+  /// trace: null for none.
+  void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&, Trace* trace);
   /// Writes the same results, found by testing every feature against every other.
-  void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&);
+  void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&, Trace*);
 
  private:
   struct Pair {
@@ -44,7 +46,7 @@ class Frame {
   Jobs jobsOf(const Pair& pair) const {
     return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
   }
-  void runRounds(const Threads&);
+  void runRounds(const Threads&, Trace*);
   void join(Pair&, const FrameJoin&);
 
   std::vector<Pair> m_pairs;

@@ -300,7 +300,8 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
 }
 
-void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads) {
+void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads,
+                                  Trace* trace) {
   double spread = 0;
   for (const auto& geometry : m_geometries)
     spread = std::max(spread, geometry->body.tree.sampleFrame(
@@ -326,8 +327,10 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   for (const Geometry* geometry : m_changed) total += size(geometry);
   const Threads one(1);
   m_wasUpdatedByOneThread = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
+  const std::size_t firstEvent = trace ? trace->reserve(m_changed.size()) : 0;
   (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
     Geometry& geometry = *m_changed[i];
+    const TraceSpan span(trace, firstEvent + i, {.name = "octree", .a = geometry.body.id});
     const Threads& shared = size(&geometry) < kSmall ? one : threads;
     if (!geometry.body.tree.isCurrent(geometry.body.mesh, geometry.body.revisions.elements.topology,
                                       scale))

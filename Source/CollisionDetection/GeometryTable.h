@@ -5,6 +5,7 @@
 
 #include "CollisionDetection/Geometry.h"
 #include "Core/Threads.h"
+#include "Core/Trace.h"
 
 #include <cstdint>
 #include <functional>
@@ -57,7 +58,7 @@ class GeometryTable {
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
   /// Updates the octrees to the positions now, or to the whole step (GeometryOctree::setSwept()).
-  void updateOctrees(const OctreeSettings&, const Threads&);
+  void updateOctrees(const OctreeSettings&, const Threads&, Trace* = nullptr);
   /// Whether one thread made the last update. Its cache then has the data.
   bool wasUpdatedByOneThread() const { return m_wasUpdatedByOneThread; }
 

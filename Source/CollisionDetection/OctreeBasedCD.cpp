@@ -5,6 +5,7 @@
 #include "DistanceField/FieldContacts.h"
 #include "Bodies/InputChecks.h"
 #include "Core/Text.h"
+#include "Core/WholeFile.h"
 
 #include <algorithm>
 #include <atomic>
@@ -361,6 +362,13 @@ void OctreeBasedCD::releaseMemory() {
 }
 
 const Settings& OctreeBasedCD::settings() const { return read().settings; }
+
+void OctreeBasedCD::writeTrace(const std::filesystem::path& path) const {
+  const Implementation& all = read();
+  if (!all.trace)
+    throw Error(ErrorCode::NotAvailable, "no frames are traced: Settings::traceFrames is 0");
+  writeWholeFile(path, all.trace->json(), "the trace");
+}
 
 std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read().audit.failures; }
 

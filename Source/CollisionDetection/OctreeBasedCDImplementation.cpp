@@ -22,7 +22,12 @@ OctreeBasedCD::Implementation::Implementation(const Settings& newSettings)
       budget(MemoryBudget::make(settings.memoryLimit)),
       threads(newSettings.threads, newSettings.executor),
       querySource(std::make_shared<QuerySource>(*this)),
-      latestSnapshot(budget) {}
+      latestSnapshot(budget) {
+  if (settings.traceFrames > 0) {
+    const MemoryScope memory(budget, MemoryStage::Results);
+    trace.emplace(static_cast<std::size_t>(settings.traceFrames));
+  }
+}
 
 OctreeBasedCD::Implementation::~Implementation() {
   querySource->close();
@@ -57,7 +62,8 @@ void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
 }
 
 void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairRecord>> records,
-                                           bool explicitly, bool detecting, bool skips) {
+                                           bool explicitly, bool detecting, bool skips,
+                                           Trace* traced) {
   const MemoryScope memory(MemoryStage::Octrees);
   using Update = LooseOctree::Update;
   octreesState = 0;
@@ -70,13 +76,14 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
     geometry->body.tree.boxMilliseconds = geometry->body.tree.octreeMilliseconds = 0;
   }
   Stopwatch watch;
+  const TraceSpan span(traced, "update");
   for (const auto& record : records) {
     planStep(*record, detecting);
     if (record->plan.swept())
       for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
   }
   updates.milliseconds.boxes += watch.lap();
-  geometries.updateOctrees(settings.octree, threads);
+  geometries.updateOctrees(settings.octree, threads, traced);
   const double wall = watch.lap();
   double boxes = 0, octrees = 0;
   updates.rebuiltOctrees = updates.refittedOctrees = updates.unchangedOctrees = 0;
@@ -157,15 +164,18 @@ void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
     if (record->collides() && !record->dataVersion.isCurrent(record->state()))
       selectedPairs.push_back(record.get());
   if (settings.engine == Engine::Octree)
-    frame.detect(selectedPairs, threads, unused);
+    frame.detect(selectedPairs, threads, unused, nullptr);
   else
-    frame.detectByBruteForce(selectedPairs, unused);
+    frame.detectByBruteForce(selectedPairs, unused, nullptr);
   for (PairRecord* record : selectedPairs) record->commit();
 }
 
 void OctreeBasedCD::Implementation::detect() {
   const MemoryScope memory(MemoryStage::Pairs);
-  update(false, true);
+  Trace* const traced = trace ? &*trace : nullptr;
+  if (traced) traced->startFrame();
+  const TraceSpan span(traced, "detectCollision");
+  update(false, true, traced);
   for (const auto& record : pairs.records()) planByFieldIfProven(*record, settings.engine);
   FrameStatistics next = updates;
   const auto records = outdatedPairs();
@@ -177,9 +187,9 @@ void OctreeBasedCD::Implementation::detect() {
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
   if (settings.engine == Engine::Octree)
-    frame.detect(records, threads, next);
+    frame.detect(records, threads, next, traced);
   else
-    frame.detectByBruteForce(records, next);
+    frame.detectByBruteForce(records, next, traced);
   for (PairRecord* record : records) record->commit();
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
@@ -192,6 +202,7 @@ void OctreeBasedCD::Implementation::detect() {
   for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->body.mesh);
   setStatistics(next);
   hasUpdates = false;
+  const TraceSpan auditSpan(traced, "audit");
   auditFrame(settings, geometries, pairs, audit);
 }
 

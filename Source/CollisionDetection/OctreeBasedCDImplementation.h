@@ -14,6 +14,7 @@
 #include "Core/FloatingPoint.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
+#include "Core/Trace.h"
 
 #include <atomic>
 #include <functional>
@@ -47,6 +48,7 @@ struct OctreeBasedCD::Implementation {
   LooseOctree::State shownOctrees;  ///< what octree() shows
   std::vector<PairRecord*> selectedPairs;
   AuditRecord audit;
+  std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
   std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
   LatestSnapshot latestSnapshot;
@@ -80,13 +82,13 @@ struct OctreeBasedCD::Implementation {
   /// records: pairs that are planned. explicitly: the user called update(). The statistics are
   /// published at once, and count as rebuilt or refitted only the trees that this call changed.
   /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
-  /// which candidates depend.
-  void update(bool explicitly = false, bool detecting = false) {
+  /// which candidates depend. traced: of a detection, or null.
+  void update(bool explicitly = false, bool detecting = false, Trace* traced = nullptr) {
     update(pairs.records(), explicitly, detecting,
-           markSkippedOctrees(detecting && octreesState != geometries.state()));
+           markSkippedOctrees(detecting && octreesState != geometries.state()), traced);
   }
   void update(std::span<const std::unique_ptr<PairRecord>> records, bool explicitly, bool detecting,
-              bool skips);
+              bool skips, Trace* traced = nullptr);
 
   bool needsNoOctree(const PairRecord& record) const {
     return record.kind() == PairKind::Proxy || mayUseLeaves(record);

@@ -31,6 +31,7 @@ const Settings& checked(const Settings& settings) {
   check("octree.bounds", octree.bounds, 0, 2, "Box, Dop14 or Dop18");
   check("engine", settings.engine, 0, 1, "Octree or BruteForce");
   check("threads", settings.threads, 0, 1024, "in [0, 1024]");
+  check("traceFrames", settings.traceFrames, 0, 10000, "in [0, 10000]");
   check("audit.features", settings.audit.features, 0, kAny, "at least 0");
   check("audit.maxFiles", settings.audit.maxFiles, 0, kAny, "at least 0");
   std::error_code fault;

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import json
 import pickle
 
 import numpy as np
@@ -270,6 +271,31 @@ def test_candidates_statistics_and_octrees():
     assert octree.geometries() == [a, b]
     assert octree.statistics().elements == 2 * len(scene.triangles)
     assert isinstance(octree.last_update(b), palpate.LooseOctreeUpdate)
+
+
+def test_traces_are_json_of_nested_events(tmp_path):
+    file = tmp_path / "frames.json"
+    scene = Balls(trace_frames=3, threads=2)
+    hashes = [scene.step(step).hash() for step in range(5)]
+    scene.collisions.write_trace(file)
+    events = json.loads(file.read_text())["traceEvents"]
+    assert {event["args"]["frame"] for event in events} == {3, 4, 5}
+    jobs = [event for event in events if event["name"] == "job"]
+    assert jobs and all((j["args"]["a"], j["args"]["b"]) == (scene.a, scene.b) for j in jobs)
+    for thread in {event["tid"] for event in events}:
+        ends = []
+        own = [event for event in events if event["tid"] == thread]
+        for event in sorted(own, key=lambda e: (e["ts"], -e["dur"])):
+            begin, end = event["ts"], event["ts"] + event["dur"]
+            while ends and ends[-1] <= begin:
+                ends.pop()
+            assert event["dur"] >= 0 and (not ends or end <= ends[-1] + 1e-3)
+            ends.append(end)
+    untraced = Balls(threads=2)
+    assert [untraced.step(step).hash() for step in range(5)] == hashes
+    with pytest.raises(palpate.Error) as caught:
+        untraced.collisions.write_trace(file)
+    assert caught.value.code is palpate.ErrorCode.NOT_AVAILABLE
 
 
 def test_two_meshes_in_one_call():

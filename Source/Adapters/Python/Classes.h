@@ -73,7 +73,7 @@ template <>
 inline constexpr auto kFields<Settings> = std::tuple(field("octree", &Settings::octree),
                                                      field("engine", &Settings::engine),
                                                      field("threads", &Settings::threads),
-                                                     field("audit", &Settings::audit),
+                                                     field("audit", &Settings::audit), field("trace_frames", &Settings::traceFrames),
                                                      field("executor", &Settings::executor),
                                                      field("memory_limit", &Settings::memoryLimit));
 template <>

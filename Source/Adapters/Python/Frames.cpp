@@ -3,6 +3,8 @@
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 
+#include <filesystem>
+
 namespace palpate::python {
 
 void addFrames(CollisionsClass& collisions) {
@@ -19,6 +21,15 @@ void addFrames(CollisionsClass& collisions) {
           R"(detect_collision() -> None
 
 Finds the contacts of every pair; see collision_data(). Releases the GIL.)")
+      .def(
+          "write_trace",
+          [](Collisions& self, const std::filesystem::path& path) {
+            self.read([&](OctreeBasedCD& d) { d.writeTrace(path); });
+          },
+          py::arg("path"),
+          R"(write_trace(path) -> None
+
+Writes the times of the last Settings.trace_frames detections as JSON for Perfetto and Chrome.)")
       .def(
           "memory_use",
           [](Collisions& self) {

@@ -18,6 +18,7 @@
 #include <Eigen/Geometry>
 
 #include <cstddef>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -377,6 +378,13 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Errors   UnknownPair.
   PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
   const Settings& settings() const;
+  /// Writes the times of the last Settings::traceFrames detections: of each stage, pair and job, by
+  /// thread. The file is JSON in the Trace Event Format, which https://ui.perfetto.dev and
+  /// chrome://tracing show. An event names its geometries by their ids.
+  ///
+  /// Errors   NotAvailable if Settings::traceFrames is 0; File if the file cannot be written; an
+  ///          existing file is then unchanged.
+  void writeTrace(const std::filesystem::path&) const;
   /// The differences that the audit (Settings::audit) found between the last detectCollision() and
   /// brute force. They are faults of this library; the audit finds those in its sample of features.
   /// A capture that cannot be written is no exception: AuditFailure::fileError names the reason.

@@ -74,6 +74,9 @@ struct Settings {
   /// depend on it.
   int threads = 0;
   AuditSettings audit{};
+  /// Number of last detections whose times OctreeBasedCD::writeTrace() writes, in [0, 10000]; 0:
+  /// none, and no cost. Results do not depend on it. A capture does not contain it.
+  int traceFrames = 0;
   /// Runs the work of a frame on at most `threads` of its threads. Several objects may share one
   /// executor. Null: the object makes its own thread pool. Results do not depend on it. A
   /// CollisionProblem and a capture do not contain it.

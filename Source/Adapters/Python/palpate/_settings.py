@@ -73,6 +73,7 @@ class Settings:
     engine           an Engine or its name; both give the same contacts
     threads          threads of a frame, in [0, 1024]; 0: one per core
     audit            AuditSettings
+    trace_frames     number of last detections that write_trace() writes; 0: none, and no cost
     executor         runs the work of a frame; None: a thread pool of its own. A pickle has none.
     memory_limit     bytes that the object may allocate; 0: no limit
     """
@@ -81,6 +82,7 @@ class Settings:
     engine: Engine | EngineName = Engine.OCTREE
     threads: int = 0
     audit: AuditSettings = field(default_factory=AuditSettings)
+    trace_frames: int = 0
     executor: Executor | None = None
     memory_limit: int = 0
 
