@@ -32,6 +32,7 @@ class BuildByCMake(build_ext):
                     "-DCMAKE_BUILD_TYPE=Release",
                     f"-DPython_EXECUTABLE={sys.executable}",
                     "-DPALPATE_WITH_PYTHON=ON",
+                    "-DPALPATE_PRECOMPILED_HEADERS=ON",  # a fifth less to compile
                 ]
                 options += [
                     f"-DPALPATE_{part}=OFF"
