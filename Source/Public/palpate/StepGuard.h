@@ -49,13 +49,14 @@ struct HeldVertex {
 ///           (now - before), rounded, and exactly at `now` for 1. The translation of a placed
 ///           geometry changes likewise. Its rotation is the normalised interpolation of the
 ///           quaternions, so that it stays rigid.
-/// Features  all pairs of the OctreeBasedCD are guarded, with its filters, predicates, restDistance
-///           and disabled elements, whatever their method and thickness. A vertex and a triangle,
-///           or two edges, touch as in Method::Continuous with thickness 0, also at the first or
-///           last moment only. Features of one geometry with a common vertex never touch.
+/// Features  all pairs of the OctreeBasedCD are guarded, with its filters, predicates and disabled
+///           elements, whatever their method and thickness. A vertex and a triangle, or two edges,
+///           touch as in Method::Continuous with thickness 0, also at the first or last moment
+///           only. Features of one geometry with a common vertex never touch.
 /// Radii     lines and points with a radius, and shapes, touch where the surfaces of their radii
 ///           or the shape do. A segment whose radius varies counts with its largest radius, or if
-///           it begins nearer than that, with the radii of 16 pieces.
+///           it begins nearer than that, with the radii of 16 pieces. What restDistance excludes
+///           from contacts is guarded without its radii.
 /// Laws      After hold(), for the step from `before` to the positions now, as Continuous moves it:
 ///           (1) features without radii do not touch. This is decided exactly on the doubles.
 ///           (2) features with radii, and elements and shapes, come no nearer than their radii, or
