@@ -70,8 +70,8 @@ struct Validity {
   /// inside another. If false, they intersect or touch, or the library does not know. By
   /// Auto they do, radii and shapes within rounding, unless `method` is Intersection, DistanceField
   /// or Proxy, or Proximity with one radius per vertex. How deep radii and shapes overlap is the
-  /// negative `distance` of contacts at time 0. Proximity whose `displacement` exceeds its limit
-  /// checks nothing.
+  /// negative `distance` of contacts at time 0, at rest at time 1. Proximity whose `displacement`
+  /// exceeds its limit checks nothing.
   bool startedApart = false;
   /// Whether some normal may be on the wrong side, if `method` is Proximity, Continuous or Auto: it
   /// is then the opposite of `trusted`. Intersection knows no sides, and the value is always false
