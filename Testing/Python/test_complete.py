@@ -12,7 +12,8 @@ import palpate
 
 SOURCE = pathlib.Path(os.environ["PALPATE_SOURCE"]) / "Source"
 HEADERS = sorted((SOURCE / "Public" / "palpate").glob("*.h")) + [
-    SOURCE / "Simplify" / "Public" / "palpate" / "Simplify.h"
+    SOURCE / "Simplify" / "Public" / "palpate" / "Simplify.h",
+    SOURCE / "Adapters" / "MeshFiles" / "Public" / "palpate" / "MeshFiles.h",
 ]
 
 # C++ name: the reason why Python has no such name, or where Python has it.
@@ -46,6 +47,8 @@ CLASSES = {
     "TimeOfImpactSettings": "keyword arguments",
     "DistanceFieldSettings": "keyword arguments of DistanceField.build()",
     "SimplifySettings": "keyword arguments of simplify()",
+    "MeshReadSettings": "keyword arguments of read_mesh_file()",
+    "MeshWriteSettings": "keyword arguments of write_mesh_file()",
     "GuardedVertex": "rows (geometry, vertex)",
     "ContinuousSettings": "keyword arguments of PairSettings",
     "AutoSettings": "keyword arguments of PairSettings",

@@ -142,5 +142,6 @@ void addSnapshots(py::module_& module, CollisionsClass& collisions);
 void addStepGuard(py::module_& module);
 void addCapture(py::module_& module, CollisionsClass& collisions);
 void addFunctions(py::module_& module);
+void addMeshFiles(py::module_& module);
 
 }  // namespace palpate::python

@@ -72,4 +72,5 @@ Threads   frames and batches of queries release the GIL. While a call that chang
   addStepGuard(module);
   addCapture(module, collisions);
   addFunctions(module);
+  addMeshFiles(module);
 }

@@ -58,6 +58,7 @@ from palpate._palpate import (
     find_mesh_defects,
     make_thread_pool,
     read_capture,
+    read_mesh_file,
     set_up,
     simd_path,
     simplify,
@@ -68,6 +69,7 @@ from palpate._palpate import (
     vertex_triangle_time_of_impact,
     weld,
     write_capture,
+    write_mesh_file,
 )
 from palpate._results import (
     AuditFailure,
@@ -77,6 +79,7 @@ from palpate._results import (
     FrameStages,
     FrameStatistics,
     MemoryUse,
+    MeshArrays,
     MeshDefects,
     OctreeNode,
     OctreeStatistics,
@@ -150,6 +153,7 @@ __all__ = [
     "LooseOctree",
     "LooseOctreeUpdate",
     "MemoryUse",
+    "MeshArrays",
     "MeshDefects",
     "Method",
     "MethodReason",
@@ -193,6 +197,7 @@ __all__ = [
     "find_mesh_defects",
     "make_thread_pool",
     "read_capture",
+    "read_mesh_file",
     "set_up",
     "simd_path",
     "simplify",
@@ -203,6 +208,7 @@ __all__ = [
     "vertex_triangle_time_of_impact",
     "weld",
     "write_capture",
+    "write_mesh_file",
 ]
 
 # Names in messages, in help() and in pickles are those of the package.

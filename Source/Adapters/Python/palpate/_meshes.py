@@ -8,25 +8,37 @@ import numpy.typing as npt
 from palpate._enums import ErrorCode
 from palpate._errors import Error
 from palpate._palpate import OctreeBasedCD, triangles_of_quads
+from palpate._results import MeshArrays
 
 
 def add(collisions: OctreeBasedCD, mesh: Any, radius: npt.ArrayLike = 0.0) -> int:
     """Adds a mesh object to an OctreeBasedCD and returns its id.
 
-    mesh    has `vertices` and `faces`, as those of trimesh; or `points` and `cells`, as those of
-            meshio. Cells of the highest dimension count: tetrahedra, or triangles and quads, or
-            lines, or points. The library reads no files.
+    mesh    MeshArrays of read_mesh_file(); or it has `vertices` and `faces`, as those of trimesh;
+            or `points` and `cells`, as those of meshio. Cells of the highest dimension count:
+            tetrahedra, or triangles and quads, or lines, or points.
     radius  L, of lines and points: a number, or (n,) one per vertex
     """
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
         return _add_faces(collisions, mesh.vertices, [np.asarray(mesh.faces)])
-    if not (hasattr(mesh, "points") and hasattr(mesh, "cells")):
+    if isinstance(mesh, MeshArrays):
+        points = mesh.positions
+        cells = _cells_by_type(
+            {
+                "tetra": mesh.tetrahedra,
+                "triangle": mesh.triangles,
+                "line": mesh.segments,
+                "vertex": mesh.points,
+            }
+        )
+    elif hasattr(mesh, "points") and hasattr(mesh, "cells"):
+        points = np.asarray(mesh.points, dtype=np.float64)
+        if points.ndim == 2 and points.shape[1] == 2:
+            points = np.column_stack([points, np.zeros(len(points))])
+        cells = _cells_by_type(mesh.cells)
+    else:
         kind = type(mesh).__name__
         raise TypeError(f"{kind} has neither vertices and faces nor points and cells")
-    points = np.asarray(mesh.points, dtype=np.float64)
-    if points.ndim == 2 and points.shape[1] == 2:
-        points = np.column_stack([points, np.zeros(len(points))])
-    cells = _cells_by_type(mesh.cells)
     if "tetra" in cells:
         return collisions.add_tetrahedral_mesh(points, np.concatenate(cells["tetra"]))
     faces = cells.get("triangle", []) + cells.get("quad", [])

@@ -53,6 +53,25 @@ class Welded(NamedTuple):
     vertex_of: IndexArray
 
 
+class MeshArrays(NamedTuple):
+    """A mesh as in a file; see read_mesh_file(). palpate.add() takes it.
+
+    positions        (n, 3), L: the file's length unit
+    triangles        (m, 3) vertex indices
+    tetrahedra       (m, 4)
+    segments         (m, 2); a polyline of n vertices gives n - 1
+    points           (m,) the vertex of each element that is a point
+    joined_vertices  vertices that read_mesh_file() joined to others
+    """
+
+    positions: FloatArray
+    triangles: IndexArray = np.empty((0, 3), np.uint32)
+    tetrahedra: IndexArray = np.empty((0, 4), np.uint32)
+    segments: IndexArray = np.empty((0, 2), np.uint32)
+    points: IndexArray = np.empty(0, np.uint32)
+    joined_vertices: int = 0
+
+
 class SimplifiedMesh(NamedTuple):
     """The result of simplify().
 
