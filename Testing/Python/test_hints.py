@@ -54,6 +54,8 @@ collisions.no_such_call()
 NO_FAULTS = r"""
 # these modules have their hints in their code, which mypy checks
 palpate\._(enums|errors|meshes|results|settings|shapes)\..*
+palpate\._(bodies|captures|exact|findings|frames|npz|pictures|progress|report|sequence)\..*
+palpate\.(check|cohort)\..*
 # mypy does not see that keyword-only fields are no positional patterns
 palpate\.(_\w+\.)?\w+\.__match_args__
 # pybind11 has a metaclass of its own, and every class has an __init__, which may raise TypeError

@@ -72,6 +72,8 @@ def test_the_content(wheel, tmp_path):
         if library.name.startswith(("_palpate", "libPalpate")):
             assert re.findall(r"\((?:RUNPATH|RPATH)\).*\[(.*)\]", dynamic) in (["$ORIGIN"], [])
     needs = (tmp_path / "palpate-0.1.0.dist-info" / "METADATA").read_text()
+    commands = (tmp_path / "palpate-0.1.0.dist-info" / "entry_points.txt").read_text()
+    assert "palpate-check = palpate.check:main" in commands
     required = [line for line in re.findall(r"Requires-Dist: (.*)", needs) if "extra" not in line]
     assert [re.match(r"\w+", line)[0] for line in required] == ["numpy"]
 
@@ -83,6 +85,7 @@ def test_it_works_in_a_fresh_environment(wheel, tmp_path):
     run(python, "-m", "pip", "install", "--no-index", "--no-deps", wheel, env=environment)
     hello = run(python, SOURCE / "Examples" / "Python" / "hello.py", cwd=tmp_path, env=environment)
     assert "vertex 0 meets triangle 0" in hello
+    run(tmp_path / "user" / "bin" / "palpate-check", "--help", env=environment)
     code = """
 import palpate, pathlib
 here = pathlib.Path(palpate.__file__).parent

@@ -29,3 +29,7 @@ class Error(Exception):
 
     def __reduce__(self) -> tuple[type["Error"], tuple[str, ErrorCode, int | None, int | None]]:
         return type(self), (str(self), self.code, self.geometry, self.element)
+
+
+class BadInput(Exception):
+    """Input that cannot be checked. The message names file, frame, body and element."""
