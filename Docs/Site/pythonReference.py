@@ -114,8 +114,8 @@ def signatureOf(function, isMethod):
 
 
 class Page:
-    def __init__(self, title, introduction):
-        self.title, self.introduction, self.names, self.text = title, introduction, [], ""
+    def __init__(self, title, introduction, module="palpate"):
+        self.title, self.introduction, self.module, self.names, self.text = title, introduction, module, [], ""
 
     def add(self, kind, name, text, indent="", options=""):
         self.text += f"{indent}.. py:{kind}:: {name}\n{options}\n{reStructured(text, indent + '   ')}\n"
@@ -188,7 +188,15 @@ def pages():
                 page.names.append(node.name)
                 addFunctions(page, [node], docstrings)
         result += [page] if page.names else []
-    return result
+    text = (PACKAGE / "cohort.py").read_text(encoding="utf-8")
+    page, names = Page("Cohort", ast.get_docstring(ast.parse(text)), "palpate.cohort"), re.search(r"^__all__ = (.*)$", text, re.M)[1]
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ClassDef) and node.name in ast.literal_eval(names):
+            addClass(page, node, docstrings)
+        elif isinstance(node, ast.FunctionDef) and node.name in ast.literal_eval(names):
+            page.names.append(node.name)
+            addFunctions(page, [node], docstrings)
+    return [*result, page]
 
 
 def main(folder):
@@ -198,7 +206,7 @@ def main(folder):
     for page in pages():
         introduction = f"{reStructured(page.introduction, '')}\n" if page.introduction else ""
         (folder / f"{page.title}.md").write_text(
-            f"# {page.title} (Python)\n\n```{{eval-rst}}\n{introduction}.. py:currentmodule:: palpate\n\n{page.text}```\n", encoding="utf-8")
+            f"# {page.title} (Python)\n\n```{{eval-rst}}\n{introduction}.. py:currentmodule:: {page.module}\n\n{page.text}```\n", encoding="utf-8")
         table += f"| [{page.title}]({page.title}.md) | {', '.join(f'`{name}`' for name in page.names)} |\n"
     toctree = "\n".join(page.title for page in pages())
     (folder / "index.md").write_text(f"""# Python API

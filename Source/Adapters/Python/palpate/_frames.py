@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate._errors import BadInput, Error
-from palpate._npz import ELEMENTS, Rows, array_of, name_of_positions, opened
+from palpate._npz import ELEMENTS, NpzRows, array_of, name_of_positions, opened
 from palpate._palpate import read_mesh_file, weld
 from palpate._results import FloatArray, IndexArray, MeshArrays
 from palpate._sequence import Body, Sequence, Source
@@ -44,7 +44,7 @@ class Reader:
     def __init__(self, sequence: Sequence) -> None:
         self._sequence = sequence
         self._still: dict[str, Mesh] = {}
-        self._rows: dict[str, Rows] = {}
+        self._rows: dict[str, NpzRows] = {}
         self._welds: dict[str, tuple[IndexArray, IndexArray, IndexArray] | None] = {}
 
     def mesh(self, body: Body, number: int) -> Mesh:
@@ -75,7 +75,7 @@ class Reader:
         else:
             rows = self._rows.get(body.name)
             if rows is None or rows.path != source.path:
-                rows = self._rows[body.name] = Rows(source.path, source.body)
+                rows = self._rows[body.name] = NpzRows(source.path, source.body)
             positions = rows.row(source.row)
         (bad, *_) = np.flatnonzero(~np.isfinite(positions).all(axis=1)).tolist() or [None]
         if bad is not None:

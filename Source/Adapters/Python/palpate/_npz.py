@@ -65,7 +65,7 @@ def opened(path: Path | str) -> Iterator[zipfile.ZipFile]:
         raise BadInput(f"{path}: {error}") from None
 
 
-class Rows:
+class NpzRows:
     """Rows of an array (frames, n, 3) in an NPZ file, one at a time."""
 
     def __init__(self, path: str, body: str) -> None:

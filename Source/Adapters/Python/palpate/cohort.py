@@ -34,6 +34,8 @@ from typing import Any, NamedTuple
 from palpate._palpate import OctreeBasedCD, capture, read_capture, set_up
 from palpate._progress import Progress
 
+__all__ = ["Outcome", "replay", "rows_of", "run", "sweep", "watch", "write_table"]
+
 Parameters = Mapping[str, Any]
 Function = Callable[..., Any]
 
@@ -163,7 +165,10 @@ def _distributed(
     retries: int,
 ) -> Iterator[Outcome]:
     """In any order. Only a few tasks wait at the scheduler, so that few results are in memory."""
-    distributed: Any = importlib.import_module("distributed")
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError as error:
+        raise ImportError(f"{error}: install Dask distributed, or use no workers (0)") from None
     with contextlib.ExitStack() as stack:
         if scheduler is None:
             options = {"threads_per_worker": 1, "dashboard_address": None}
@@ -308,17 +313,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         function, tasks = _tasks_of(options.call, options.tasks)
     except (ValueError, ImportError, AttributeError) as error:
         parser.error(str(error))
-    outcomes = list(
-        run(
-            function,
-            tasks,
-            workers=options.workers,
-            scheduler=options.scheduler,
-            retries=options.retries,
-            folder=options.captures,
-            progress=Progress("palpate.cohort", options.quiet),
-        )
+    running = run(
+        function,
+        tasks,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        retries=options.retries,
+        folder=options.captures,
+        progress=Progress("palpate.cohort", options.quiet),
     )
+    try:
+        outcomes = list(running)
+    except (ImportError, OSError) as error:  # no Dask, or no scheduler at the address
+        parser.error(str(error))
     write_table(outcomes, options.output)
     failed = [outcome for outcome in outcomes if outcome.error]
     for outcome in failed:
