@@ -151,8 +151,11 @@ def test_wrong_frames_are_reported_and_the_others_checked(tmp_path):
     folder = made(sequences.pierced_membrane, tmp_path)
     (folder / "membrane_01.vtp").unlink()
     (folder / "membrane_03.vtp").write_text("")
+    (folder / "settings.json").write_text("{}")
     code, rows = run(folder, tmp_path / "out", "--svg")
     assert code == 2 and frames_of(rows, "crossing") == {6}
+    report = (tmp_path / "out" / "report.txt").read_text()
+    assert "note: files of other formats are not read: .json\n" in report
     texts = {int(row["frame"]): row["text"] for row in rows if row["kind"] == "unreadable"}
     assert set(texts) == {1, 3}
     assert texts[1] == 'frame 1, body "membrane": there is no file'
@@ -163,7 +166,7 @@ def test_wrong_frames_are_reported_and_the_others_checked(tmp_path):
     assert {r["body_a"] for r in rows if r["frame"] == "2"} == {"blade", "membrane"}
 
 
-def test_wrong_arrays_name_their_element(tmp_path):
+def test_wrong_arrays_name_their_element(tmp_path, capsys):
     positions = np.zeros((3, 4, 3))
     positions[1, 2, 0] = np.nan
     np.savez(tmp_path / "cloth.npz", positions=positions, triangles=[[0, 1, 7]])
@@ -172,6 +175,9 @@ def test_wrong_arrays_name_their_element(tmp_path):
     assert code == 2 and len(rows) == 3
     assert "triangle 0: vertex index 7" in texts[0] and 'frame 0, body "cloth"' in texts[0]
     assert "cloth.npz: the position of vertex 2 is not finite" in texts[1]
+    np.savez(tmp_path / "cloth.npz", positions=positions[:0], triangles=[[0, 1, 2]])
+    assert check.main([str(tmp_path), "--quiet"]) == 2
+    assert 'body "cloth": the positions have no frames' in capsys.readouterr().err
     with open(tmp_path / "cloth.npz", "r+b") as file:
         file.truncate(100)
     assert check.main([str(tmp_path), "--quiet"]) == 2
@@ -215,6 +221,22 @@ def test_series_of_paraview(tmp_path):
         (folder / f"{name}.vtp.series").write_text(json.dumps({"files": files}))
     code, rows = run(folder, tmp_path / "out", "--svg")
     assert code == 1 and {row["time"] for row in rows} == {"0.12"}
+    assert elements_of(rows, "membrane") == {"triangle 3"}
+    for path in folder.glob("*.series"):
+        path.unlink()
+    for frame in range(8):
+        blocks = "".join(
+            f'<DataSet index="{i}" name="{name}" file="data/{name}_{frame:02}.vtp"/>'
+            for i, name in enumerate(("blade", "membrane"))
+        )
+        (folder / f"scene{frame}.vtm").write_text(
+            f'<VTKFile type="vtkMultiBlockDataSet"><vtkMultiBlockDataSet>{blocks}'
+            "</vtkMultiBlockDataSet></VTKFile>"
+        )
+    files = [{"name": f"scene{frame}.vtm", "time": frame} for frame in range(8)]
+    (folder / "scene.vtm.series").write_text(json.dumps({"files": files}))
+    code, rows = run(folder, tmp_path / "out", "--svg")
+    assert code == 1 and {row["time"] for row in rows} == {"6.0"}
     assert elements_of(rows, "membrane") == {"triangle 3"}
 
 

@@ -100,7 +100,7 @@ class FindingsTable:
 
     def add(self, finding: Finding) -> None:
         row = ["" if isinstance(v, float) and math.isnan(v) else v for v in finding]
-        self._writer.writerow([self._times[finding.frame], *row] if self._times else row)
+        self._writer.writerow([self._times.get(finding.frame, ""), *row] if self._times else row)
 
     def close(self) -> None:
         self._file.close()

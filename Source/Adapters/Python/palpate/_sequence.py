@@ -74,6 +74,7 @@ class _Found:
         self.bodies: dict[str, Body] = {}
         self.times: dict[int, float] = {}
         self.listed: set[Path] = set()
+        self.notes: list[str] = []
 
     def add(self, name: str, number: int | None, source: Source) -> None:
         body = self.bodies.setdefault(name, Body(name=name))
@@ -101,6 +102,8 @@ class _Found:
             source = Source(str(path), body)
             if len(shape) == 2:
                 self.add(own, number, source)
+            elif shape[0] == 0:
+                raise BadInput(f'{path}, body "{own}": the positions have no frames')
             else:
                 for row in range(shape[0]):
                     self.add(own, row, source._replace(row=row))
@@ -149,10 +152,17 @@ def find_sequence(
         lists = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in LISTS]
         for path in lists:
             found.add_list(path)
+        others = set()
         for path in sorted(folder.iterdir()):
-            if path.suffix.lower() in (*MESH_FILES, ".npz") and path.resolve() not in found.listed:
+            if path.resolve() in found.listed or path in lists or not path.is_file():
+                continue
+            if path.suffix.lower() in (*MESH_FILES, ".npz"):
                 stem, number = _number(path)
                 found.add_file(stem, number, path)
+            else:
+                others.add(path.suffix or path.name)
+        if others:
+            found.notes.append(f"files of other formats are not read: {', '.join(sorted(others))}")
     if not found.bodies:
         kinds = ", ".join((*MESH_FILES, ".npz", *LISTS))
         raise BadInput(f"{folder}: no frames; files of these formats are read: {kinds}")
@@ -160,7 +170,7 @@ def find_sequence(
 
 
 def _sequence(found: _Found, pairs: list[tuple[str, str]]) -> Sequence:
-    notes = []
+    notes = found.notes
     bodies = []
     most = max(len(body.sources) for body in found.bodies.values())
     for body in found.bodies.values():

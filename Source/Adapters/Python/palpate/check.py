@@ -95,7 +95,7 @@ def parser() -> argparse.ArgumentParser:
     add("--svg", action="store_true", help="draw pictures without VTK")
     add("--touch", action="store_true", help="surfaces that touch are findings, too")
     add("--threads", type=int, default=0, help="threads of a process; 0: one per core")
-    add_cluster_options(result)
+    add_cluster_options(result, "0")
     add("--quiet", action="store_true", help="no progress and no table on the terminal")
     return result
 

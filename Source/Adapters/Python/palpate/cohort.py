@@ -305,7 +305,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--call", metavar="MODULE:FUNCTION", help="the function of a parameter sweep")
     add("--output", default="cohort.csv", help="the table, .csv or .parquet (default: cohort.csv)")
     add("--captures", default="palpate-cohort", help="folder for captures of failed tasks")
-    add_cluster_options(parser)
+    add_cluster_options(parser, "one per core")
     add("--retries", type=int, default=2, help="how often a failed task is tried again")
     add("--quiet", action="store_true", help="no progress")
     options = parser.parse_args(arguments)
@@ -334,12 +334,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if failed else 0
 
 
-def add_cluster_options(parser: argparse.ArgumentParser) -> None:
+def add_cluster_options(parser: argparse.ArgumentParser, default: str) -> None:
+    """default: what the command does without them, in words."""
     parser.add_argument(
         "--workers",
         type=int,
         metavar="N",
-        help="processes of a local cluster; 0: this process, without Dask",
+        help=f"processes of a local cluster; 0: this process, without Dask (default: {default})",
     )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="a Dask scheduler, as tcp://10.0.0.1:8786"
