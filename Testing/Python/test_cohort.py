@@ -25,8 +25,9 @@ SINGLE = {"env": {**os.environ, "OMP_NUM_THREADS": "1"}, "capture_output": True,
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def cluster(tmp_path_factory):
     options = {"threads_per_worker": 1, "dashboard_address": None}
+    options["local_directory"] = tmp_path_factory.mktemp("workers")
     with distributed.LocalCluster(n_workers=2, **options) as cluster:
         yield cluster.scheduler_address
 
@@ -165,8 +166,9 @@ def test_long_sequences(tmp_path):
     (folder / "cloth0001.ply").unlink()
     for name, options in (("serial", []), ("parallel", ["--workers", "2"])):
         command = [sys.executable, "-m", "palpate.check", folder, "--svg", *options]
-        done = subprocess.run([*command, "--output", tmp_path / name], **SINGLE)
+        done = subprocess.run([*command, "--output", tmp_path / name], cwd=tmp_path, **SINGLE)
         assert done.returncode == 2, done.stderr
+    assert {p.name for p in tmp_path.iterdir()} == {folder.name, "serial", "parallel"}
     files = sorted(p.relative_to(tmp_path / "serial") for p in (tmp_path / "serial").rglob("*"))
     assert len(files) > 4
     for file in files:

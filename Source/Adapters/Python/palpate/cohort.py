@@ -171,9 +171,12 @@ def _distributed(
         raise ImportError(f"{error}: install Dask distributed, or use no workers (0)") from None
     with contextlib.ExitStack() as stack:
         if scheduler is None:
-            options = {"threads_per_worker": 1, "dashboard_address": None}
             cluster = distributed.LocalCluster(
-                n_workers=workers, silence_logs=logging.ERROR, **options
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=None,
+                local_directory=stack.enter_context(tempfile.TemporaryDirectory()),
+                silence_logs=logging.ERROR,
             )
             scheduler = stack.enter_context(cluster)
         client = stack.enter_context(distributed.Client(scheduler))
