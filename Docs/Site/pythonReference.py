@@ -206,7 +206,7 @@ def main(folder):
     for page in pages():
         introduction = f"{reStructured(page.introduction, '')}\n" if page.introduction else ""
         (folder / f"{page.title}.md").write_text(
-            f"# {page.title} (Python)\n\n```{{eval-rst}}\n{introduction}.. py:currentmodule:: {page.module}\n\n{page.text}```\n", encoding="utf-8")
+            f"# {page.title} (Python)\n\n```{{eval-rst}}\n.. highlight:: python\n\n{introduction}.. py:currentmodule:: {page.module}\n\n{page.text}```\n", encoding="utf-8")
         table += f"| [{page.title}]({page.title}.md) | {', '.join(f'`{name}`' for name in page.names)} |\n"
     toctree = "\n".join(page.title for page in pages())
     (folder / "index.md").write_text(f"""# Python API

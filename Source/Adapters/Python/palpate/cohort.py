@@ -193,8 +193,11 @@ def _distributed(
                 number, attempt = running.pop(future)
                 try:
                     result = future.result()
-                except Exception as error:  # the worker died several times, for example
-                    result = _Failure(f"{type(error).__name__}: {error}", "")
+                except Exception as error:
+                    text = f"{type(error).__name__}: {error}"
+                    if isinstance(error, distributed.scheduler.KilledWorker):
+                        text = "KilledWorker: several workers died while they ran the task"
+                    result = _Failure(text, "")
                 if isinstance(result, _Failure) and attempt <= retries:
                     waiting.append((number, attempt + 1))
                 else:
