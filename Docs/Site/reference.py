@@ -81,9 +81,8 @@ for header in headers:
 lines, rows = "\n".join(names), "\n".join(table)
 (out / "index.md").write_text(f"""# C++ API
 
-This reference has one page for each public header. `<palpate/Palpate.h>` includes the headers that most programs need, and with
-them those of all types in their functions. Include `Distance.h`, `Intersection.h`, `TimeOfImpact.h`, `ClosedMesh.h` and
-`ArrayAdapter.h` yourself where you use them.
+This reference has one page for each public header. `<palpate/Palpate.h>` includes those of the library.
+Include the headers of optional targets yourself.
 [Errors](/Docs/Errors.md) explains the codes that functions throw, and [Settings](/Docs/Settings.md) lists all settings.
 
 | header | declares |

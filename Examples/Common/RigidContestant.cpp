@@ -1,6 +1,6 @@
 #include "RigidContestant.h"
 
-#include <palpate/ClosedMesh.h>
+#include <palpate/Meshes.h>
 
 #include <algorithm>
 #include <chrono>

@@ -1,6 +1,6 @@
 #include "SelfImpacts.h"
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include <Eigen/Geometry>
 

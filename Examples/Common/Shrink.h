@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/CollisionProblem.h>
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <functional>

@@ -1,7 +1,7 @@
 #include "Reference.h"
 
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/TimeOfImpact.h>
 
 #include <Eigen/Geometry>
 

@@ -1,5 +1,5 @@
-// Part of <palpate/ClosedMesh.h>: findMeshDefects() with positions, which runs a detection.
-#include <palpate/ClosedMesh.h>
+// Part of <palpate/Meshes.h>: findMeshDefects() with positions, which runs a detection.
+#include <palpate/Meshes.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Math/TriangleIntersection.h"

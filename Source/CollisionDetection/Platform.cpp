@@ -1,4 +1,4 @@
-#include <palpate/Platform.h>
+#include <palpate/Executor.h>
 
 #include "Core/SimdPath.h"
 

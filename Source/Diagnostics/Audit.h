@@ -1,7 +1,6 @@
 #pragma once
 
-#include <palpate/Audit.h>
-#include <palpate/CollisionProblem.h>
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>
 

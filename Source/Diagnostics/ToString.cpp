@@ -1,9 +1,9 @@
 // Part of <palpate/Palpate.h>: the names of enumerators. A switch without a default has the
 // compiler check that none is missing.
-#include <palpate/Audit.h>
-#include <palpate/ClosedMesh.h>
-#include <palpate/Distance.h>
+#include <palpate/Capture.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/LooseOctree.h>
+#include <palpate/Meshes.h>
 #include <palpate/Palpate.h>
 
 namespace palpate {

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 
 #include <optional>
 
 namespace palpate {
 
-// The public functions of <palpate/Distance.h> without their check for NaN and infinity, and the
-// decisions that they use. Every decision is exact for the given doubles.
+// The public functions of <palpate/FeaturePairs.h> without their check for NaN and infinity, and
+// the decisions that they use. Every decision is exact for the given doubles.
 
 VertexTriangleDistance finiteVertexTriangleDistance(const Eigen::Vector3d& p,
                                                     const Eigen::Vector3d& a,

@@ -1,4 +1,4 @@
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Math/ImpactQuery.h"
 #include "Math/Tolerances.h"

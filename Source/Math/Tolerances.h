@@ -289,7 +289,7 @@ constexpr double kFlatSquare = 0x1p-60;
 
 /// Relative error of motions; for a distance, relative to the largest coordinate difference. A
 /// displacement carries 2 u, a difference of two 5 u, and its length 4 u more. A distance is within
-/// 16 u of the largest coordinate difference (<palpate/Distance.h>).
+/// 16 u of the largest coordinate difference (<palpate/FeaturePairs.h>).
 constexpr double kMotionError = 0x1p-46;
 /// Multiple of the time tolerance by which a motion that extends a thickness is enlarged. It covers
 /// twice what Continuous may report early.

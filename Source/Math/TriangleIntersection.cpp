@@ -1,6 +1,6 @@
 #include "Math/TriangleIntersection.h"
 
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Core/FloatingPoint.h"
 

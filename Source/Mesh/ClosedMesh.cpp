@@ -1,4 +1,4 @@
-#include <palpate/ClosedMesh.h>
+#include <palpate/Meshes.h>
 
 #include <algorithm>
 

@@ -24,7 +24,7 @@ namespace palpate {
 /// in the triangle's interior or the vertex touches the triangle. If the closest point is on an
 /// edge or a corner, the normal is along the line through both points, on the winding normal's
 /// side. For a triangle without area, and for touching parallel edges, it is the axis that
-/// <palpate/Distance.h> defines.
+/// <palpate/FeaturePairs.h> defines.
 ///
 /// Two edges have crossed if each of the closest points lies below the surface around the other
 /// (liesBelow()). Their distance is then negative, and the normal leads out.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 
 #include "NarrowPhase/NarrowPhase.h"
 

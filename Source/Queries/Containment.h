@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/ClosedMesh.h>
+#include <palpate/Meshes.h>
 #include <palpate/Settings.h>
 
 #include "Queries/VertexSearch.h"

@@ -1,6 +1,6 @@
 #include "Queries/ElementDistance.h"
 
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Math/ClosestPoint.h"
 #include "Math/ConvexMinimum.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/TetrahedralMesh.h>
+#include <palpate/Meshes.h>
 
 #include "Queries/VertexSearch.h"
 

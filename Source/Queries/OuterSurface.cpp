@@ -1,6 +1,6 @@
 #include "Queries/OuterSurface.h"
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Queries/GeometryDistances.h"
 #include "Queries/PairTraversal.h"

@@ -1,7 +1,7 @@
 #include "Simplify/SimplifyRounds.h"
 
-#include <palpate/ClosedMesh.h>
 #include <palpate/Error.h>
+#include <palpate/Meshes.h>
 
 #include "Simplify/Shells.h"
 #include "Simplify/SimplifyCertificate.h"

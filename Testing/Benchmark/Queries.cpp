@@ -1,6 +1,6 @@
 #include "Queries.h"
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include <algorithm>
 #include <chrono>

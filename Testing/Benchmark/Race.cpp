@@ -3,7 +3,7 @@
 #include "PalpateEngine.h"
 #include "Rows.h"
 
-#include <palpate/Platform.h>
+#include <palpate/Executor.h>
 
 #include <CLI/CLI.hpp>
 

@@ -5,7 +5,7 @@
 
 #include "Core/SimdPath.h"
 
-#include <palpate/Platform.h>
+#include <palpate/Executor.h>
 
 #include <Meshes.h>
 

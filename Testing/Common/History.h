@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 

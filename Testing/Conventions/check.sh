@@ -53,7 +53,7 @@ checkIncludes() {
           fault "$file: $module may not include ${include#\"}"
           ;;
         "<palpate/"*)
-          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|Platform|FrameStatistics)\.h$ ]] ||
+          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|FrameStatistics)\.h$ ]] ||
             fault "$file: Core may include Public's plain types only, not ${include#<}"
           ;;
       esac
@@ -86,7 +86,8 @@ checkPlaces() {
 }
 
 # Each public header compiles alone, includes nothing of Eigen but Core and Geometry, and reaches no file
-# that these and the standard library do not.
+# that these and the standard library do not. Palpate.h includes all headers of the library. OctreeBasedCD.h reaches no
+# distance fields, captures and simplification.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
   local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/MeshFiles/Public
@@ -98,6 +99,14 @@ checkPublicHeaders() {
     reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
   for header in $(find Source -path '*Public/palpate/*.h' | sort); do
     files=$(set -o pipefail && reached -include "$header" /dev/null) || fault "$header does not compile alone"
+    if [[ $header == */OctreeBasedCD.h ]]; then
+      while read -r include; do fault "$header reaches $include"; done < <(grep -E '/(DistanceField|Capture|Simplify)\.h$' <<<"$files")
+    fi
+    if [[ $header == */Palpate.h ]]; then
+      for include in Source/Public/palpate/*.h; do
+        grep -qx "$include" <<<"$files" || fault "$header does not include $include"
+      done
+    fi
     while read -r include; do
       [[ $include =~ ^.palpate/(vtk/|fcl/)?[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
         fault "$header includes ${include:1}"

@@ -15,6 +15,7 @@ done
 mkdir -p "$tree/Examples" "$tree/Testing"
 cp "$root/.clang-format" "$tree"
 printf '#pragma once\n\n#include <Eigen/Core>\n' >"$tree/Source/Public/palpate/Types.h"
+printf '#pragma once\n' >"$tree/Source/Public/palpate/Capture.h"
 
 # expect STATUS CHECK ARGUMENT...
 expect() {
@@ -57,6 +58,8 @@ plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n'
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#include LIBRARY\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/Palpate.h '#pragma once\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/OctreeBasedCD.h '#pragma once\n#include <palpate/Capture.h>\n' "$compiler" "$eigen"
 plant Assertions Source/Math/A.cpp 'int a;\n'
 printf '#pragma once\ninline int one() { return 1; }\n' >"$tree/Source/Math/One.h"
 plant Headers Source/Shapes/A.h '#pragma once\ninline int one() { return 2; }\n' "$compiler" "$eigen"

@@ -1,4 +1,4 @@
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Unit/Math/TrianglePairs.h"
 

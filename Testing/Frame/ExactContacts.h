@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Frame/Placement.h"
 #include "Unit/Math/ImpactOracle.h"

@@ -4,10 +4,8 @@
 #include "Unit/Math/TrianglePairs.h"
 
 #include <palpate/ConstraintRows.h>
-#include <palpate/Distance.h>
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/Palpate.h>
-#include <palpate/TimeOfImpact.h>
 
 #include <gtest/gtest.h>
 

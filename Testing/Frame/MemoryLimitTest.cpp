@@ -1,4 +1,5 @@
 // Settings::memoryLimit, FrameStatistics::memory and releaseMemory().
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/FailingAllocation.h"

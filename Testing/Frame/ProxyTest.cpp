@@ -1,6 +1,6 @@
 // Method::Proxy: its contacts beside exact distances, with the error that the result states.
 #include <palpate/Capture.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"

@@ -1,5 +1,5 @@
+#include <palpate/FeaturePairs.h>
 #include <palpate/SpatialQueries.h>
-#include <palpate/TimeOfImpact.h>
 
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"

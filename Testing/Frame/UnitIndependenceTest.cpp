@@ -1,4 +1,4 @@
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Common/PairRun.h"
 #include "Common/DegenerateCases.h"

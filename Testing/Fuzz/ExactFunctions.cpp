@@ -1,6 +1,6 @@
 #include "Targets.h"
 
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Unit/Math/DistanceAtTime.h"
 #include "Unit/Math/DistanceCheck.h"

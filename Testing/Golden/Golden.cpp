@@ -5,6 +5,7 @@
 #include "Core/SimdPath.h"
 
 #include <palpate/ConstraintRows.h>
+#include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"

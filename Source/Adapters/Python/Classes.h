@@ -3,11 +3,11 @@
 #include "Python/Fields.h"
 
 #include <palpate/AnalyticalGeometry.h>
-#include <palpate/Audit.h>
-#include <palpate/ClosedMesh.h>
+#include <palpate/Capture.h>
 #include <palpate/ConstraintRows.h>
 #include <palpate/FrameStatistics.h>
 #include <palpate/LooseOctree.h>
+#include <palpate/Meshes.h>
 #include <palpate/PenetrationTracker.h>
 #include <palpate/Settings.h>
 #include <palpate/Validity.h>
@@ -73,7 +73,8 @@ template <>
 inline constexpr auto kFields<Settings> = std::tuple(field("octree", &Settings::octree),
                                                      field("engine", &Settings::engine),
                                                      field("threads", &Settings::threads),
-                                                     field("audit", &Settings::audit), field("trace_frames", &Settings::traceFrames),
+                                                     field("audit", &Settings::audit),
+                                                     field("trace_frames", &Settings::traceFrames),
                                                      field("executor", &Settings::executor),
                                                      field("memory_limit", &Settings::memoryLimit));
 template <>

@@ -5,9 +5,8 @@
 #include "Python/Records.h"
 
 #include <palpate/ArrayAdapter.h>
-#include <palpate/ClosedMesh.h>
-#include <palpate/Intersection.h>
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
+#include <palpate/Meshes.h>
 
 namespace palpate::python {
 namespace {

@@ -3,7 +3,7 @@
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 
-#include <palpate/Platform.h>
+#include <palpate/Executor.h>
 
 namespace palpate::python {
 

@@ -2,14 +2,13 @@
 
 #include "Python/Fields.h"
 
-#include <palpate/ClosedMesh.h>
 #include <palpate/CollisionData.h>
 #include <palpate/ConstraintRows.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
+#include <palpate/Meshes.h>
 #include <palpate/PenetrationTracker.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/StepGuard.h>
-#include <palpate/TetrahedralMesh.h>
 
 #include <cstring>
 #include <functional>

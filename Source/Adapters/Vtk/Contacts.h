@@ -2,7 +2,7 @@
 
 #include "Vtk/Glyphs.h"
 
-#include <palpate/CollisionProblem.h>
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <array>

@@ -2,7 +2,7 @@
 
 #include "Vtk/Bodies.h"
 
-#include <palpate/CollisionProblem.h>
+#include <palpate/Capture.h>
 
 #include <Eigen/Core>
 

@@ -1,13 +1,99 @@
 #pragma once
 
-#include <palpate/Audit.h>
-#include <palpate/CollisionProblem.h>
+#include <palpate/AnalyticalGeometry.h>
+#include <palpate/CollisionData.h>
+#include <palpate/DistanceField.h>
 #include <palpate/Export.h>
 #include <palpate/OctreeBasedCD.h>
+#include <palpate/Settings.h>
+#include <palpate/Types.h>
 
+#include <Eigen/Core>
+
+#include <cstdint>
 #include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
 
 namespace palpate {
+
+/// A contact in which a frame's CollisionData and brute force differ. This is a fault of the
+/// library. Method::Auto may mix the answers of several methods; for it the audit reports only
+/// missing contacts. Where a step begins in intersection it does not miss those of vertices of
+/// triangles that intersect, nor any of bodies of which Auto left out contacts on an inner side.
+struct AuditFailure {
+  enum class Fault {
+    /// Expected, not found. In List::Earliest: a contact is earlier than earliestTimeOfImpact().
+    FalseNegative,
+    FalsePositive,  ///< found, not expected, or found twice
+    Different       ///< found with other values than expected
+  };
+  /// The list of CollisionData, or its earliest time.
+  enum class List {
+    VertexTriangle,
+    TriangleVertex,
+    EdgeEdge,
+    IntersectingTriangles,
+    Earliest,
+    Shape,
+    ShapeShape
+  };
+  using Contact = std::variant<std::monostate, VertexTriangleContact, EdgeEdgeContact, ElementPair,
+                               ShapeContact, ShapeShapeContact>;
+
+  GeometryId a, b;          ///< the pair, in the order in which it was added
+  std::uint64_t frame = 0;  ///< number of the detectCollision() call, from 1
+  Fault fault = Fault::FalseNegative;
+  List list = List::VertexTriangle;  ///< The list in which the contact is or should be.
+  Contact expected{}, found{};       ///< The contact; monostate: it does not exist.
+  std::filesystem::path file{};      ///< Capture of the pair's frame; empty: not written.
+  std::string fileError{};           ///< Why the capture was not written, with its name.
+};
+PALPATE_EXPORT const char* toString(AuditFailure::Fault) noexcept;  ///< its name, or "unknown"
+PALPATE_EXPORT const char* toString(AuditFailure::List) noexcept;   ///< its name, or "unknown"
+
+/// Everything on which the answers of one frame depend, except predicates. Get it from
+/// OctreeBasedCD::problem(). <palpate/Capture.h> writes and reads it, and makes an OctreeBasedCD
+/// from it.
+struct CollisionProblem {
+  /// A geometry of any type.
+  struct Geometry {
+    GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
+    /// L, in the world, also if setTransform() placed the geometry; of a mesh with a distance field
+    /// or leaves in the body's frame.
+    std::vector<Eigen::Vector3d> before, now;
+    std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
+    GeometryType type = GeometryType::Triangles;
+    std::vector<double> radii{};  ///< L: none, one for all vertices, or one per vertex
+    /// L: the positions that determine PairSettings::restDistance and the winding of the surface of
+    /// tetrahedra. Empty: `now`.
+    std::vector<Eigen::Vector3d> rest{};
+    CollisionFilter filter{};
+    std::vector<std::uint32_t> disabled{};           ///< disabled elements
+    std::optional<AnalyticalGeometry> analytical{};  ///< a shape; `motion` places it
+    RigidMotion motion{};                            ///< of setTransform()
+    std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
+    /// The field of an added distance field, or of a mesh that has one; `motion` places it.
+    std::shared_ptr<const DistanceField> field{};
+    std::optional<SurfaceProxySettings> proxy{};  ///< of the leaves that are attached to a mesh
+    std::string name{};                           ///< OctreeBasedCD::setName(); not in a file
+  };
+  /// A collision pair.
+  struct Pair {
+    std::uint32_t a, b;  ///< indices in `geometries`
+    PairSettings settings;
+    Method method;  ///< the method that answered; no answer depends on it
+    /// Whether the pair has a predicate. A problem does not contain it, so that a replay may find
+    /// more contacts.
+    bool predicate = false;
+  };
+  Settings settings;  ///< without an executor
+  std::vector<Geometry> geometries;
+  std::vector<Pair> pairs;  ///< in the order in which they were added
+};
 
 // A capture is a text file with a CollisionProblem. It replays a frame exactly: every double keeps
 // its bits.

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <palpate/Distance.h>
 #include <palpate/Export.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/Types.h>
 #include <palpate/Validity.h>
 

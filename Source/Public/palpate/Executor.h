@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <string>
 
 namespace palpate {
 
@@ -49,5 +50,9 @@ class PALPATE_EXPORT Executor {
 /// Errors   InvalidSettings if `threads` is out of range. In the child of a fork() that a task
 ///          called, run() throws NotAvailable if other threads had begun tasks of its loop.
 PALPATE_EXPORT std::shared_ptr<Executor> makeThreadPool(int threads = 0);
+
+/// The instruction set that the library uses in this process: "AVX-512", "AVX2", "SSE4" or
+/// "Scalar". The library selects it at run time. Results do not depend on it.
+PALPATE_EXPORT std::string simdPath();
 
 }  // namespace palpate

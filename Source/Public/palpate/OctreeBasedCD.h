@@ -1,18 +1,15 @@
 #pragma once
 
 #include <palpate/AnalyticalGeometry.h>
-#include <palpate/Audit.h>
 #include <palpate/CollisionData.h>
-#include <palpate/CollisionProblem.h>
-#include <palpate/DistanceField.h>
 #include <palpate/Error.h>
 #include <palpate/Export.h>
 #include <palpate/FrameStatistics.h>
 #include <palpate/LooseOctree.h>
+#include <palpate/Meshes.h>
 #include <palpate/Settings.h>
 #include <palpate/Snapshot.h>
 #include <palpate/SpatialQueries.h>
-#include <palpate/TetrahedralMesh.h>
 #include <palpate/Types.h>
 
 #include <Eigen/Geometry>
@@ -28,7 +25,10 @@
 
 namespace palpate {
 
+class DistanceField;
 class StepSource;
+struct AuditFailure;
+struct CollisionProblem;
 
 /// A pair of geometries that is tested in each frame, with its settings.
 struct CollisionPair {

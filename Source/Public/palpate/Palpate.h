@@ -1,15 +1,24 @@
 #pragma once
 
-// Includes the headers that most programs need, and with them those of all types in their
-// functions. You may rely on that. Include <palpate/Distance.h>, <palpate/Intersection.h>,
-// <palpate/TimeOfImpact.h>, <palpate/ClosedMesh.h>, <palpate/ArrayAdapter.h> and standard headers
-// yourself where you use them.
+// Includes all headers of the library. Those of optional targets, such as Palpate::Simplify, are
+// not among them.
+#include <palpate/AnalyticalGeometry.h>
+#include <palpate/ArrayAdapter.h>
 #include <palpate/Capture.h>
 #include <palpate/CollisionData.h>
 #include <palpate/ConstraintRows.h>
+#include <palpate/DistanceField.h>
 #include <palpate/Error.h>
+#include <palpate/Executor.h>
+#include <palpate/FeaturePairs.h>
+#include <palpate/FrameStatistics.h>
+#include <palpate/LooseOctree.h>
+#include <palpate/Meshes.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 #include <palpate/Settings.h>
+#include <palpate/Snapshot.h>
+#include <palpate/SpatialQueries.h>
 #include <palpate/StepGuard.h>
 #include <palpate/Types.h>
+#include <palpate/Validity.h>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <palpate/ClosedMesh.h>
 #include <palpate/Export.h>
+#include <palpate/Meshes.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/Types.h>
 

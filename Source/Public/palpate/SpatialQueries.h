@@ -1,10 +1,9 @@
 #pragma once
 
 #include <palpate/AnalyticalGeometry.h>
-#include <palpate/ClosedMesh.h>
 #include <palpate/CollisionData.h>
 #include <palpate/Export.h>
-#include <palpate/TetrahedralMesh.h>
+#include <palpate/Meshes.h>
 #include <palpate/Types.h>
 
 #include <Eigen/Core>

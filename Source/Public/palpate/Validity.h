@@ -132,7 +132,7 @@ struct Validity {
   /// shape. For a geometry with itself all are in the first list.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles of meshes without area that are in contacts, ascending. Their normals follow the
-  /// rules of <palpate/Distance.h>. Empty for pairs with a shape.
+  /// rules of <palpate/FeaturePairs.h>. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
   /// Indices of contacts in CollisionData::shape(), ascending, if `method` is DistanceField. The

@@ -1,5 +1,5 @@
 #include <palpate/ConstraintRows.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Common/TestGeometry.h"
 

@@ -1,7 +1,6 @@
 #include <palpate/Capture.h>
-#include <palpate/Distance.h>
-#include <palpate/Intersection.h>
 #include <palpate/ConstraintRows.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/DistinctTruth.h"

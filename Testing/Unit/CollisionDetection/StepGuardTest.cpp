@@ -1,9 +1,8 @@
 #include <palpate/StepGuard.h>
 
 #include <palpate/ConstraintRows.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/TimeOfImpact.h>
 
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"

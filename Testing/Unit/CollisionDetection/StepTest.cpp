@@ -1,4 +1,4 @@
-#include <palpate/CollisionProblem.h>
+#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"

@@ -1,7 +1,7 @@
 #include "Core/SimdPath.h"
 
+#include <palpate/Executor.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/Platform.h>
 
 #include "Common/RandomMeshes.h"
 

@@ -1,8 +1,8 @@
 // The laws of the leaves of Method::Proxy, for points in each leaf, beside exact distances.
 #include "DistanceField/SurfaceProxy.h"
 
-#include <palpate/Distance.h>
 #include <palpate/Error.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"

@@ -13,7 +13,7 @@ namespace {
 
 using oracle::Rational;
 
-/// e of <palpate/TimeOfImpact.h>, rounded upward.
+/// e of <palpate/FeaturePairs.h>, rounded upward.
 double statedError(const ImpactCase& query, const TimeOfImpactSettings& settings) {
   double displacement = 0.0, largest = 0.0;
   const auto& p = query.positions;

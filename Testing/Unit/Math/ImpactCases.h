@@ -1,6 +1,6 @@
 #pragma once
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "ImpactOracle.h"
 #include "Math/ImpactQuery.h"

@@ -1,6 +1,6 @@
 #include "Math/RoundSegment.h"
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Unit/Math/TrianglePairs.h"
 

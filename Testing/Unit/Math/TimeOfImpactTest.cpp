@@ -1,4 +1,4 @@
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "ImpactCheck.h"
 #include "Common/Sanitized.h"

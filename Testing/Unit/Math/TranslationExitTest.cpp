@@ -2,7 +2,7 @@
 
 #include "Common/RandomMeshes.h"
 
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
-#include <palpate/Distance.h>
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Common/Sanitized.h"
 #include "Math/TriangleIntersection.h"

@@ -1,6 +1,6 @@
 #include "Mesh/UnfoldedStars.h"
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include "Common/RandomMeshes.h"
 #include "Core/SimdPath.h"

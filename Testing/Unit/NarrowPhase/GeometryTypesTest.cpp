@@ -1,5 +1,5 @@
 #include <palpate/Capture.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
@@ -24,7 +24,7 @@
 #include <vector>
 
 // Lines and points: every pair of geometry types against brute force and against the definition,
-// which is written here with <palpate/Distance.h>. Unsupported pairs are refused.
+// which is written here with <palpate/FeaturePairs.h>. Unsupported pairs are refused.
 
 namespace palpate::testing {
 namespace {

@@ -1,6 +1,6 @@
 #include "Common/PairRun.h"
 
-#include <palpate/TimeOfImpact.h>
+#include <palpate/FeaturePairs.h>
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include "Common/TestGeometry.h"
 #include "Unit/Queries/Cube.h"
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <gtest/gtest.h>

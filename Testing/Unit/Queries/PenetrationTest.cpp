@@ -4,8 +4,8 @@
 #include "Common/Solids.h"
 #include "Unit/Queries/Cube.h"
 
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/Intersection.h>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-#include <palpate/ClosedMesh.h>
-#include <palpate/Intersection.h>
+#include <palpate/FeaturePairs.h>
+#include <palpate/Meshes.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Simplify.h>
 
