@@ -57,7 +57,6 @@ struct Cylinder {
 /// The convex hull of at least one point, such as the tip of a tool. Points may be doubled or
 /// inside. If all points are exactly in one plane, on one line or at one place, the hull is a
 /// plate, a segment or a point. Points near a plane span a thin body.
-///
 /// Errors   addAnalyticalGeometry() throws InvalidShape for no points, and for more than
 ///          kMaxHullPoints.
 /// Cost     to add: n log n for n points, on average, in any order. A distance tests each triangle

@@ -126,7 +126,6 @@ struct CellTypes {
 /// vertices (idCount 2). A point of a point set is a vertex. The index of a triangle of a
 /// tetrahedral mesh is that in OctreeBasedCD::surface(). Contacts with analytical shapes are not
 /// included.
-///
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(); one cell per contact.
 /// Needs    an Element with ids[4], idCount and cellType.
 template <class Element, class CellType>

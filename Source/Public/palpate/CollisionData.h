@@ -38,9 +38,8 @@ namespace palpate {
 //          Intersection it has one contact of negative distance, with the nearest feature around
 //          the triangles that its edges pierce: a face, an edge or a vertex. It names the lowest
 //          triangle that holds this feature and behind which the vertex is.
-// Touch    If the centres are at distance 0, or for an impact without a thickness, the normal is
-// one
-//          that can separate the surfaces: no triangle at the first feature lies on its back side,
+// Touch    If the centres are at distance 0, or for an impact without a thickness, the normal can
+//          separate the surfaces: no triangle at the first feature lies on its back side,
 //          and none at the second one on its front side, as far as such a normal exists. It is
 //          the normal of a triangle at either feature, else the cross product of two edges there,
 //          else the direction from which the features came. Where the step tells that side, the
@@ -92,7 +91,6 @@ PALPATE_EXPORT const char* toString(ShapeElement) noexcept;  ///< its name, or "
 
 /// A contact of a vertex, edge or triangle with an analytical shape, or with a body by
 /// Method::DistanceField or Method::Proxy. All values are those at timeOfImpact.
-///
 /// Field    `distance` is the field's value at `point` less the radius. `normal` has the direction
 ///          of the field's gradient there; where that is 0, it is the last axis of the field's
 ///          frame. pointOnShape follows from both.
@@ -119,7 +117,6 @@ struct ShapeContact {
 /// Method::Continuous the time at which the shapes first come near enough. If the shapes are apart,
 /// the points are the closest points. If they overlap, the normal is the direction of the shortest
 /// translation that separates them.
-///
 /// Error    pointA - pointB equals distance * normal. Where a cylinder overlaps another shape, the
 ///          two differ by up to 2e-3 of the two sizes.
 struct ShapeShapeContact {
@@ -149,7 +146,6 @@ inline Stencil stencil(const VertexTriangleContact& contact) {
 PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 
 /// The contacts of one pair of geometries in the last frame.
-///
 /// Order    vertexTriangle by (vertex, triangle), triangleVertex by (triangle, vertex), edgeEdge by
 ///          (edgeA, edgeB), intersectingTriangles by (a, b), shape by (element, id, vertices).
 /// Valid    a reference from OctreeBasedCD::collisionData(), and the spans of that object, are

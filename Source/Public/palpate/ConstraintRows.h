@@ -15,7 +15,6 @@
 namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
-///
 /// Units    the gap is in L. A solver keeps it at least as large as the distance h that it wants.
 ///          The depth of the contact at the positions `now` is h - gap(now); the `distance` of the
 ///          contact is that at timeOfImpact. Docs/HowTo/Solvers.md has the rule for h.
@@ -105,7 +104,6 @@ struct ContactSide {
 
 /// The place of a contact and how its two sides slide along each other, for friction and haptics.
 /// The first side is the geometry to which the normal points. Its weights in the row are positive.
-///
 /// Units    L. relativeDisplacement is that of the whole step. Divide it by the step's duration to
 ///          get the relative velocity.
 /// Laws     (1) point - opposite = distance normal, within the error of the contact's own law. For
@@ -125,7 +123,6 @@ struct ContactMotion {
 };
 
 /// Appends a ContactMotion for each contact of a pair (a, b).
-///
 /// Order    that of appendRows(); for two shapes the contact in shapeShape(), whose first side is
 ///          a.
 /// Time     each contact is at its timeOfImpact. At that time a shape is between its two poses;
@@ -144,7 +141,6 @@ using Tangents = std::array<Eigen::Vector3d, 2>;
 
 /// The tangents of a normal, by a rule that depends on the normal only. The shortest rotation from
 /// the z axis to the normal turns the x and the y axis into them.
-///
 /// Laws     (1) the rule is continuous except at the normal -z; no rule is continuous everywhere.
 ///          If the normal turns by a small angle e, tangents change by at most 2 e / |normal + z|.
 ///          (2) tangents are unit and perpendicular within 4 ulp, also next to -z.
@@ -158,7 +154,6 @@ PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal);
 /// The tangents of a normal that continue those of an earlier frame: the shortest rotation from the
 /// previous normal to the normal turns the previous tangents into them. Use it for friction that
 /// keeps a force or a stretch for each contact.
-///
 /// Laws     (1) each tangent changes by at most the change of the normal: |t - previous t| <=
 ///          |normal - previous normal|, within 2^-40. This holds for every normal.
 ///          (2) tangents are unit and perpendicular within 4 ulp, over any number of frames.

@@ -36,13 +36,7 @@ struct DistanceFieldSettings {
 };
 
 /// The signed distance from the surface of a triangle mesh, tabulated in an octree and interpolated
-/// trilinearly. Its error has a bound that is proven, not sampled (Docs/DistanceFields.md). Cells
-/// are as large as the proof allows.
-///
-///   const DistanceField field = DistanceField::build({positions, triangles},
-///                                                    {.errorBound = 0.1, .band = 5.0});
-///   const double distance = field.value(tip);  // negative inside
-///
+/// trilinearly. Its error has a proven bound (Docs/DistanceFields.md).
 /// Threads  const functions are safe from any number of threads.
 /// Copies   are cheap and share the memory. A field never changes.
 class PALPATE_EXPORT DistanceField {
@@ -51,7 +45,6 @@ class PALPATE_EXPORT DistanceField {
   /// winding number, decided exactly, is not 0. Of any other mesh, inside is where the magnitude of
   /// the generalised winding number is more than 1/2, and signIsReliable() says where that holds
   /// for certain. The field keeps no reference to the mesh.
-  ///
   /// Errors   NonFinitePosition, also for one beyond kLargestMeasure; IndexOutOfRange for a vertex
   ///          index; TooLarge for more than 2^28 vertices or triangles; NotClosed for a mesh
   ///          without triangles; InvalidSettings; MemoryLimit; Cancelled. Messages name the mesh
@@ -76,7 +69,6 @@ class PALPATE_EXPORT DistanceField {
   ///                 domain.
   /// Where signIsReliable() is false, all of this holds for the distance without its sign. The
   /// value is then not negative, and it jumps at faces of cells.
-  ///
   /// Units    L.
   /// Errors   NonFinitePosition.
   /// Cost     some tens of nanoseconds. Allocates nothing.
@@ -85,23 +77,19 @@ class PALPATE_EXPORT DistanceField {
   /// it is in cells in which the winding number is certainly within 3/8 of an integer. Every patch
   /// that closes the mesh, and whose own winding number about the point is less than 5/8 in
   /// magnitude, gives the same sign.
-  ///
   /// Errors   NonFinitePosition.
   bool signIsReliable(const Eigen::Vector3d&) const;
   /// The gradient of value(). It jumps at the faces of cells, where it is that of the cell with the
   /// larger coordinates, and at the end of the band. 0 where the value is the constant band;
   /// outside the domain the unit vector away from it. In the band it is not exactly of length 1.
-  ///
   /// Errors   NonFinitePosition.
   Eigen::Vector3d gradient(const Eigen::Vector3d&) const;
   /// value() of many points, on the calling thread in SIMD lanes, with the same bits.
-  ///
   /// Errors   NonFinitePosition, which names the point, such as "point 3"; InvalidSettings if `out`
   ///          has another size than `points`. Nothing is written then.
   void values(std::span<const Eigen::Vector3d> points, std::span<double> out) const;
 
   /// Writes the field to a file, completely or not at all. Equal fields give equal files.
-  ///
   /// Errors   File.
   void save(const std::filesystem::path&) const;
   /// Reads a file of save(). Any content is safe: a file with a fault throws File, and the message

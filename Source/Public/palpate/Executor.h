@@ -10,7 +10,6 @@ namespace palpate {
 
 /// Runs the library's work on threads. Several OctreeBasedCD objects and the program itself may
 /// share one executor: see Settings::executor. Derive from it to use your own threads.
-///
 /// Needs    run() must accept calls from any thread, from several threads at once, and from inside
 ///          a task. In each case the calling thread or a free thread must make progress. Calling
 ///          threads should run tasks, too.

@@ -37,7 +37,6 @@ struct VertexTriangleDistance {
 };
 
 /// The point of triangle (a, b, c) that is closest to a vertex p, and the distance.
-///
 /// Shapes   p, a, b, c: one position each. Any winding, all finite doubles.
 /// Units    in: L. Out: weights 1, distance and difference L.
 /// Returns  distance, difference and closest point within 8 ulp of the largest coordinate
@@ -73,7 +72,6 @@ struct EdgeEdgeDistance {
 };
 
 /// The closest points of edges (p0, p1) and (q0, q1), and their distance.
-///
 /// Shapes   one position each, all finite doubles.
 /// Returns  with the accuracy of vertexTriangleDistance(). At distance 0 the normal is the cross
 ///          product of p1 - p0 and q1 - q0. For parallel edges it is then the coordinate axis along
@@ -93,7 +91,6 @@ PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
 
 /// Whether two triangles have a point in common. Touching counts. Decided exactly for all finite
 /// doubles.
-///
 /// Shapes   three corners each, any winding. A triangle without area is the segment or the point
 ///          that it covers.
 /// Errors   none. If a position is NaN or infinite, the result has no meaning.
@@ -115,7 +112,6 @@ struct TimeOfImpactSettings {
 
 /// The time at which a moving vertex first touches a moving triangle. The triangle includes its
 /// border.
-///
 /// Shapes   positions before the step, then now: of the vertex v and of the triangle's corners a,
 ///          b, c. Each moves along p(t) = (1 - t) before + t now, in real arithmetic, t in [0, 1].
 /// Units    in: the length unit L of the positions. Out: a fraction of the step.

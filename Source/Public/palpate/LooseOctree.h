@@ -27,7 +27,6 @@ struct OctreeStatistics {
 
 /// A view of the octrees of the last update, for diagnostics and display. Each geometry with
 /// elements has one; analytical shapes have none.
-///
 /// Units    L. If setTransform() placed the geometry, boxes are in the body's frame.
 /// Valid    as long as the OctreeBasedCD to which it belongs. Each update changes what it shows. If
 ///          an exception ended an update, the geometries concerned have no nodes until the next
@@ -60,7 +59,6 @@ class PALPATE_EXPORT LooseOctree {
   /// boxes above it. Fitted boxes are tight. Links agree in both directions. Free and used blocks
   /// add up to those allocated. After a rebuild, each element is in the cell of its centre and
   /// inside that cell's loose bounds, up to 2^-22 of the root's edge.
-  ///
   /// Returns  one sentence for each violation.
   /// Cost     linear in the elements.
   std::vector<std::string> validate() const;

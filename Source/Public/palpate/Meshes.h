@@ -14,7 +14,6 @@ namespace palpate {
 
 /// The edges because of which a mesh is not closed and consistently oriented. A closed mesh without
 /// such edges has an inside.
-///
 /// Order    each list is sorted. Each edge has its lower vertex first.
 struct MeshDefects {
   std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
@@ -82,7 +81,6 @@ struct InsideVertex {
 
 /// The triangles with which a tetrahedral mesh collides: the faces of exactly one tetrahedron.
 /// tetrahedra[i] is the tetrahedron to which triangles[i] belongs. Contacts name these triangles.
-///
 /// Order    by tetrahedron, ascending; faces of one tetrahedron in the order of the corners that
 ///          they do not have.
 /// Winding  outward at rest, decided exactly; the order in which you pass the corners does not

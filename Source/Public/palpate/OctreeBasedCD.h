@@ -39,7 +39,6 @@ struct CollisionPair {
 /// Collision detection of deforming triangle and tetrahedral meshes, lines and points, and of
 /// analytical shapes. Add geometries and pairs once. Then call in each step setPositions(),
 /// detectCollision(), collisionData() and advance().
-///
 /// Step     a step runs from the positions `before` to the positions `now`; each vertex moves in a
 ///          straight line. advance() ends the step: `now` becomes `before`, for positions and
 ///          transforms of all geometries. A geometry that is not set after advance() is at rest.
@@ -56,9 +55,7 @@ struct CollisionPair {
 ///          executors. Exact arithmetic may use GMP, which ends the process if it gets no memory.
 ///          After a move every function except assignment and destruction throws InvalidCall. A
 ///          call from a predicate or callback to the object that calls it throws InvalidCall, too.
-/// Memory   with Settings::memoryLimit, every function that needs memory throws MemoryLimit where
-/// it
-///          would need more than that.
+/// Memory   with Settings::memoryLimit, a function that needs more memory throws MemoryLimit.
 /// Valid    spans and references that functions return are valid until the next call that is not
 ///          const, unless a function says more.
 /// Threads  const functions are safe from any number of threads while no other function runs. Two
@@ -75,23 +72,20 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   /// Adds a triangle mesh. The library copies it. Any set of triangles is valid: several
   /// components, borders, non-manifold edges, triangles without area, no triangles at all.
-  ///
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index; TooLarge for more than 2^28
   ///          vertices or triangles, or if no geometry ids are left, as all functions that add one.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
   /// Adds a tetrahedral mesh. Every pair and method treats its surface() as a triangle mesh, with
   /// the vertex ids of the tetrahedral mesh.
-  ///
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index, or a tetrahedron that has one
   ///          vertex twice; SharedFace for a face of more than two tetrahedra; TooLarge for more
   ///          than 2^28 vertices or 2^26 tetrahedra.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron> tetrahedra);
-  /// Adds a line mesh, such as a suture, a needle or a centre line. It may be open, closed or
-  /// branching, and consist of several parts. radius: L, of all vertices. radii: L, one per vertex,
-  /// linear along each segment. Radii are in [0, kLargestMeasure]. They never change.
-  ///
+  /// Adds a line mesh: open, closed or branching, of any number of parts. radius: L, of all
+  /// vertices. radii: L, one per vertex, linear along each segment. Radii are in
+  /// [0, kLargestMeasure]. They never change.
   /// Lists    edgeEdge() has its segments with edges of triangles and with segments of line meshes.
   ///          vertexTriangle() or triangleVertex() has its vertices with triangles, and points with
   ///          its segments: segment {p, q} is the triangle {p, q, q} there. Features are a contact
@@ -105,7 +99,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, std::span<const double> radii);
   /// Adds a point set. Point i is vertex i. Radii are as in addLineMesh().
-  ///
   /// Lists    vertexTriangle() or triangleVertex() has its points with triangles, segments and
   ///          other points: point p is the triangle {p, p, p} there. For two point sets the points
   ///          of the first set are the vertices. For a point set with itself the lower point is the
@@ -114,32 +107,20 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          more than 2^28 points.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
-  /// Adds an analytical shape, such as a tool, a needle's tip or a table. setTransform() places it.
-  /// CollisionData::shape() has its contacts with triangles, lines and points. Its contacts with
-  /// another shape are in CollisionData::shapeShape(). Method::Auto, Proximity and Continuous
-  /// answer such pairs, also with a thickness of 0.
-  ///
-  ///   const Capsule probe{{0, 0, 0}, {0, 0, 80}, 2.5};
-  ///   const GeometryId tool = detection.addAnalyticalGeometry(probe);
-  ///   detection.addCollisionPair(organ, tool, {.thickness = 0.5});
-  ///   detection.setTransform(tool, before, now);  // in each step
-  ///
-  /// Docs/HowTo/RigidTools.md has the whole loop, with the rows of a solver.
-  ///
-  /// Errors   InvalidShape if a measure is out of the range that <palpate/AnalyticalGeometry.h>
-  ///          states.
+  /// Adds an analytical shape, which setTransform() places. CollisionData::shape() has its contacts
+  /// with triangles, lines and points, shapeShape() those with another shape. Method::Auto,
+  /// Proximity and Continuous answer such pairs, also with a thickness of 0.
+  /// Errors   InvalidShape if a measure is out of range (<palpate/AnalyticalGeometry.h>).
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
   /// Adds the surface of a distance field. setTransform() places it. Its pairs with triangle,
   /// tetrahedral and line meshes and with point sets need Method::DistanceField, which is the only
   /// one that accepts it. The geometry has no vertices and no elements. Queries refuse it.
-  ///
   /// Errors   InvalidSettings for null.
   GeometryId addDistanceField(std::shared_ptr<const DistanceField>);
   /// Attaches a distance field to a triangle or tetrahedral mesh that is rigid. Pairs of the mesh
   /// may then use Method::DistanceField, and Auto may (PairSettings::allowedError). The field is in
   /// the body's frame. Null detaches it. A body with a field keeps its shape: setPositions(),
   /// setTriangles(), setTetrahedra() and setDisabledElements() throw UnsupportedMethod.
-  ///
   /// Errors   UnsupportedMethod for another geometry type, for a mesh with disabled elements, or if
   ///          a pair by Method::DistanceField still needs the field that this call replaces by
   ///          null or by one with a smaller band; InvalidSettings if the field is not of this mesh:
@@ -151,7 +132,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// attaches them. Pairs by Auto of a point set, first, and the mesh may then use them
   /// (PairSettings::allowedError). None detaches them. A body with leaves keeps its shape, as with
   /// attachDistanceField().
-  ///
   /// Errors   UnsupportedMethod for another geometry type; InvalidSettings; TooLarge as
   ///          Method::Proxy.
   /// Cost     some seconds of processor time for half a million triangles, shared by the threads.
@@ -170,18 +150,13 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
-  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable. If you stop
-  /// calling it, each detection tests the motion since the last call. If you never call it, the
-  /// one-array form of setPositions() leaves all geometries at rest.
-  ///
+  /// Ends the step of all geometries: `now` becomes `before`. Results stay readable.
   /// Cost     does not grow with the number of vertices.
   void advance();
 
   /// Sets the positions, one per vertex. One array sets `now`; two arrays set both ends of the
   /// step. Only the second form and advance() set `before`. In the step in which a geometry is
-  /// added, or its topology is set, `before` follows `now` unless you pass it. Call advance() once
-  /// after you have added all geometries, so that the first step has motion.
-  ///
+  /// added, or its topology is set, `before` follows `now` unless you pass it.
   /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also for a coordinate beyond
   ///          kLargestMeasure, as all functions that take positions.
   /// Cost     linear in the vertices.
@@ -190,56 +165,42 @@ class PALPATE_EXPORT OctreeBasedCD {
                     std::span<const Eigen::Vector3d> now);
   /// Sets the topology of a triangle mesh, as after a cut, and its positions at both ends of the
   /// step. All elements are enabled afterwards.
-  ///
   /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange and TooLarge as in
   ///          addTriangleMesh(), TooLarge for restDistance, too; NonFinitePosition.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   /// The same for a tetrahedral mesh.
-  ///
   /// Errors   UnsupportedMethod for another geometry type; IndexOutOfRange, SharedFace and TooLarge
   ///          as in addTetrahedralMesh(), TooLarge for restDistance, too; NonFinitePosition.
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
   /// The triangles with which a tetrahedral mesh collides. The spans are valid until
   /// setTetrahedra() changes the mesh, or until it is removed.
-  ///
   /// Errors   UnsupportedMethod for another geometry type.
   TetrahedralSurface surface(GeometryId) const;
 
-  /// Places a geometry as a whole, from now on: a point x of the body's frame is at rotation x +
-  /// translation in the world. For a vertex this is the double ((r0 x + r1 y) + r2 z) + t.
-  /// Positions that were set before, or that setPositions(), setTriangles() or setTetrahedra() set
-  /// later, are in the body's frame. The octree is in that frame, too, and does not change.
-  ///
-  /// As with setPositions(), one pose sets `now`, two poses set both ends of the step. Positions
-  /// and transform are independent of each other. Vertices move in straight lines between the two
-  /// ends (Validity::arcDeviation).
-  ///
-  /// A rotation may come from floats. If an entry of R^T R is off the identity by more than 1e-9,
-  /// the nearest rotation counts instead; transform() returns it.
-  ///
-  /// Errors   InvalidTransform if the rotation is none: an entry of R^T R is off the identity
-  ///          by more than 1e-5, or the determinant is not positive. InvalidTransform also if an
-  ///          entry is not finite, or if the translation is beyond kLargestMeasure.
-  ///          UnsupportedMethod if the geometry has a pair with itself.
-  /// Cost     does not grow with the size of the geometry, with one exception: each call
-  ///          for a ConvexHull turns its corners.
+  /// Places a geometry as a whole, from now on. Its positions, earlier and later ones, and its
+  /// octree are in the body's frame. A vertex in the world is the double ((r0 x + r1 y) + r2 z) +
+  /// t. One pose sets `now`, two poses set both ends of the step. Vertices move in straight lines
+  /// between the two ends (Validity::arcDeviation). If an entry of R^T R is off the identity by
+  /// more than 1e-9, the nearest rotation counts instead.
+  /// Errors   InvalidTransform if an entry of R^T R is off the identity by more than 1e-5, if the
+  ///          determinant is not positive, if an entry is not finite, or if the translation is
+  ///          beyond kLargestMeasure. UnsupportedMethod if the geometry has a pair with itself.
+  /// Cost     that of turning the corners of a ConvexHull; none that grows with a mesh.
   void setTransform(GeometryId, const Pose& now);
   void setTransform(GeometryId, const Pose& before, const Pose& now);
   /// The pose now, with the rotation that counts; the identity if setTransform() has not placed the
   /// geometry.
   Pose transform(GeometryId) const;
-  /// Names a geometry, for messages: "geometry 3" becomes `geometry 3 "liver"`. Any text, also one
-  /// that another geometry has; none by default. A capture file does not hold it.
-  ///
+  /// Names a geometry in messages: `geometry 3 "liver"`. Any text; none by default. A capture file
+  /// does not hold it.
   /// Errors   InvalidSettings for a name with a null character.
   void setName(GeometryId, std::string name);
   const std::string& name(GeometryId) const;
   /// Sets which geometries this one collides with, and from which sides. Two geometries collide
   /// only if the mask of each contains a group of the other. A pair that does not collide has no
   /// contacts, no candidates and no cost, and is not trusted.
-  ///
   /// Errors   InvalidSettings for a value that Sidedness does not have, and for Sidedness::Outer of
   ///          lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
@@ -247,7 +208,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// point; of a tetrahedral mesh a triangle of surface(). Disabled elements are in no candidate
   /// pair. A vertex or edge is tested as long as an enabled element holds it. SpatialQueries search
   /// disabled elements, too.
-  ///
   /// Errors   IndexOutOfRange.
   /// Cost     linear in the elements. The octree stays as it is.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
@@ -255,29 +215,24 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Adds a pair that each detection tests. a == b tests a geometry with itself (self-collision):
   /// features with a common vertex are no contacts. The order of a and b determines the order of
   /// ids in all results.
-  ///
   /// Errors   UnsupportedMethod if the method does not exist for these geometries
   ///          (Docs/SupportMatrix.md), also for a geometry with itself that setTransform() has
   ///          placed; InvalidSettings; DuplicatePair; TooLarge for PairSettings::restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
   /// Replaces the settings of a pair. (a, b) may be in either order.
-  ///
   /// Errors   UnknownPair; UnsupportedMethod, InvalidSettings and TooLarge as in
   ///          addCollisionPair().
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
   /// Sets a predicate that refuses contacts. Refused features are no contacts, and they suppress no
   /// other contact. intersectingTriangles() and validity() do not use the predicate. An empty
   /// predicate refuses nothing. (a, b) is in the order in which the pair was added.
-  ///
   /// Errors   UnknownPair; UnsupportedMethod for a pair with a shape.
   void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
   /// Removes a pair and its answer. (a, b) may be in either order.
-  ///
   /// Errors   UnknownPair.
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;  ///< in the order in which they were added
   /// The settings as you passed them last. (a, b) is in the order in which the pair was added.
-  ///
   /// Errors   UnknownPair.
   const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
@@ -286,7 +241,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Runs the broad phase and the narrow phase of every pair, and updates octrees if needed. Pairs
   /// for which nothing changed since the last detection keep their answer. A steady frame allocates
   /// no memory, except for integers of exact arithmetic (Docs/Guarantees.md, "Memory").
-  ///
   /// Errors   whatever a predicate or executor throws; InvalidSettings if an executor's run()
   ///          returns too early; NotAvailable if a task called fork() (see makeThreadPool()).
   ///          Predicates apart, update(), forEachCandidate() and queries() throw the same.
@@ -298,7 +252,6 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Auto may add to the thickness (Validity::effectiveThickness), and for Intersection it is 0. If
   /// the method needs the motion in the step, the boxes enclose the whole step. Outward rounding
   /// may add pairs. Updates octrees if needed. (a, b) may be in either order.
-  ///
   /// Order    none. Of a pair, `a` is of the first geometry with which the pair was added. For a
   ///          geometry with itself each unordered pair once, a < b, and no pair with a common
   ///          vertex.
@@ -333,14 +286,11 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   /// Spatial queries at the positions now. Updates octrees if needed. While it does, the
   /// LooseOctree of octree() changes, so that no other thread may read it.
-  ///
   /// Cost     none but the update, which the next detection then does not repeat.
   SpatialQueries queries() const;
 
   /// Makes the state now the latest snapshot, which other threads may query while this object
-  /// changes. Updates octrees if needed. Objects from queries() stay valid. time: yours, of any
-  /// unit; it comes back as Snapshot::time().
-  ///
+  /// changes. Updates octrees if needed. Objects from queries() stay valid. time: Snapshot::time().
   /// Errors   those of queries(). If it throws, the last snapshot stays the latest.
   /// Cost     copies the octrees and, after a change, the topology of geometries that changed since
   ///          the last publication. Geometries that did not move are shared with it. Allocates
@@ -349,14 +299,12 @@ class PALPATE_EXPORT OctreeBasedCD {
   void publish(double time = 0.0);
   /// The last state that was published; null before the first. The snapshot may outlive this
   /// object. Releasing it waits for nobody.
-  ///
   /// Threads  safe from any thread at any time between construction and destruction, also while
   ///          another function runs; not during a move. It locks a std::mutex to copy one
   ///          shared_ptr. publish() locks the same mutex to swap one.
   std::shared_ptr<const Snapshot> latestSnapshot() const;
 
   /// The answer of the last detectCollision(). (a, b) is in the order in which the pair was added.
-  ///
   /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// The octrees of all geometries, as of the last update. The reference is valid as long as this
@@ -367,21 +315,18 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Gives back memory that the object only keeps for the next frames. They allocate what they need
   /// again. Results, candidate pairs and the snapshots that somebody holds stay as they are.
   /// FrameStatistics::peakMemory starts again.
-  ///
   /// Errors   none for lack of memory: what needs a smaller copy then stays as it is.
   void releaseMemory();
   /// Times and counts of the last detectCollision() with the updates before it, or of a later
   /// update(). queries() does not change them.
   const FrameStatistics& statistics() const;
   /// Time and counts of one pair in the last detectCollision(). (a, b) may be in either order.
-  ///
   /// Errors   UnknownPair.
   PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
   const Settings& settings() const;
   /// Writes the times of the last Settings::traceFrames detections: of each stage, pair and job, by
   /// thread. The file is JSON in the Trace Event Format, which https://ui.perfetto.dev and
   /// chrome://tracing show. An event names its geometries by their ids.
-  ///
   /// Errors   NotAvailable if Settings::traceFrames is 0; File if the file cannot be written; an
   ///          existing file is then unchanged.
   void writeTrace(const std::filesystem::path&) const;
@@ -409,7 +354,6 @@ class PALPATE_EXPORT OctreeBasedCD {
 
 /// The contacts of two triangle meshes in one call, without a step. It runs the code of
 /// OctreeBasedCD on one thread.
-///
 /// Errors   UnsupportedMethod for Method::Continuous, which needs a step; those of
 ///          addTriangleMesh() and addCollisionPair().
 PALPATE_EXPORT CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,

@@ -44,15 +44,7 @@ struct TrackedVertex {
 /// Finds the vertices of one geometry that are inside another, a closed body, with penetration
 /// directions that are stable over time. The nearest surface point jumps where two parts of the
 /// surface are equally near; these directions do not. Call update() in each step, after
-/// setPositions():
-///
-///   PenetrationTracker tracker(needle, organ);
-///   for (;;) {
-///     collisions.setPositions(organ, positions);
-///     for (const TrackedVertex& v : tracker.update(collisions.queries())) ...
-///     collisions.advance();
-///   }
-///
+/// setPositions(). Docs/HowTo/Penetration.md has an example.
 /// Laws     (1) the depth is at most kMaxDepthRatio times the least depth.
 ///          (2) a direction turns further than kMaxTurn + m only if its change is Jumped. Here m
 ///          is the turn that motion explains: the distance that the vertex moved from its last
@@ -73,7 +65,6 @@ class PALPATE_EXPORT PenetrationTracker {
   /// Computes the directions of this step. You may call it any number of times in a step: it
   /// continues from the last earlier step in which it received queries of the same OctreeBasedCD.
   /// The span is valid until the next call.
-  ///
   /// Order    by vertex, ascending.
   /// Errors   those of SpatialQueries::findInsideVertices() with default settings; the tracker then
   ///          keeps the directions of earlier steps. InvalidCall after a move.

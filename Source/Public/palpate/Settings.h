@@ -251,7 +251,6 @@ PALPATE_EXPORT const char* toString(ContactFeatures::Kind) noexcept;  ///< its n
 
 /// Returns whether two features may be a contact. The library calls it only for features that are
 /// near enough, once or several times each. A call does not mean that the features are a contact.
-///
 /// Needs    within one frame it must always return the same for the same features.
 /// Threads  several threads call it at once, in any order.
 /// Errors   an exception ends the frame, and detectCollision() throws it.

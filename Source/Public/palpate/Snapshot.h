@@ -13,13 +13,7 @@ namespace palpate {
 
 /// The geometries of an OctreeBasedCD as they were when publish() was called: their positions,
 /// transforms and octrees, and their motion in the step. A snapshot never changes. Other threads
-/// query it while the simulation computes the next steps.
-///
-///   // simulation thread                            // haptic thread
-///   collisions.detectCollision();                   const auto snapshot =
-///   collisions.publish(time);                           collisions.latestSnapshot();
-///   collisions.advance();                           snapshot->queries().contacts(organ, tip, ...);
-///
+/// query it while the simulation computes the next steps. Docs/HowTo/Haptics.md has an example.
 /// Valid    as long as a shared_ptr holds it, also after the OctreeBasedCD was destroyed. Spans are
 ///          valid as long.
 /// Threads  all functions are safe from any number of threads. Batches run on the calling thread.
@@ -29,7 +23,6 @@ class PALPATE_EXPORT Snapshot {
  public:
   /// Queries at the positions now of publish(). A copy of the object throws InvalidCall after the
   /// snapshot was released.
-  ///
   /// Waiting  only threads that query snapshots wait for each other: for a moment to take scratch,
   ///          and while one of them prepares a geometry for the first contains(), signedDistance(),
   ///          findInsideVertices(), findEmbeddedVertices() or findTetrahedron().
@@ -46,7 +39,6 @@ class PALPATE_EXPORT Snapshot {
   RigidMotion motion(GeometryId) const;
   /// L, in the world: where a vertex is on the straight line of its step. time: 0 for the start of
   /// the step, 1 for its end; other times extrapolate.
-  ///
   /// Errors   IndexOutOfRange; InvalidSettings for a time that is not finite.
   Eigen::Vector3d position(GeometryId, std::uint32_t vertex, double time = 1.0) const;
 

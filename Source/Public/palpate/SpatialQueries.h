@@ -82,12 +82,10 @@ struct Pick {
 
 /// A small rigid mesh, such as a tool, that SpatialQueries::contacts() places. It keeps the mesh's
 /// octree and the memory of the query.
-///
 /// Threads  one at a time. Threads that share a tool need a RigidMesh each.
 class PALPATE_EXPORT RigidMesh {
  public:
   /// positions: L, in the mesh's own frame.
-  ///
   /// Errors   those of OctreeBasedCD::addTriangleMesh(). They name the mesh as geometry 0.
   RigidMesh(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles);
   RigidMesh(RigidMesh&&) noexcept;
@@ -139,13 +137,7 @@ struct PathClearance {
 /// Spatial queries over the geometries of one OctreeBasedCD, at their positions now. A segment
 /// whose radii differ between its ends is the hull of the balls there, in every query. Get the
 /// object from OctreeBasedCD::queries(). Collision filters do not apply. Queries search disabled
-/// elements, too.
-///
-///   const SpatialQueries queries = collisions.queries();
-///   std::vector<InsideVertex> inside;
-///   queries.findInsideVertices(needle, organ, inside);
-///   for (const InsideVertex& v : inside) pushOut(v.vertex, v.depth * v.direction);
-///
+/// elements, too. Docs/HowTo/Queries.md has examples.
 /// Valid    until positions, transforms, topology or geometries change, or advance() is called. A
 ///          detection leaves it valid. Copies are cheap and valid as long.
 /// Threads  all functions are safe from any number of threads.
@@ -159,7 +151,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// Finds the point of a geometry's surface that is nearest to a point, decided exactly. Of
   /// several equally near elements it is on the lowest. Returns nothing if no surface point is
   /// within maxDistance.
-  ///
   /// Units    point, maxDistance: L; both are in the world.
   /// Errors   NonFinitePosition; InvalidSettings if maxDistance is negative or NaN.
   /// Cost     about logarithmic in the elements. Allocates nothing but the integers that compare
@@ -168,14 +159,12 @@ class PALPATE_EXPORT SpatialQueries {
                                            double maxDistance = kInfinity) const;
   /// The same for many points, on all threads. Points without an answer have an infinite distance
   /// and element kNoElement. As every answer for a shape has that element, only the distance tells.
-  ///
   /// Errors   InvalidSettings, too, if `out` has another size than `points`. Messages name the
   ///          point, such as "point 3".
   void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
                      std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
   /// Finds the k elements that are nearest to a point, or all if there are fewer, with their
   /// closest points.
-  ///
   /// Order    by distance, then by element, decided exactly.
   /// Errors   those of closestPoint(); InvalidSettings if k is below 1.
   void nearestElements(GeometryId, const Eigen::Vector3d& point, int k,
@@ -184,22 +173,18 @@ class PALPATE_EXPORT SpatialQueries {
   /// InsideRule::WindingNumber a number that the margin or rounding leaves open counts as inside.
   /// With InsideRule::Closed, points on the surface of a triangle mesh are not inside; points on
   /// the boundary of a tetrahedron are.
-  ///
   /// Errors   those of findInsideVertices(); NonFinitePosition.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
   /// The distance from a body's surface, negative where contains() holds.
-  ///
   /// Errors   those of contains(); NotClosed for a body without elements.
   SignedDistance signedDistance(GeometryId body, const Eigen::Vector3d& point,
                                 const InsideSettings& = {}) const;
   /// The same for many points, on all threads.
-  ///
   /// Errors   InvalidSettings, too, if `out` has another size than `points`. Messages name the
   ///          point, such as "point 3".
   void signedDistances(GeometryId body, std::span<const Eigen::Vector3d> points,
                        std::span<SignedDistance> out, const InsideSettings& = {}) const;
   /// Finds the elements with a point within a radius, decided exactly.
-  ///
   /// Order    ascending.
   /// Errors   NonFinitePosition; InvalidSettings if the radius is not in [0, kLargestMeasure].
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
@@ -207,7 +192,6 @@ class PALPATE_EXPORT SpatialQueries {
 
   /// Finds the first hit of a ray on a geometry. Rays are watertight: no ray passes between
   /// triangles that share an edge or vertex.
-  ///
   /// Errors   NonFinitePosition for an origin or direction; InvalidSettings for a direction of
   ///          length 0, or if tMin is not finite or not at most tMax.
   /// Cost     about logarithmic in the elements.
@@ -217,12 +201,10 @@ class PALPATE_EXPORT SpatialQueries {
   bool anyHit(GeometryId, const Ray&) const;  ///< whether there is a hit
   /// First hits of many rays, on all threads. Rays without a hit have an infinite t and element
   /// kNoElement. As every hit on a shape has that element, only t tells.
-  ///
   /// Errors   InvalidSettings, too, if `out` has another size than `rays`. Messages name the ray,
   ///          such as "ray 3".
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   /// All hits.
-  ///
   /// Order    by ascending t.
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;
   /// What a ray selects among all geometries. frontFacesOnly: other hits do not count, and so it
@@ -231,18 +213,15 @@ class PALPATE_EXPORT SpatialQueries {
 
   /// Finds the elements that have a point in a shape, interior included. The poses are those of
   /// OctreeBasedCD::setTransform(). A frustum is a ConvexHull.
-  ///
   /// Order    ascending.
-  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius, on
-  /// the
-  ///          shape's corners as they are rounded when it is placed. Otherwise elements are found
-  ///          up to rounding errors of the distance.
+  /// Accuracy decided exactly for spheres, and for boxes and hulls if elements have no radius: on
+  ///          the shape's corners, rounded when it is placed. Otherwise up to rounding errors of
+  ///          the distance.
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape itself.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Pose&,
                    std::vector<std::uint32_t>& elements) const;
   /// Finds the contacts that a pair of the geometry and the shape would have with Method::Proximity
   /// and Contacts::Distinct, with the shape at this pose. All have the time 1.
-  ///
   /// Order    that of CollisionData::shape().
   /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
   /// Cost     follows the elements near the shape. A repeated call allocates nothing, unless a box or
@@ -254,7 +233,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// features that touch; an edge that only passes through a triangle's inside has no contact.
   /// Disabled elements have no contacts. Of the collision filter only Sidedness applies. validity()
   /// has the method, the thickness and the number of contacts only.
-  ///
   /// Lists    vertexTriangle() has vertices of the geometry with triangles of the mesh.
   ///          triangleVertex() has elements of the geometry with vertices of the mesh. The normals
   ///          of edgeEdge() point from the mesh to the geometry.
@@ -310,7 +288,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// outside by contains(). A point that only touches the surface of a body with an inside is not
   /// in it. Bodies are closed triangle meshes, tetrahedral meshes and shapes. Other meshes have no
   /// inside: the ball is in them while it touches them.
-  ///
   /// inside   by ascending `enter`, then in the order of `bodies`.
   /// outside  for each body without an interval, in the order of `bodies`.
   /// Accuracy with radius 0, which triangles the path meets is decided exactly. Other arc lengths
@@ -336,7 +313,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// in one point, a nearer one may be missed. Depth and surface point have the accuracy of
   /// vertexTriangleDistance(). Where two triangles intersect they are computed in double, and are
   /// less accurate if the triangles are almost parallel.
-  ///
   /// Order    by vertex, ascending.
   /// Errors   NotClosed if the body has no inside: it is not a mesh, or with InsideRule::Closed it
   ///          is a triangle mesh with defects (the message names the first edge); InvalidSettings
@@ -347,7 +323,6 @@ class PALPATE_EXPORT SpatialQueries {
   /// Finds the vertices of one geometry that are in a tetrahedron of another, or on its boundary,
   /// decided exactly. A vertex that several tetrahedra contain is in the lowest of them. Inverted
   /// tetrahedra contain points as others do; tetrahedra without volume contain none.
-  ///
   /// Order    by vertex, ascending, each vertex once.
   /// Errors   UnsupportedMethod if the body is no tetrahedral mesh or if `vertices` is a shape;
   ///          InvalidSettings if both geometries are the same.

@@ -30,20 +30,10 @@ struct HeldVertex {
   friend bool operator==(const HeldVertex&, const HeldVertex&) = default;
 };
 
-/// Prevents geometries from passing through each other at the end of a solver's step. A solver
-/// meets constraints one after another, so that an impact may remain in its step. The function
-/// hold() shortens the steps of vertices, and of placed bodies, until nothing touches within the
-/// step.
-///
-///   OctreeBasedCD collisions;   // with its geometries and pairs
-///   StepGuard guard(collisions);
-///   // after the solver's last correction of a step:
-///   collisions.setPositions(organ, corrected);
-///   collisions.setTransform(tool, {rotation, translation});
-///   guard.hold();
-///   // collisions.positions(organ) and collisions.transform(tool) are to be used from here on
-///   collisions.advance();
-///
+/// Prevents geometries from passing through each other at the end of a solver's step: after its
+/// last correction, hold() shortens the steps of vertices and placed bodies until nothing touches
+/// within the step. The positions and transforms of the OctreeBasedCD are to be used from there on.
+/// Docs/HowTo/Solvers.md has an example.
 /// Parts     A vertex is a part, and so is a geometry that setTransform() moves in the step, and a
 ///           rigid group. A part makes a fraction of its step: a vertex ends at before + fraction *
 ///           (now - before), rounded, and exactly at `now` for 1. The translation of a placed
@@ -101,14 +91,12 @@ class PALPATE_EXPORT StepGuard {
   ~StepGuard();
 
   /// Whether features of this pair, in either order, must not touch. True for every pair at first.
-  ///
   /// Errors   UnknownPair.
   void setGuarded(GeometryId a, GeometryId b, bool guarded);
   /// These vertices make one fraction of their steps. Groups with a common vertex become one group.
   /// Use setTransform() for a rigid body: a group does not stay rigid while it turns. Groups of
   /// placed geometries are for tools of several parts. A vertex that does not exist when hold() is
   /// called does not count.
-  ///
   /// Errors   IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
   /// These vertices of a geometry always make their whole step; none is fixed but these.
@@ -116,13 +104,11 @@ class PALPATE_EXPORT StepGuard {
   /// vertex is fixed. If hold() throws ImpactRemains, set the `now` of these vertices to `before`
   /// and call it again. Vertices that a hand drives need not be fixed: hold() may then shorten
   /// their step, and the hand has to wait.
-  ///
   /// Errors   IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
   /// Shortens the steps of vertices and placed geometries of the OctreeBasedCD: sets their
   /// positions and transforms now. Its results stay readable.
-  ///
   /// Returns  the size of held().
   /// Errors   ImpactRemains if features touch and cannot be shortened: they touched before the
   ///          step, or all their vertices that move are fixed. The message names geometries and

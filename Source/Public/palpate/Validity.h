@@ -38,7 +38,6 @@ PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "
 /// Whether the last answer for one pair can be trusted, and what the library knows about the step.
 /// Each method relies on conditions, and each detectCollision() checks them. Docs/HowTo/Validity.md
 /// says what to do in each case.
-///
 /// Laws     (1) if trusted, and `method` is Proximity, Continuous or Auto: every normal is on the
 ///          side from which its features came, and no features that touched or crossed within the
 ///          step are missing. With Contacts::Distinct another contact may stand for them, and

@@ -44,7 +44,6 @@ struct SimplifiedMesh {
 ///
 /// Where a mesh cannot be made coarser within maxDistance, the result has its triangles, moved
 /// outward. Shells inside the mesh have no counterpart in the result.
-///
 /// Errors   NonFinitePosition; IndexOutOfRange for a vertex index; TooLarge for more than 2^28
 ///          vertices or triangles; NotClosed, also for a mesh without triangles; InvalidSettings,
 ///          also for a mesh whose longest side is not in [2^-200, 2^200]; UnsupportedMethod, with
