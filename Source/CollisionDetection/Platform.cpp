@@ -1,3 +1,4 @@
+// Part of <palpate/Executor.h>: simdPath().
 #include <palpate/Executor.h>
 
 #include "Core/SimdPath.h"

@@ -1,3 +1,4 @@
+// Part of <palpate/FeaturePairs.h>: times of impact.
 #include <palpate/FeaturePairs.h>
 
 #include "Math/ImpactQuery.h"

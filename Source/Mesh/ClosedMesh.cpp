@@ -1,3 +1,4 @@
+// Part of <palpate/Meshes.h>: findMeshDefects() of triangles.
 #include <palpate/Meshes.h>
 
 #include <algorithm>
