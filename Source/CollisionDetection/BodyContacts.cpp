@@ -178,8 +178,8 @@ void BodyContacts::addContacts(const PairRecord& record, Engine engine, const Pe
                      buffers->intersectingTriangles.end());
   // Intersection did not run if the surfaces were apart at the start.
   if (triangles.empty())
-    for (const BodyPair::Meeting& meeting : m_scratch.meetings)
-      triangles.push_back({meeting.elementA, meeting.elementB});
+    for (const BodyPair::IntersectingTriangles& both : m_scratch.intersecting)
+      triangles.push_back({both.elementA, both.elementB});
   const BodyPair pair(record.a->body, record.b->body, engine, m_scratch.pair);
   for (const bool ofA : {true, false})
     addVertices(pair, ofA, found, record.pair.settings.thickness);

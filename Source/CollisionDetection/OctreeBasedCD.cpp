@@ -34,7 +34,7 @@ Eigen::AlignedBox3d boundsOf(const Geometry& geometry) {
 }  // namespace
 
 void checkCandidates(const PairRecord& record) {
-  const PairKind kind = record.kind();
+  const PairKind kind = record.support->kind;
   if (kind != PairKind::Meshes)
     throw Error(ErrorCode::NotAvailable,
                 nameOf(record.pair.a, record.pair.b) +

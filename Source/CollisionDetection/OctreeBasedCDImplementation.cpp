@@ -115,7 +115,7 @@ bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
     if (needsNoOctree(*record)) record->a->skipsOctree = true;
   for (const auto& record : pairs.records()) {
     if (!needsNoOctree(*record)) record->a->skipsOctree = false;
-    if (record->kind() != PairKind::Proxy) record->b->skipsOctree = false;
+    if (record->support->kind != PairKind::Proxy) record->b->skipsOctree = false;
   }
   return std::any_of(geometries.all().begin(), geometries.all().end(),
                      [](const auto& geometry) { return geometry->skipsOctree; });
@@ -151,7 +151,8 @@ bool OctreeBasedCD::Implementation::updateProxies(std::span<PairRecord* const> r
   const MemoryScope memory(MemoryStage::Octrees);
   bool built = false;
   for (PairRecord* record : records)
-    if (record->kind() == PairKind::Proxy) built |= record->updateProxy(pairs.records(), threads);
+    if (record->support->kind == PairKind::Proxy)
+      built |= record->updateProxy(pairs.records(), threads);
   return built;
 }
 

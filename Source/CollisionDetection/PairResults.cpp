@@ -62,9 +62,9 @@ void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& stati
 }
 
 void PairResults::keepFirstImpacts(PairRecord& record, double end) {
-  if (record.pair.settings.contacts == Contacts::Distinct)
-    m_firstImpacts.keep(record.meshes(), end, m_orderScratch,
-                        CollisionData::Contents::of(record.next));
+  const MeshPair pair = record.meshes();
+  if (pair.reportsDistinct())
+    m_firstImpacts.keep(pair, end, m_orderScratch, CollisionData::Contents::of(record.next));
 }
 
 void keepDistinct(const PairRecord& record, DistinctContacts& distinct,

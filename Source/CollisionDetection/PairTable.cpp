@@ -26,7 +26,7 @@ FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
 
 bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
                              const Threads& threads) {
-  PALPATE_ASSERT(kind() == PairKind::Proxy);
+  PALPATE_ASSERT(support->kind == PairKind::Proxy);
   const ProxyState state{b->body.revisions.elements, b->body.mesh.now.bodyRevision()};
   const ProxySettings wanted{pair.settings.thickness + a->body.mesh.largestRadius,
                              pair.settings.allowedError, pair.settings.proxy.widestNormalCone};
@@ -79,8 +79,9 @@ std::uint64_t keyOf(GeometryId a, GeometryId b) {
   return std::min(first, second) << 32 | std::max(first, second);
 }
 
-/// Throws unless the kind of pair can have a contact predicate.
-void checkPredicate(const PairRecord& record, PairKind kind) {
+/// Throws unless a pair that is answered so can have a contact predicate.
+void checkPredicate(const PairRecord& record, const SupportedPairs& support) {
+  const PairKind kind = support.kind;
   if (kind == PairKind::Meshes) return;
   throw Error(ErrorCode::UnsupportedMethod,
               nameOf(*record.a, *record.b) +
@@ -111,7 +112,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings, const Threads& threads) {
   Geometry& first = geometries.at(a);
   Geometry& second = geometries.at(b);
-  checkPair(first, second, settings);
+  const SupportedPairs& support = checkPair(first, second, settings);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
                 nameOf(first, second) + " was added before; setPairSettings() changes its settings",
@@ -120,6 +121,7 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->pair = {a, b, settings};
   record->a = &first;
   record->b = &second;
+  record->support = &support;
   planWithoutMotion(*record);
   record->settingsRevision = m_revisions.next();
   if (settings.restDistance > 0.0)
@@ -157,8 +159,8 @@ PairRecord& PairTable::inOrder(const GeometryTable& geometries, GeometryId a, Ge
 void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings, const Threads& threads) {
   PairRecord& record = at(geometries, a, b);
-  const PairKind kind = checkPair(*record.a, *record.b, settings).kind;
-  if (record.predicate) checkPredicate(record, kind);
+  const SupportedPairs& support = checkPair(*record.a, *record.b, settings);
+  if (record.predicate) checkPredicate(record, support);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0)
     record.nearAtRest = verticesWithin(record.a->body.mesh.topology, record.a->body.mesh.rest,
                                        settings.restDistance, threads);
@@ -169,6 +171,7 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
   }
   PALPATE_ASSERT(m_records[record.index].get() == &record);
   record.pair.settings = m_pairs[record.index].settings = settings;
+  record.support = &support;
   planWithoutMotion(record);
   record.settingsRevision = m_revisions.next();
 }
@@ -194,7 +197,7 @@ void PairTable::checkFieldChange(GeometryId geometry, const DistanceField* field
 void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, GeometryId b,
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
-  if (predicate) checkPredicate(record, record.kind());
+  if (predicate) checkPredicate(record, *record.support);
   record.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }

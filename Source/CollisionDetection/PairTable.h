@@ -29,7 +29,8 @@ struct PairRecord : CountedObject {
   CollisionPair pair;
   Geometry* a;
   Geometry* b;
-  PairPlan plan;  ///< of this frame
+  const SupportedPairs* support = nullptr;  ///< the row of the table that answers the settings
+  PairPlan plan;  ///< of this frame; only Auto's may be of another kind than `support`
   Trust trust;
 
   struct State {
@@ -75,15 +76,9 @@ struct PairRecord : CountedObject {
 
   void releaseMemory();  ///< keeps the result
 
-  /// How the settings have the pair answered. Auto's plan of a frame may have another kind.
-  PairKind kind() const {
-    return supportOf(pair.settings.method, a->body.mesh.topology.type, b->body.mesh.topology.type,
-                     a == b)
-        ->kind;
-  }
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
   /// ask for candidates.
-  bool hasCandidates() const { return kind() == PairKind::Meshes; }
+  bool hasCandidates() const { return support->kind == PairKind::Meshes; }
   /// Makes `proxy` for the body and the settings if it is another one, or takes that of `others`.
   /// Returns whether leaves were built.
   bool updateProxy(std::span<const std::unique_ptr<PairRecord>> others, const Threads&);

@@ -6,7 +6,8 @@
 namespace palpate {
 
 void planWithoutMotion(PairRecord& record) {
-  record.plan = planOf(record.pair.settings, record.a->inStep(), record.b->inStep());
+  record.plan =
+      planOf(*record.support, record.pair.settings, record.a->inStep(), record.b->inStep());
 }
 
 bool mayUseLeaves(const PairRecord& record) {
@@ -20,12 +21,12 @@ bool mayUseLeaves(const PairRecord& record) {
 
 void planStep(PairRecord& record, bool detecting) {
   const PairSettings& settings = record.pair.settings;
-  const PairKind kind = record.kind();
+  const PairKind kind = record.support->kind;
   const bool moves = (detecting || settings.method == Method::Auto) && kind != PairKind::Proxy &&
                      kind != PairKind::Field;
   if (moves)
     for (Geometry* geometry : {record.a, record.b}) geometry->motion.update(*geometry);
-  record.plan = planOf(settings, record.a->inStep(), record.b->inStep(), moves);
+  record.plan = planOf(*record.support, settings, record.a->inStep(), record.b->inStep(), moves);
   if (detecting && mayUseLeaves(record)) record.plan = planByLeaves(settings, record.plan);
 }
 

@@ -4,6 +4,7 @@
 
 #include "CollisionDetection/GuardedStep.h"
 #include "Bodies/InputChecks.h"
+#include "Core/Assert.h"
 
 #include <memory>
 #include <vector>
@@ -47,6 +48,9 @@ void updatePairs(const PairTable& table, const GuardSettings& settings, GuardedP
       own->b = record->b;
     }
     own->pair = {record->pair.a, record->pair.b, settingsOf(*record)};
+    own->support = supportOf(Method::Continuous, own->a->body.mesh.topology.type,
+                             own->b->body.mesh.topology.type, own->a == own->b);
+    PALPATE_ASSERT(own->support);
     own->settingsRevision = record->settingsRevision;
   }
   pairs.resize(count);

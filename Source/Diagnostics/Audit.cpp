@@ -232,8 +232,7 @@ void audit(const PairRecord& record, const CollisionData& data, const AuditSetti
   const FeatureLists sample = drawFeatures(record, settings, frame);
   const Coverage coverage(record, sample);
   // Any contact with a shape may stand for one of the sample.
-  const bool needsAll =
-      record.plan.kind == PairKind::MeshAndShape && meshes.settings.contacts == Contacts::Distinct;
+  const bool needsAll = record.plan.kind == PairKind::MeshAndShape && meshes.reportsDistinct();
   findContactsByBruteForce(record, needsAll ? everyFeature(record) : sample, contacts);
   if (meshes.settings.method == Method::Intersection)
     addListed(meshes, coverage, data, contacts, pierced);

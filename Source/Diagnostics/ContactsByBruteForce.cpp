@@ -108,7 +108,7 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
                         ContactBuffers& out) {
   const TriangleMesh &vertices = kSwapped ? pair.b : pair.a,
                      &triangles = kSwapped ? pair.a : pair.b;
-  const bool distinct = pair.settings.contacts == Contacts::Distinct;
+  const bool distinct = pair.reportsDistinct();
   const Features<ImpactQuery::Kind::VertexTriangle> features{vertices, triangles};
   StepCheck check(pair, out);
   VertexAgainstMesh against(triangles);
@@ -174,7 +174,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
       if (check.addImpactIfTouched(features, i, j, false, answer.distance)) continue;
       const bool inside = !answer.parallel && answer.featureA == EdgeFeature::Interior &&
                           answer.featureB == EdgeFeature::Interior;
-      if (pair.settings.contacts == Contacts::Distinct && !inside) continue;
+      if (pair.reportsDistinct() && !inside) continue;
       if (rejectsEdges(pair, i, j)) continue;
       if (pointInwardAtEnd(pair, i, j, answer)) {
         if (pair.step.reportsImpacts) addImpact(pair, features, i, j, false, out);
@@ -230,9 +230,8 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
       ++out.featurePairs;
       const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
       if (!nearby ||
-          (pair.settings.contacts == Contacts::Distinct &&
-           (!isDistinctOfLines(pair, {i, j}, nearby->features) ||
-            isExcludedByFaces(pair, i, j, *nearby))) ||
+          (pair.reportsDistinct() && (!isDistinctOfLines(pair, {i, j}, nearby->features) ||
+                                      isExcludedByFaces(pair, i, j, *nearby))) ||
           pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;

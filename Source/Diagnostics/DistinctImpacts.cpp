@@ -16,7 +16,7 @@ namespace palpate {
 namespace {
 
 bool keepsDistinctImpacts(const MeshPair& meshes) {
-  return meshes.settings.contacts == Contacts::Distinct &&
+  return meshes.reportsDistinct() &&
          (meshes.settings.method == Method::Continuous || meshes.step.reportsImpacts);
 }
 

@@ -129,9 +129,8 @@ void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edge
   const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB, &check);
   if (!nearby) return;
   out.exactDecisions += nearby->centres.exact;
-  if (pair.settings.contacts == Contacts::Distinct &&
-      (!isDistinct(pair, edgeA, edgeB, nearby->features, out) ||
-       isExcludedByFaces(pair, edgeA, edgeB, *nearby)))
+  if (pair.reportsDistinct() && (!isDistinct(pair, edgeA, edgeB, nearby->features, out) ||
+                                 isExcludedByFaces(pair, edgeA, edgeB, *nearby)))
     return;
   if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
   EdgeEdgeDistance centres = nearby->centres;

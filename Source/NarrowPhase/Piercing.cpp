@@ -322,7 +322,7 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   if (m_atEnd.empty() && m_atStart.empty()) return;
   sort(m_atEnd);
   sort(m_atStart);
-  const bool drops = pair.settings.contacts == Contacts::Distinct, b = !pair.self();
+  const bool drops = pair.reportsDistinct(), b = !pair.self();
   // ofB: the mesh of each vertex.
   const auto represents = [&](const auto& contact, const std::array<bool, 4>& ofB) {
     if constexpr (requires { contact.vertex; }) {

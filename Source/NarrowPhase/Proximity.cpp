@@ -37,7 +37,7 @@ class VertexTriangleFinder {
         m_topology(m_features.second.topology),
         m_self(pair.self()),
         m_thickness(pair.thicknessAtEnd()),
-        m_distinct(pair.settings.contacts == Contacts::Distinct),
+        m_distinct(pair.reportsDistinct()),
         m_corners(corners),
         m_check(pair, out),
         m_buffers(out),
@@ -172,7 +172,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   const auto at = [&](int i) -> Vector3d {
     return features.meshOf(i).now[features.vertices(edgeA, edgeB)[i]];
   };
-  const bool distinct = pair.settings.contacts == Contacts::Distinct;
+  const bool distinct = pair.reportsDistinct();
   std::optional<EdgeEdgeDistance> answer;
   if (distinct) answer = crossingEdgesDistance(at(0), at(1), at(2), at(3));
   const bool isContact = answer || !distinct;
@@ -220,8 +220,7 @@ class ProximityFinder {
                       out),
         m_sharedVertex(pair.a.topology, pair.self() ? pair.floats : nullptr, candidates),
         m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
-        m_distinct(pair.settings.contacts == Contacts::Distinct && !pair.has(GeometryType::Lines)) {
-  }
+        m_distinct(pair.reportsDistinct() && !pair.has(GeometryType::Lines)) {}
 
   void find(std::span<const ElementPair> candidates) {
     for (const ElementPair& candidate : candidates) add(candidate);

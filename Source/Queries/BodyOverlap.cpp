@@ -17,7 +17,7 @@ namespace {
 
 /// The mean of the points at which features of two triangles touch. It is between them, and so in
 /// the middle of what the triangles share.
-Vector3d commonPoint(const BodyPair::Meeting& meeting) {
+Vector3d commonPoint(const BodyPair::IntersectingTriangles& both) {
   Vector3d sum = Vector3d::Zero();
   double count = 0;
   const auto add = [&](const Vector3d& p) {
@@ -25,27 +25,28 @@ Vector3d commonPoint(const BodyPair::Meeting& meeting) {
     ++count;
   };
   for (std::size_t i = 0; i < 3; ++i) {
-    if (meeting.found.cornersOfAOnB >> i & 1) add(meeting.a[i]);
-    if (meeting.found.cornersOfBOnA >> i & 1) add(meeting.b[i]);
+    if (both.found.cornersOfAOnB >> i & 1) add(both.a[i]);
+    if (both.found.cornersOfBOnA >> i & 1) add(both.b[i]);
     for (std::size_t j = 0; j < 3; ++j)
-      if (meeting.found.touchingEdges &
+      if (both.found.touchingEdges &
           TriangleIntersection::edgesBit(static_cast<int>(i), static_cast<int>(j))) {
-        const EdgeEdgeDistance at = finiteEdgeEdgeDistance(meeting.a[i], meeting.a[(i + 1) % 3],
-                                                           meeting.b[j], meeting.b[(j + 1) % 3]);
-        add((1.0 - at.weightA) * meeting.a[i] + at.weightA * meeting.a[(i + 1) % 3]);
+        const EdgeEdgeDistance at =
+            finiteEdgeEdgeDistance(both.a[i], both.a[(i + 1) % 3], both.b[j], both.b[(j + 1) % 3]);
+        add((1.0 - at.weightA) * both.a[i] + at.weightA * both.a[(i + 1) % 3]);
       }
   }
   return sum / count;
 }
 
 /// Whether a point beside p, behind the faces of both triangles, is inside both bodies.
-bool overlapBeside(const BodyPair& pair, const Vector3d& p, const BodyPair::Meeting& meeting) {
-  const Vector3d normalA = windingNormal(meeting.a[0], meeting.a[1], meeting.a[2]),
-                 normalB = windingNormal(meeting.b[0], meeting.b[1], meeting.b[2]);
-  const double size = std::min(stableLength(meeting.a[1] - meeting.a[0]),
-                               stableLength(meeting.b[1] - meeting.b[0]));
-  const Vector3d middleA = (meeting.a[0] + meeting.a[1]) + meeting.a[2],
-                 middleB = (meeting.b[0] + meeting.b[1]) + meeting.b[2];
+bool overlapBeside(const BodyPair& pair, const Vector3d& p,
+                   const BodyPair::IntersectingTriangles& both) {
+  const Vector3d normalA = windingNormal(both.a[0], both.a[1], both.a[2]),
+                 normalB = windingNormal(both.b[0], both.b[1], both.b[2]);
+  const double size =
+      std::min(stableLength(both.a[1] - both.a[0]), stableLength(both.b[1] - both.b[0]));
+  const Vector3d middleA = (both.a[0] + both.a[1]) + both.a[2],
+                 middleB = (both.b[0] + both.b[1]) + both.b[2];
   const std::array<Vector3d, 4> directions{-normalA - normalB, normalA + normalB, normalB - normalA,
                                            normalA - normalB};
   for (const double share : {0x1p-6, 0x1p-16, 0x1p-26})
@@ -56,33 +57,35 @@ bool overlapBeside(const BodyPair& pair, const Vector3d& p, const BodyPair::Meet
   return false;
 }
 
-bool overlapWhereTouching(const BodyPair& pair, const CountedVector<BodyPair::Meeting>& meetings) {
+bool overlapWhereTouching(const BodyPair& pair,
+                          const CountedVector<BodyPair::IntersectingTriangles>& intersecting) {
   for (const bool ofA : {true, false}) {
     const BodyVertices& vertices = pair.vertices(ofA);
     for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
       if (vertices.triangleOf[v] != kNoElement && pair.isInside(ofA, v)) return true;
   }
-  return std::any_of(meetings.begin(), meetings.end(), [&](const BodyPair::Meeting& meeting) {
-    return overlapBeside(pair, commonPoint(meeting), meeting);
-  });
+  return std::any_of(intersecting.begin(), intersecting.end(),
+                     [&](const BodyPair::IntersectingTriangles& both) {
+                       return overlapBeside(pair, commonPoint(both), both);
+                     });
 }
 
 }  // namespace
 
-bool overlap(const BodyPair& pair, CountedVector<BodyPair::Meeting>& meetings) {
-  meetings.clear();
+bool overlap(const BodyPair& pair, CountedVector<BodyPair::IntersectingTriangles>& intersecting) {
+  intersecting.clear();
   bool pierce = false;
-  pair.forEachMeeting(Vector3d::Zero(), [&](const BodyPair::Meeting& meeting) {
-    meetings.push_back(meeting);
-    pierce |= (meeting.found.edgesOfAThroughB | meeting.found.edgesOfBThroughA) != 0;
+  pair.forEachIntersecting(Vector3d::Zero(), [&](const BodyPair::IntersectingTriangles& both) {
+    intersecting.push_back(both);
+    pierce |= (both.found.edgesOfAThroughB | both.found.edgesOfBThroughA) != 0;
     return true;
   });
-  std::sort(meetings.begin(), meetings.end(),
-            [](const BodyPair::Meeting& l, const BodyPair::Meeting& r) {
+  std::sort(intersecting.begin(), intersecting.end(),
+            [](const BodyPair::IntersectingTriangles& l, const BodyPair::IntersectingTriangles& r) {
               return std::pair(l.elementA, l.elementB) < std::pair(r.elementA, r.elementB);
             });
   if (pierce || pair.findInsidePart(Vector3d::Zero())) return true;
-  return !meetings.empty() && overlapWhereTouching(pair, meetings);
+  return !intersecting.empty() && overlapWhereTouching(pair, intersecting);
 }
 
 bool isConvex(const BodyPair& pair, bool ofA) {

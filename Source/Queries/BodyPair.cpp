@@ -90,20 +90,20 @@ Corners BodyPair::cornersOfB(std::uint32_t element) const {
   return {p[t[0]], p[t[1]], p[t[2]]};
 }
 
-void BodyPair::forEachMeeting(const Vector3d& shift,
-                              const std::function<bool(const Meeting&)>& f) const {
+void BodyPair::forEachIntersecting(
+    const Vector3d& shift, const std::function<bool(const IntersectingTriangles&)>& f) const {
   SignCounts counts;
-  Meeting meeting;
+  IntersectingTriangles both;
   const auto test = [&](std::uint32_t elementB) {
-    meeting.elementB = elementB;
-    meeting.b = cornersOfB(elementB);
-    meeting.found = intersectTriangles(meeting.a, meeting.b, counts);
+    both.elementB = elementB;
+    both.b = cornersOfB(elementB);
+    both.found = intersectTriangles(both.a, both.b, counts);
     m_scratch.stack.exactDecisions += std::exchange(counts.undecided, 0);
-    return !meeting.found.intersect() || f(meeting);
+    return !both.found.intersect() || f(both);
   };
   const auto setA = [&](std::uint32_t elementA) {
-    meeting.elementA = elementA;
-    meeting.a = cornersOfA(elementA, shift);
+    both.elementA = elementA;
+    both.a = cornersOfA(elementA, shift);
   };
   if (m_engine == Engine::BruteForce) {
     const std::size_t sizeA = m_a.mesh.topology.triangles.size(),
@@ -179,7 +179,7 @@ std::optional<BodyPair::PartVertex> BodyPair::findInsidePart(const Vector3d& shi
 
 bool BodyPair::areApart(const Vector3d& shift) const {
   bool apart = true;
-  forEachMeeting(shift, [&](const Meeting&) { return apart = false; });
+  forEachIntersecting(shift, [&](const IntersectingTriangles&) { return apart = false; });
   return apart && !findInsidePart(shift);
 }
 

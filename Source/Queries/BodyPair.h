@@ -64,15 +64,15 @@ class BodyPair {
 
   Corners cornersOfA(std::uint32_t element, const Eigen::Vector3d& shift) const;
   Corners cornersOfB(std::uint32_t element) const;
-  /// Calls f for all pairs of triangles that have a common point, in any order, until it returns
-  /// false.
-  struct Meeting {
+  /// Two triangles that have a common point.
+  struct IntersectingTriangles {
     std::uint32_t elementA, elementB;
     Corners a, b;  ///< a moved
     TriangleIntersection found;
   };
-  void forEachMeeting(const Eigen::Vector3d& shift,
-                      const std::function<bool(const Meeting&)>& f) const;
+  /// Calls f for all that intersect, in any order, until it returns false.
+  void forEachIntersecting(const Eigen::Vector3d& shift,
+                           const std::function<bool(const IntersectingTriangles&)>& f) const;
 
   /// Whether a vertex is inside the other body, a not moved; not if it is on the surface.
   bool isInside(bool ofA, std::uint32_t vertex) const;

@@ -100,33 +100,33 @@ class Search {
     const Vector3d shift = at.depth * at.direction;
     const double start = at.depth;
     bool any = false;
-    const auto takeMeeting = [&](const BodyPair::Meeting& meeting) {
+    const auto takeIntersecting = [&](const BodyPair::IntersectingTriangles& both) {
       any = true;
-      takeExit(at, start, meeting);
+      takeExit(at, start, both);
       return true;
     };
-    m_pair.forEachMeeting(shift, std::ref(takeMeeting));  // a copy would allocate
+    m_pair.forEachIntersecting(shift, std::ref(takeIntersecting));  // a copy would allocate
     if (any) return true;
     const auto part = m_pair.findInsidePart(shift);
     if (!part) return false;
     takeHit(at, *part, start);
     return true;
   }
-  void takeExit(Translation& at, double start, const BodyPair::Meeting& meeting) {
+  void takeExit(Translation& at, double start, const BodyPair::IntersectingTriangles& both) {
     const auto scaled = [&](const Corners& c) {
       return Corners{m_unit * c[0], m_unit * c[1], m_unit * c[2]};
     };
-    const TranslationExit exit = lastTouch(scaled(meeting.a), scaled(meeting.b), at.direction);
+    const TranslationExit exit = lastTouch(scaled(both.a), scaled(both.b), at.direction);
     const double depth = start + exit.t / m_unit;
     const auto precedes = [&] {
-      return std::pair(meeting.elementA, meeting.elementB) <
+      return std::pair(both.elementA, both.elementB) <
              std::pair(at.last.elementA, at.last.elementB);
     };
     // Bodies that overlap by less than rounding may have no exit after the start.
     const bool isOnly = at.last.elementA == kNoElement && exit.t > -kInfinity;
     if (!(isOnly || depth > at.depth || (depth == at.depth && depth > start && precedes()))) return;
     at.depth = std::max(at.depth, depth);
-    at.last = {meeting.elementA, meeting.elementB, exit.weightsA, exit.weightsB, exit.normal};
+    at.last = {both.elementA, both.elementB, exit.weightsA, exit.weightsB, exit.normal};
   }
   /// Moves on to where a vertex meets the other surface.
   void takeHit(Translation& at, const BodyPair::PartVertex& vertex, double start) {
@@ -256,9 +256,9 @@ class Search {
     addSeed(directionOfVolume());
     for (const bool ofA : {true, false})
       for (const std::uint32_t v : insideOf(ofA)) add(ofA, m_pair.vertices(ofA).triangleOf[v]);
-    for (const BodyPair::Meeting& meeting : m_scratch.meetings) {
-      add(true, meeting.elementA);
-      add(false, meeting.elementB);
+    for (const BodyPair::IntersectingTriangles& both : m_scratch.intersecting) {
+      add(true, both.elementA);
+      add(false, both.elementB);
     }
   }
   /// The direction in which the overlap shrinks fastest, about: the mean normal of inside faces.
@@ -290,9 +290,9 @@ class Search {
     return m_best.separates && hulls.direction != Vector3d::Zero() &&
            m_best.depth <= (hulls.depth - hulls.gap) / m_unit + most && areConvex();
   }
-  ElementPair firstMeeting() const {
-    if (m_scratch.meetings.empty()) return {0, 0};
-    return {m_scratch.meetings.front().elementA, m_scratch.meetings.front().elementB};
+  ElementPair firstIntersecting() const {
+    if (m_scratch.intersecting.empty()) return {0, 0};
+    return {m_scratch.intersecting.front().elementA, m_scratch.intersecting.front().elementB};
   }
   bool areConvex() const {
     if (!m_areConvex) m_areConvex = isConvex(m_pair, true) && isConvex(m_pair, false);
@@ -313,7 +313,7 @@ class Search {
   Penetration result() {
     if (m_best.last.elementA == kNoElement) {  // no exit was found in floating point
       const Vector3d middle = Vector3d::Constant(1.0 / 3.0);
-      const auto& [a, b] = firstMeeting();
+      const auto& [a, b] = firstIntersecting();
       m_best.last = {a, b, middle, middle, m_best.direction};
     }
     return {true, m_best.direction, m_best.depth, pointOf(true), pointOf(false), false};
@@ -339,7 +339,7 @@ Penetration penetrationOf(const Body& a, const Body& b, Engine engine, Penetrati
   const Penetration apart{false, Vector3d::Zero(), 0.0, none(a), none(b), true};
   if (a.mesh.topology.triangles.empty() || b.mesh.topology.triangles.empty()) return apart;
   const BodyPair pair(a, b, engine, scratch.pair, effort.moved);
-  if (!overlap(pair, scratch.meetings)) return apart;
+  if (!overlap(pair, scratch.intersecting)) return apart;
   return Search(pair, scratch, effort).run();
 }
 

@@ -25,7 +25,7 @@ struct PenetrationScratch {
   BodyPairScratch pair;
   Polytope difference;
   ShortestTranslation shortest;
-  CountedVector<BodyPair::Meeting> meetings;      ///< where a is not moved
+  CountedVector<BodyPair::IntersectingTriangles> intersecting;  ///< where a is not moved
   CountedVector<std::uint32_t> insideA, insideB;  ///< some vertices inside the other body
   CountedVector<Seed> seeds;
 };

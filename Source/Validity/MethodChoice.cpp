@@ -60,11 +60,11 @@ static void examineProximity(double thickness, PairPlan& plan) {
   plan.step.arcDeviation = plan.arcDeviation;
 }
 
-PairPlan planOf(const PairSettings& settings, const GeometryInStep& a, const GeometryInStep& b,
-                bool moves) {
-  PALPATE_ASSERT(supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh));
+PairPlan planOf(const SupportedPairs& support, const PairSettings& settings,
+                const GeometryInStep& a, const GeometryInStep& b, bool moves) {
+  PALPATE_ASSERT(&support == supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh));
   PairPlan plan;
-  plan.kind = supportOf(settings.method, a.type(), b.type(), &a.mesh == &b.mesh)->kind;
+  plan.kind = support.kind;
   plan.method = settings.method;
   StepPlan& step = plan.step;
   const double thickness = settings.thickness;

@@ -61,10 +61,10 @@ inline bool answersByFieldOfSecond(GeometryType first, const DistanceField* ofSe
   return ofSecond && first != GeometryType::Field;
 }
 
-/// Plans a pair's frame from valid settings and from how the geometries moved. moves: whether that
-/// motion is used; otherwise it counts as 0.
-PairPlan planOf(const PairSettings&, const GeometryInStep& a, const GeometryInStep& b,
-                bool moves = true);
+/// Plans a pair's frame from valid settings, the row of the table that answers them, and from how
+/// the geometries moved. moves: whether that motion is used; otherwise it counts as 0.
+PairPlan planOf(const SupportedPairs&, const PairSettings&, const GeometryInStep& a,
+                const GeometryInStep& b, bool moves = true);
 
 /// Whether the field can answer at this thickness: all contacts outside the body are in its band.
 bool isWithinBand(const DistanceField&, double thickness, double largestRadius);
