@@ -3,14 +3,13 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Queries/NearestElements.cpp"
 #include "Core/Simd.h"
 #include "Math/TriangleLanes.h"
-#include "Octree/BoxLanes.h"
+#include "Octree/WalkLanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
@@ -59,67 +58,16 @@ class Search {
   }
 
   HWY_ATTR void run() {
-    const OctreeBlock* const blocks = m_search.octree.blocks();
-    std::array<Siblings, kMaxLevels> path;
-    std::size_t depth = 0;
-    const OctreeBlock* block = blocks;
-    std::uint32_t slot = 0;
-    for (;;) {
-      const std::uint32_t begin = block->begin[slot];
-      if (block->isLeaf(slot)) {
-        addElements(begin, begin + block->count(slot));
-      } else {
-        const OctreeBlock& children = blocks[block->child[slot]];
-        addElements(begin, children.begin[0]);
-        PALPATE_ASSERT(depth < kMaxLevels);
-        setOrder(children, path[depth++]);
-      }
-      // The nearest sibling that was not visited, on the lowest level that has one within the
-      // bound.
-      std::uint32_t key = kVisited;
-      while (depth > 0 && (key = leastKey(path[depth - 1])) > m_limitKey) --depth;
-      if (depth == 0) break;
-      Siblings& siblings = path[depth - 1];
-      block = siblings.block;
-      slot = key % kChildren;
-      siblings.keys[slot] = kVisited;
-    }
+    walkAround(
+        m_search.octree, m_search.point.box(),
+        [&](std::uint32_t begin, std::uint32_t end) HWY_ATTR { addElements(begin, end); },
+        [&] { return m_limitKey; });
     test();
     if (m_candidates.size > 0) flush();
     leaveLanes();
   }
 
  private:
-  /// Eight siblings. A key is the bits of the squared distance of a box from the point, rounded
-  /// down, with the slot in the lowest three bits.
-  struct Siblings {
-    alignas(32) std::uint32_t keys[kChildren];
-    const OctreeBlock* block;
-  };
-  static constexpr std::uint32_t kVisited = 0xffffffff;  ///< or empty
-
-  HWY_ATTR HWY_INLINE void setOrder(const OctreeBlock& block, Siblings& siblings) const {
-    const NodeTag d;
-    const hn::RebindToUnsigned<NodeTag> du;
-    const FloatBox point = m_search.point.box();
-    for (std::size_t i = 0; i < kChildren; i += hn::Lanes(d)) {
-      const auto boxes = BoxLanes<NodeTag>::load(block, i);
-      const auto bits = hn::BitCast(du, boxes.distanceFrom(point));
-      const auto key =
-          hn::Or(hn::AndNot(hn::Set(du, 7), bits), hn::Iota(du, static_cast<std::uint32_t>(i)));
-      const auto used = hn::RebindMask(du, hn::Le(boxes.lower[0], boxes.upper[0]));
-      hn::Store(hn::IfThenElse(used, key, hn::Set(du, kVisited)), du, siblings.keys + i);
-    }
-    siblings.block = &block;
-  }
-  HWY_ATTR HWY_INLINE static std::uint32_t leastKey(const Siblings& siblings) {
-    const hn::RebindToUnsigned<NodeTag> du;
-    auto least = hn::Load(du, siblings.keys);
-    for (std::size_t i = hn::Lanes(du); i < kChildren; i += hn::Lanes(du))
-      least = hn::Min(least, hn::Load(du, siblings.keys + i));
-    return hn::GetLane(hn::MinOfLanes(du, least));
-  }
-
   /// Tests elements whose boxes are within the bound.
   HWY_ATTR HWY_INLINE void addElements(std::uint32_t begin, std::uint32_t end) {
     const LeafTag d;
@@ -145,7 +93,7 @@ class Search {
     const float reach = m_bound + m_search.tolerance + m_search.slack;
     m_limit = OutwardRounding::up(reach * reach * (1.0f + 0x1p-19f));
     if (!(m_limit >= 0)) m_limit = std::numeric_limits<float>::infinity();
-    m_limitKey = std::bit_cast<std::uint32_t>(m_limit) | 7;
+    m_limitKey = WaitingSiblings::keyOf(m_limit);
   }
   void lower(float bound) {
     if (!(bound < m_bound)) return;
