@@ -91,7 +91,10 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_treeVersion.commit(now);
 }
 
-double GeometryOctree::reach() const { return m_octree.box(0).reach() / m_frame.scale; }
+double GeometryOctree::reach() const {
+  PALPATE_ASSERT(m_octree.isBuilt());
+  return m_octree.box(0).reach() / m_frame.scale;
+}
 
 bool GeometryOctree::isCompact() const {
   return m_octree.isBuilt() && reach() <= 0x1p20 * m_spread;
@@ -173,6 +176,7 @@ void GeometryOctree::releaseMemory() {
 void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,
                                   FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
                                   bool reordered) {
+  PALPATE_ASSERT(groups.front() == 0 && groups.back() == m_ordered.size());
   const CountedVector<Triangle>& triangles = mesh.topology.triangles;
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
@@ -184,6 +188,7 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
 
 /// Computes the boxes of the triangles in m_ordered, and returns the bounds of all.
 FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
+  PALPATE_ASSERT(m_ordered.size() == mesh.topology.triangles.size());
   const std::size_t size = m_ordered.size(),
                     count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
   m_boundsGroups.resize(count + 1);
@@ -228,6 +233,7 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
 
 const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
+  PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.triangles.size());
   const MemoryScope memory(MemoryStage::Octrees);
   m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
   return m_stars.triangles();

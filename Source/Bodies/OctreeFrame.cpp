@@ -30,9 +30,13 @@ struct MapEnd {
     for (int k = 0; k < 3; ++k)
       for (int j = 0; j < 3; ++j) matrix[k][j] = rotation(k, j);
   }
-  void addTo(BoxMap& map) const { setEnd(map.ends[map.count++], matrix, offset, thickness, error); }
+  void addTo(BoxMap& map) const {
+    PALPATE_ASSERT(static_cast<std::size_t>(map.count) < std::size(map.ends));
+    setEnd(map.ends[map.count++], matrix, offset, thickness, error);
+  }
   /// dops: of the boxes that are mapped.
   void addTo(DopMap& map, const OctreeDops& dops) const {
+    PALPATE_ASSERT(static_cast<std::size_t>(map.count) < std::size(map.ends));
     map.directions = dops.directions;
     setEnd(map.ends[map.count++], dops, matrix, offset, thickness, error);
   }
@@ -68,6 +72,7 @@ Matrix3d inverseOf(const Matrix3d& m) {
 /// LooseOctree.md derives the bound of the errors.
 template <class F>
 void forEachBodyEnd(const Body& a, const Body& b, double thickness, bool wholeStep, F&& f) {
+  PALPATE_ASSERT(a.isPlaced() && b.isPlaced() && thickness >= 0.0);
   const FloatFrame &from = a.tree.frame(), &to = b.tree.frame();
   const double sizes =
       2.0 * (largest(from.origin) + a.tree.reach() + largest(to.origin) + b.tree.reach());
@@ -162,6 +167,7 @@ float boxErrorOf(const Body& a, const Body& b) {
 }
 
 TreePair treesOf(const Body& a, const Body& b, double thickness, bool wholeStep, BoxFrame frame) {
+  PALPATE_ASSERT(thickness >= 0.0);
   PALPATE_ASSERT(a.tree.isValid() && b.tree.isValid());
   PALPATE_ASSERT(a.tree.frame().scale == b.tree.frame().scale);
   TreePair trees{&a.tree.octree(), &b.tree.octree()};

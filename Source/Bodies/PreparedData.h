@@ -5,6 +5,7 @@
 #include "Mesh/FloatPositions.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TetrahedralTopology.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 
 #include <array>
@@ -28,6 +29,7 @@ class PreparedState {
            m_updates.load(std::memory_order_relaxed) == updates;
   }
   void commit(std::uint64_t state, std::uint64_t updates) {
+    PALPATE_ASSERT(state != 0);  // 0: nothing is prepared
     m_updates.store(updates, std::memory_order_relaxed);
     m_state.store(state, std::memory_order_release);
   }

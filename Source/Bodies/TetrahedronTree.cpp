@@ -57,6 +57,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
 }
 
 void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {
+  PALPATE_ASSERT(m_ordered.size() == m_octree.size() && m_octree.size() > 0);
   const std::span<const std::uint32_t> groups = m_octree.groups();
   threads.forChunks(groups.size() - 1, kGroupGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {

@@ -94,6 +94,7 @@ void GuardedParts::start(const GeometryTable& geometries, const GuardedPairs& pa
   }
   for (const GuardedVertex& v : settings.fixed)
     forEachPart(v, [&](std::uint32_t part) { m_isFixed[part] = 1; });
+  PALPATE_ASSERT(m_bodies.size() == m_geometries.size());
   for (const Body& body : m_bodies)
     for (std::uint32_t i = 0; i < body.nodeCount(); ++i)
       if (body.moves(i)) m_moves[partOf(body, i)] = 1;

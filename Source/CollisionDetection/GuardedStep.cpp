@@ -29,6 +29,7 @@ double between(double before, double now, double fraction) {
                     std::max(before, now));
 }
 Vector3d between(const Vector3d& before, const Vector3d& now, double fraction) {
+  PALPATE_ASSERT(fraction >= 0.0 && fraction <= 1.0);
   if (fraction == 1.0) return now;
   Vector3d p;
   for (int k = 0; k < 3; ++k) p[k] = between(before[k], now[k], fraction);
@@ -101,6 +102,7 @@ void GuardedFractions::shortenApproaching(const GuardedParts& parts, const Guard
   const auto canShorten = [&](const GuardedTouch::Mover& mover) {
     return parts.isFree(mover.part) && m_fraction[mover.part] > 0.0;
   };
+  PALPATE_ASSERT(touch.time >= 0.0 && touch.time <= 1.0);
   double approach = 0, others = 0;
   for (const GuardedTouch::Mover& mover : touch.movers)
     (mover.approach < 0 && canShorten(mover) ? approach : others) += mover.approach;
@@ -137,6 +139,7 @@ void GuardedFractions::shorten(const GuardedParts& parts, std::span<const Guarde
 void setShortened(const GuardedParts& parts, std::span<const double> fractions,
                   GeometryTable& geometries, const Threads& threads,
                   std::vector<Vector3d>& scratch) {
+  PALPATE_ASSERT(fractions.size() == parts.nodeCount());
   for (const GuardedParts::Body& body : parts.bodies()) {
     const GeometryId id = body.geometry->body.id;
     const TriangleMesh& mesh = body.geometry->body.mesh;

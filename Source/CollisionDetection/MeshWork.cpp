@@ -200,6 +200,7 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
 /// Auto: finds intersections at the step's end.
 void MeshWork::detectIntersections(std::span<const ElementPair> pairs, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
+  PALPATE_ASSERT(m_record->plan.runsIntersection);
   const MeshPair meshes = m_record->meshes();
   findIntersections(meshes, pairs, scratch.intersections);
   if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, scratch.intersections);
@@ -209,6 +210,7 @@ void MeshWork::findEarliest(const MeshPair& meshes, std::span<const ElementPair>
                             JobScratch& scratch) const {
   std::atomic<double>& earliest = m_record->earliest;
   const double found = findEarliestImpact(meshes, pairs, earliest.load(), scratch.contacts);
+  PALPATE_ASSERT(found >= 0.0);
   double known = earliest.load();
   while (found < known && !earliest.compare_exchange_weak(known, found)) {
   }

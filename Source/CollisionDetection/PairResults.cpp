@@ -52,6 +52,7 @@ std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {
 
 void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& statistics) {
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+  PALPATE_ASSERT(std::is_sorted(m_facts.verticesA.begin(), m_facts.verticesA.end()));
   contents.earliestTimeOfImpact = record.earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
   if (!record.guarded)
@@ -77,6 +78,7 @@ void keepDistinct(const PairRecord& record, DistinctContacts& distinct,
 }
 
 void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
+  PALPATE_ASSERT(record.pair.settings.continuous.earliestTimeOnly);
   const auto take = [&](auto& list, int = 0) {
     for (const auto& contact : list)
       record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);

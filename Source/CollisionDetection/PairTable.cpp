@@ -1,5 +1,6 @@
 #include "CollisionDetection/PairTable.h"
 
+#include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Mesh/RestDistance.h"
@@ -53,6 +54,8 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
 }
 
 void PairRecord::commit() noexcept {
+  PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
+                 sizeOf(CollisionData::Contents::of(next)));
   std::swap(data, next);
   hasData = true;
   dataVersion.commit(state());

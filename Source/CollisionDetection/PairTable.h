@@ -57,6 +57,7 @@ struct PairRecord : CountedObject {
   /// Whether a distance field answers in this frame.
   bool usesField() const { return plan.kind == PairKind::Field; }
   const Geometry& body() const {  ///< if usesField()
+    PALPATE_ASSERT(usesField());
     return answersByFieldOfSecond(a->body.mesh.topology.type, b->body.field.get()) ? *b : *a;
   }
   PlacedField placedField() const {
@@ -85,7 +86,10 @@ struct PairRecord : CountedObject {
   /// For a pair with a shape, or if usesField(): the geometry with elements.
   const Geometry& mesh() const { return a->body.shape || (usesField() && &body() == a) ? *b : *a; }
   /// Of a shape and a mesh: the shape.
-  const Geometry& shape() const { return a->body.shape ? *a : *b; }
+  const Geometry& shape() const {
+    PALPATE_ASSERT(a->body.shape || b->body.shape);
+    return a->body.shape ? *a : *b;
+  }
 
   /// Whether stored boxes may enclose the whole step though this pair's method needs only its end.
   bool hasWiderBoxes() const {

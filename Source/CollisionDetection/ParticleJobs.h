@@ -27,6 +27,7 @@ class ParticleJobs {
   /// Finds the hits of a job's particles.
   void find(std::size_t job, JobScratch& scratch) const {
     const std::size_t begin = job * kParticlesPerJob;
+    PALPATE_ASSERT(begin < m_points->now.size());
     find(begin, std::min(m_points->now.size(), begin + kParticlesPerJob), false, scratch);
   }
   /// Finds those of all particles, whose leaves it finds among all leaves.

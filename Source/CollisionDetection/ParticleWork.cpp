@@ -78,6 +78,7 @@ void ParticleWork::runByBruteForce(JobScratch& scratch) {
 
 void ParticleWork::writeHits(JobScratch& scratch) const {
   auto& found = scratch.contacts.shapes.shape;
+  PALPATE_ASSERT(std::is_sorted(scratch.hits.others.begin(), scratch.hits.others.end()));
   found.resize(scratch.hits.count);
   m_particles.write(scratch, found.data());
 }

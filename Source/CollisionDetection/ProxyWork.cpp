@@ -1,6 +1,7 @@
 #include "CollisionDetection/ProxyWork.h"
 
 #include "CollisionDetection/PairResults.h"
+#include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
 
@@ -29,6 +30,7 @@ void ProxyWork::runByBruteForce(JobScratch& scratch) {
 
 void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
+  PALPATE_ASSERT(record.plan.kind == PairKind::Proxy);
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   contents.vertexTriangle.clear();
   contents.triangleVertex.clear();

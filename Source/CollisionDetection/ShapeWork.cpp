@@ -34,6 +34,7 @@ std::size_t ShapeWork::start(const FrameStart&) const {
 
 void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
   const PairRecord& record = *m_record;
+  PALPATE_ASSERT(record.shape().body.shape);
   if (record.plan.kind == PairKind::MeshAndShape) {
     const PlacedShape& shape = *record.shape().body.shape;
     findElementsNear(record.mesh().body, record.plan.swept() ? shape.before : shape.now, shape.now,

@@ -93,6 +93,7 @@ int signBeforeEnd(const Form<3>& form) {
 }
 
 void removeRootsAtStart(Form<3>& form) {
+  PALPATE_ASSERT(!isZero(form));
   while (form[0] == 0) form = {form[1], form[2], form[3], 0};
 }
 
@@ -113,6 +114,7 @@ CriticalPoints criticalPoints(const Form<3>& form) {
 
 CubicTime::CubicTime(const Form<3>& cubic, int cell, int rising, double lower, double upper)
     : m_cubic(cubic), m_cell(cell), m_rising(rising) {
+  PALPATE_ASSERT(cell >= 0 && cell <= 2 && (rising == 1 || rising == -1));
   bracket(lower, upper);
 }
 
@@ -161,6 +163,7 @@ void CubicTime::bracket(double lower, double upper) {
 }
 
 double CubicTime::timeLowerBound(double tolerance) const {
+  PALPATE_ASSERT(tolerance > 0.0 && m_low <= m_high);
   double low = m_low, high = m_high;
   while (high - low > tolerance) {
     const double middle = 0.5 * (low + high);

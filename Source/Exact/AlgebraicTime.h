@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Exact/Exact.h"
+#include "Core/Assert.h"
 
 #include <array>
 #include <cstddef>
@@ -87,6 +88,7 @@ bool anyRootInside(Form<3> cubic, F&& f);
 
 template <std::size_t N>
 int QuadraticTime::sign(const std::array<Integer, N>& form) const {
+  PALPATE_ASSERT(r > 0 && d >= 0 && q >= -1 && q <= 1);
   // Horner's scheme in numbers a + b √d. The result is multiplied by r^(N-1) > 0.
   Integer a = form[N - 1], b, power = r, next;
   for (std::size_t i = N - 1; i-- > 0;) {

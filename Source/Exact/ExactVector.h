@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Exact/Exact.h"
+#include "Core/Assert.h"
 
 #include <array>
 #include <cstdint>
@@ -41,6 +42,9 @@ Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
 /// of 64 bits must stay below 2^61.
 template <class T>
 auto volumeOf(const Vector<T>& u, const Vector<T>& v, const Vector<T>& w) {
+  if constexpr (std::is_same_v<T, std::int64_t>)
+    for (const Vector<T>* all : {&u, &v, &w})
+      for (const T x : *all) PALPATE_ASSERT(x >> 61 == 0 || x >> 61 == -1);
   const Vector<Wide<T>> normal = cross(u, v);
   using Volume = decltype(product(normal[0], w[0]));  // not auto: sums of Integers are expressions
   return Volume(product(normal[0], w[0]) + product(normal[1], w[1]) + product(normal[2], w[2]));

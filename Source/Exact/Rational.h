@@ -55,6 +55,7 @@ struct Rational {
 
 /// The value of a finite double.
 inline Rational rational(double value) {
+  PALPATE_ASSERT(std::isfinite(value));
   const auto parts = splitDouble(value);
   Rational result{parts.mantissa, 1};
   if (parts.exponent >= 0)
@@ -67,6 +68,7 @@ inline Rational rational(double value) {
 inline double toDouble(const Rational& a) { return quotient(a.numerator, a.denominator, 0); }
 /// Sign of a - b.
 inline int compare(const Rational& a, const Rational& b) {
+  PALPATE_ASSERT(a.denominator > 0 && b.denominator > 0);
   return sgn(Integer(a.numerator * b.denominator - b.numerator * a.denominator));
 }
 /// Sign of a - b, where b may be infinite.

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Core/Assert.h"
+
 #include <Eigen/Core>
 
 #include <algorithm>
@@ -154,6 +156,7 @@ struct FixedGrid {
     const auto [mantissa, exponent] = splitDouble(x);
     if (mantissa == 0) return 0;
     const int shift = exponent - lowest;
+    PALPATE_ASSERT(shift <= 67 && (shift >= 0 || mantissa >> -shift << -shift == mantissa));
     const Int128 magnitude = shift >= 0 ? Int128{mantissa} << shift : Int128{mantissa >> -shift};
     return x < 0 ? -magnitude : magnitude;
   }

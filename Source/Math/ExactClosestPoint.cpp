@@ -233,6 +233,7 @@ struct RoundDistance {
 
 /// Sign of a + b times the root of c / d, for c >= 0 and d > 0.
 int signOfSum(const Integer& a, const Integer& b, const Integer& c, const Integer& d) {
+  PALPATE_ASSERT(c >= 0 && d > 0);
   const int root = sgn(c) == 0 ? 0 : sgn(b);
   if (root == 0 || sgn(a) == root) return sgn(a);
   return root * sgn(Integer(b * b * c - a * a * d));
@@ -273,6 +274,7 @@ Rational difference(const Rational& a, const Rational& b) {
 
 /// Sign of the root of a less the root of b, less c.
 int compareRoots(const Rational& a, const Rational& b, const Rational& c) {
+  PALPATE_ASSERT(a.numerator >= 0 && b.numerator >= 0 && c.denominator > 0);
   if (c.numerator < 0) return -compareRoots(b, a, {-c.numerator, c.denominator});
   // a - b - c² against 2 c times the root of b
   const Integer cc = c.numerator * c.numerator, dd = c.denominator * c.denominator,

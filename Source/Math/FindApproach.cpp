@@ -3,6 +3,7 @@
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -170,6 +171,7 @@ ImpactResult findScaled(const ImpactQuery& query, double distance, double tolera
 
 ImpactResult findApproach(const ImpactQuery& query, double distance, double tolerance,
                           double upTo) {
+  PALPATE_ASSERT(distance > 0.0 && tolerance >= kSmallestTimeTolerance && tolerance <= 1.0);
   return query.kind == Kind::VertexTriangle
              ? findScaled<Kind::VertexTriangle>(query, distance, tolerance, upTo)
              : findScaled<Kind::EdgeEdge>(query, distance, tolerance, upTo);

@@ -5,6 +5,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Exact/Rational.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -102,6 +103,7 @@ bool varies(Kind kind, const FeatureRadii& radii) {
 }  // namespace
 
 ImpactResult findNearing(const ImpactQuery& query, const FeatureRadii& radii, double tolerance) {
+  PALPATE_ASSERT(*std::min_element(radii.begin(), radii.end()) >= 0.0 && tolerance > 0.0);
   const int second = firstOfSecond(query.kind);
   const double radius = *std::max_element(radii.begin(), radii.begin() + second) +
                         *std::max_element(radii.begin() + second, radii.end());

@@ -3,6 +3,7 @@
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
 #include "Exact/CubicRoot.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <optional>
@@ -213,6 +214,7 @@ ImpactResult find(const ImpactQuery& query, double tolerance, double upTo) {
 }  // namespace
 
 ImpactResult findTouch(const ImpactQuery& query, double tolerance, double upTo) {
+  PALPATE_ASSERT(tolerance >= kSmallestTimeTolerance && tolerance <= 1.0);
   return query.kind == Kind::VertexTriangle ? find<Kind::VertexTriangle>(query, tolerance, upTo)
                                             : find<Kind::EdgeEdge>(query, tolerance, upTo);
 }

@@ -213,6 +213,7 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
 }  // namespace
 
 ImpactResult findTouchExactly(const ImpactQuery& query, double tolerance) {
+  PALPATE_ASSERT(tolerance > 0.0);
   const std::optional<double> time = ExactQuery(query).firstTouch(tolerance);
   return {time.has_value(), true, time.value_or(0.0)};
 }

@@ -2,6 +2,7 @@
 
 #include "Math/ExactClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -197,6 +198,7 @@ Foot footBetweenEdges(const EdgePair& edges) {
     };
     return atModerateScale(extent, find, exact::footBetweenLines, p0, p1, q0, q1);
   }
+  PALPATE_ASSERT(p0 != p1 && q0 != q1);
   std::optional<Foot> foot = footOnPlane(m, u, v, Range::MinusOneToOne, extent);
   if (!foot || !hasRightDistance(*foot, p0, p1, q0, q1))
     return exact::footBetweenLines(p0, p1, q0, q1);

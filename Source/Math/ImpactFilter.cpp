@@ -1,6 +1,7 @@
 #include "Math/ImpactFilter.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <limits>
@@ -196,6 +197,7 @@ HWY_EXPORT(mayImpactKernel);
 
 std::uint8_t mayImpact(ImpactQuery::Kind kind, const ImpactBlock& block,
                        const TimeOfImpactSettings& settings) {
+  PALPATE_ASSERT(settings.timeTolerance >= kSmallestTimeTolerance && settings.timeTolerance <= 1.0);
   return static_cast<std::uint8_t>(HWY_DYNAMIC_DISPATCH(mayImpactKernel)(
       kind, block, std::max(settings.minimumDistance, 0.0), settings.timeTolerance));
 }

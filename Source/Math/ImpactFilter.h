@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Math/ImpactQuery.h"
+#include "Core/Assert.h"
 
 #include <cstdint>
 
@@ -12,6 +13,7 @@ struct ImpactBlock {
   alignas(64) double positions[4][2][3][kLanes] = {};  ///< vertex, end of the step, coordinate
 
   void set(int lane, int vertex, const Eigen::Vector3d& before, const Eigen::Vector3d& now) {
+    PALPATE_ASSERT(lane >= 0 && lane < kLanes && vertex >= 0 && vertex < 4);
     for (int k = 0; k < 3; ++k) {
       positions[vertex][0][k][lane] = before[k];
       positions[vertex][1][k][lane] = now[k];

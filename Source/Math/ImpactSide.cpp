@@ -6,6 +6,7 @@
 #include "Math/Tolerances.h"
 #include "Exact/CubicRoot.h"
 #include "Exact/ExactVector.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -77,6 +78,7 @@ bool stayInAxisPlane(const ImpactQuery& query) {
 }  // namespace
 
 int sideBefore(const ImpactQuery& query, double time, std::size_t* exactDecisions) {
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   if (stayInAxisPlane(query)) return 0;
   return query.kind == ImpactQuery::Kind::VertexTriangle
              ? side<ImpactQuery::Kind::VertexTriangle>(query, time, exactDecisions)
@@ -84,6 +86,7 @@ int sideBefore(const ImpactQuery& query, double time, std::size_t* exactDecision
 }
 
 std::array<Eigen::Vector3d, 4> positionsAt(const ImpactQuery& query, double time) {
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   std::array<Eigen::Vector3d, 4> p;
   const auto place = [&](const Eigen::Vector3d& start, const Eigen::Vector3d& end) {
     for (int i = 0; i < 4; ++i)
@@ -176,6 +179,7 @@ Vector3d partAcross(const Vector3d& vector, const std::array<ImpactQuery::Differ
 }  // namespace
 
 std::optional<Approach> approachOf(const ImpactQuery& given, double time) {
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   const ImpactQuery query = withoutDenormals(given);
   const ClosestPoints closest = closestPointsBefore(query, time);
   if (closest.distance == 0.0) return {};

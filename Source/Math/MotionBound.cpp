@@ -2,6 +2,7 @@
 
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -44,6 +45,7 @@ double motionBound(const ImpactQuery& query) {
 
 template <ImpactQuery::Kind kind>
 bool mayHaveTouched(const ImpactQuery& query, double distance, double motionLimit) {
+  PALPATE_ASSERT(motionLimit >= 0.0);
   return distance <= motionLimit + kMotionError * (motionLimit + sizeAtEnd<kind>(query)) &&
          distance <= motionBound<kind>(query);
 }

@@ -2,6 +2,7 @@
 
 #include "Math/ImpactQuery.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <array>
 #include <optional>
@@ -40,6 +41,7 @@ bool certainlyPart(const ImpactQuery&);
 template <class ClearanceAt>
 std::optional<double> timeOfNoClearance(double motion, double tolerance,
                                         ClearanceAt&& clearanceAt) {
+  PALPATE_ASSERT(motion >= 0.0 && tolerance > 0.0);
   double time = 0;
   for (int i = 0; i < kMostClearances; ++i) {
     const double clearance = clearanceAt(time);
@@ -47,6 +49,7 @@ std::optional<double> timeOfNoClearance(double motion, double tolerance,
     if (!(clearance < (1.0 - time) * motion)) return {};
     time += clearance / motion * (1.0 - kQuotientError);
   }
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   return time;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Core>
 
@@ -51,7 +52,9 @@ struct TangentPlane {
       : up(normal),
         height(normal.dot(point) + radius),
         gap(gapAtEnd),
-        slack(kPlaneShare * thickness + kNormalConeError * (point.lpNorm<1>() + radius)) {}
+        slack(kPlaneShare * thickness + kNormalConeError * (point.lpNorm<1>() + radius)) {
+    PALPATE_ASSERT(radius >= 0.0 && thickness >= 0.0);
+  }
 
   /// Whether a ball of the body touches the plane from behind.
   bool touches(const Eigen::Vector3d& centre, double radius) const {

@@ -2,6 +2,7 @@
 
 #include "Math/ExactClosestPoint.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,7 @@ enum class RayCrossing : std::int8_t {
 inline RayCrossing crossRay(int axis, bool against, const Eigen::Vector3d& p,
                             const Eigen::Vector3d& a, const Eigen::Vector3d& b,
                             const Eigen::Vector3d& c, SignCounts& counts) {
+  PALPATE_ASSERT(axis >= 0 && axis < 3);
   const int y = axis == 2 ? 0 : axis + 1, z = axis == 0 ? 2 : axis - 1;
   bool isOnEdge = false;  // p, seen along the axis, is on the line of an edge
   const auto turn = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {

@@ -162,6 +162,7 @@ RayInterval intervalOf(const RayProblem& problem, const RationalInterval& interv
 int compareRayEnds(const RaySegment& ray, const RayEnd& one, const RayEnd& two) {
   const auto end = [&](const RayEnd& of) {
     const auto interval = intersect(ray, RayProblem(ray, of.a, of.b, of.c));
+    PALPATE_ASSERT(interval);
     return of.last ? interval->last : interval->first;
   };
   return compare(end(one), end(two));
@@ -174,7 +175,6 @@ namespace {
 std::optional<RayInterval> intersectRayExactly(const RaySegment& ray, const Eigen::Vector3d& a,
                                                const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                                                std::size_t* exactDecisions) {
-  PALPATE_ASSERT(ray.direction != Eigen::Vector3d::Zero() && ray.tMin <= ray.tMax);
   if (exactDecisions) ++*exactDecisions;
   const exact::RayProblem problem(ray, a, b, c);
   const auto interval = exact::intersect(ray, problem);
@@ -215,6 +215,7 @@ struct CrossProduct {
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                                         std::size_t* exactDecisions) {
+  PALPATE_ASSERT(!ray.direction.isZero(0.0) && ray.tMin <= ray.tMax);
   const Eigen::Vector3d p = a - ray.origin, q = b - ray.origin, r = c - ray.origin;
   // The volumes of the ray's direction with each edge, as seen from the origin.
   const CrossProduct first(ray.direction, p);

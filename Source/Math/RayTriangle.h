@@ -1,10 +1,12 @@
 #pragma once
 
 #include "Exact/ErrorBounds.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Core>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -61,6 +63,7 @@ class LineFilter {
   LineFilter(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, int largestComponent,
              double extent, double error)
       : m_axes{(largestComponent + 1) % 3, (largestComponent + 2) % 3, largestComponent} {
+    PALPATE_ASSERT(std::abs(direction[largestComponent]) == 1.0 && extent >= 0.0 && error >= 0.0);
     for (int k = 0; k < 3; ++k) m_origin[k] = origin[m_axes[k]];
     for (int k = 0; k < 2; ++k) m_slope[k] = direction[m_axes[k]] * direction[largestComponent];
     // Products of larger coordinates might overflow.

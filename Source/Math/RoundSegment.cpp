@@ -4,6 +4,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -55,6 +56,7 @@ void forEachBelow(double a, double b, double c, const Range& within, F&& f) {
 
 double nearestBall(const Eigen::Vector3d& x, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                    double radiusP, double radiusQ) {
+  PALPATE_ASSERT(radiusP >= 0.0 && radiusQ >= 0.0);
   const double scale =
       scaleTowardsOne(std::max({largest(x - p), largest(q - p), radiusP, radiusQ}));
   const Eigen::Vector3d m = scale * (x - p), u = scale * (q - p);
@@ -69,6 +71,7 @@ double nearestBall(const Eigen::Vector3d& x, const Eigen::Vector3d& p, const Eig
 
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
                                         const Eigen::Vector3d& q, double radiusP, double radiusQ) {
+  PALPATE_ASSERT(radiusP >= 0.0 && radiusQ >= 0.0);
   // The direction has length 1 here, and s = 0 where the ray is nearest to the segment's middle.
   const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length, middle = 0.5 * p + 0.5 * q;
@@ -132,6 +135,7 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
                                         const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                                         double radius) {
+  PALPATE_ASSERT(radius > 0.0);
   // The body is convex: it is the union of three capsules and of the prism between the triangle's
   // two copies at the radius from its plane.
   std::optional<RayInterval> all;

@@ -3,6 +3,7 @@
 
 #include "Math/ImpactQuery.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 #include "Core/FloatingPoint.h"
 
 #include <algorithm>
@@ -15,9 +16,11 @@ ImpactResult findImpact(const ImpactQuery& query, const TimeOfImpactSettings& se
   const double tolerance = settings.timeTolerance > kSmallestTimeTolerance
                                ? std::min(settings.timeTolerance, 1.0)
                                : kSmallestTimeTolerance;
-  return settings.minimumDistance > 0.0
-             ? findApproach(query, settings.minimumDistance, tolerance, upTo)
-             : findTouch(query, tolerance, upTo);
+  const ImpactResult result = settings.minimumDistance > 0.0
+                                  ? findApproach(query, settings.minimumDistance, tolerance, upTo)
+                                  : findTouch(query, tolerance, upTo);
+  PALPATE_ASSERT(!result.impact || (result.time >= 0.0 && result.time <= 1.0));
+  return result;
 }
 
 namespace {

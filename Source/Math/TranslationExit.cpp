@@ -1,6 +1,7 @@
 #include "Math/TranslationExit.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -84,6 +85,7 @@ class Search {
 }  // namespace
 
 TranslationExit lastTouch(const Corners& a, const Corners& b, const Vector3d& direction) {
+  PALPATE_ASSERT(!direction.isZero(0.0));
   return Search(a, b, direction).run();
 }
 

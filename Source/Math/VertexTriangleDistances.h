@@ -2,6 +2,8 @@
 
 #include <palpate/FeaturePairs.h>
 
+#include "Core/Assert.h"
+
 #include <cstddef>
 #include <cstdint>
 
@@ -14,6 +16,7 @@ struct TriangleBatch {
 
   void set(std::size_t i, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
            const Eigen::Vector3d& c) {
+    PALPATE_ASSERT(i < kSize);
     for (int k = 0; k < 3; ++k) {
       corners[0][k][i] = a[k];
       corners[1][k][i] = b[k];

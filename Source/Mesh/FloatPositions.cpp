@@ -1,6 +1,7 @@
 #include "Mesh/FloatPositions.h"
 
 #include "Math/Range.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -114,6 +115,7 @@ HWY_EXPORT(toFloatsKernel);
 
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
               FloatPoint* out) {
+  PALPATE_ASSERT(frame.scale > 0.0);
   HWY_DYNAMIC_DISPATCH(toFloatsKernel)(positions.data(), positions.size(), frame, out);
 }
 

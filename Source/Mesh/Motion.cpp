@@ -2,6 +2,7 @@
 
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cmath>
@@ -70,6 +71,7 @@ void MotionRange::add(const MotionRange& other) {
 }
 
 MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector3d> now) {
+  PALPATE_ASSERT(before.size() == now.size());
   MotionRange range;
   const std::size_t blocks = now.size() / kVertices;
   if (blocks > 0) {
@@ -84,6 +86,7 @@ MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector
 }
 
 MotionRange motionRange(const Positions& before, const Positions& now) {
+  PALPATE_ASSERT(before.size() == now.size());
   if (!before.isPlaced() && !now.isPlaced()) return motionRange(before.body(), now.body());
   MotionRange range;
   for (std::size_t i = 0; i < now.size(); ++i)

@@ -40,6 +40,7 @@ class Positions {
   std::size_t size() const { return m_body->size(); }
   /// In the world.
   Eigen::Vector3d operator[](std::size_t vertex) const {
+    PALPATE_ASSERT(vertex < m_body->size());
     return m_placed ? m_transform(m_data[vertex]) : m_data[vertex];
   }
   std::vector<Eigen::Vector3d> all() const {

@@ -4,6 +4,7 @@
 
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <atomic>
@@ -91,6 +92,7 @@ class ShortestPaths {
         if (v > from) out.push_back(v);
       std::sort(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
     }
+    PALPATE_ASSERT(m_waiting == 0);
     for (const std::uint32_t v : m_reached) m_pathLength[v] = kUnreached;
     m_reached.clear();
   }
@@ -135,6 +137,7 @@ class ShortestPaths {
 
 IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
                           double distance, const Threads& threads) {
+  PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
   const EdgeLists edges(topology, rest, distance);
   const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
   IndexLists lists;
@@ -157,6 +160,7 @@ IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::V
     throw Error(ErrorCode::TooLarge,
                 "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
   for (std::size_t v = 0; v < count; ++v) lists.offsets[v + 1] += lists.offsets[v];
+  PALPATE_ASSERT(lists.offsets.back() == pairs);
   lists.items.reserve(pairs);
   for (CountedVector<std::uint32_t>& part : found) {
     lists.items.insert(lists.items.end(), part.begin(), part.end());

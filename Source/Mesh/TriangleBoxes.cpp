@@ -1,5 +1,9 @@
 #include "Mesh/TriangleBoxes.h"
 
+#include "Core/Assert.h"
+
+#include <algorithm>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Mesh/TriangleBoxes.cpp"
 #include "Core/Simd.h"
@@ -105,6 +109,7 @@ HWY_EXPORT(triangleBoxesKernel);
 void triangleBoxes(const FloatPoint* vertices, const FloatPoint* before, const Triangle* triangles,
                    std::span<const std::uint32_t> groups, BoxArrays& boxes, FloatBox* groupBoxes) {
   if (groups.size() < 2) return;
+  PALPATE_ASSERT(std::is_sorted(groups.begin(), groups.end()));
   HWY_DYNAMIC_DISPATCH(triangleBoxesKernel)(vertices, before, triangles, groups, boxes, groupBoxes);
 }
 

@@ -78,6 +78,7 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   const auto assignOwner = [&](std::uint32_t item, std::uint32_t owner, const auto& held,
                                auto&& bitOf) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
+    PALPATE_ASSERT(place < 3);
     owners[owner] |= static_cast<std::uint8_t>(bitOf(static_cast<int>(place)));
   };
   std::size_t untested = 0;
@@ -91,6 +92,7 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   CountedVector<std::uint8_t> closedStars(vertexCount, 1);
   const auto isForward = [&](std::uint32_t e, std::uint32_t triangle) {
     const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
+    PALPATE_ASSERT(side != triangleEdges[triangle].end());
     return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {

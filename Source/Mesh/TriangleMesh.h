@@ -113,6 +113,7 @@ struct TriangleMesh {
   bool outerSideOnly = false;             ///< Sidedness::Outer
 
   double radius(std::uint32_t vertex) const {
+    PALPATE_ASSERT(radii.empty() || vertex < radii.size());
     return radii.empty() ? largestRadius : radii[vertex];
   }
   /// The radius at p0 + weight (p1 - p0).

@@ -4,6 +4,7 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <array>
 #include <cstddef>
@@ -85,6 +86,7 @@ void divide(const MeshPair& pair, std::span<const ElementPair> candidates, Conta
 }  // namespace
 
 void findAuto(const MeshPair& pair, std::span<const ElementPair> candidates, ContactBuffers& out) {
+  PALPATE_ASSERT(pair.step.reportsImpacts && pair.step.slowMotion >= 0.0);
   divide(pair, candidates, out);
   if (pair.floats) {
     FloatPair atEnd = *pair.floats;

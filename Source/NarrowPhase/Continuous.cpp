@@ -10,6 +10,7 @@
 #include "Math/MotionBound.h"
 #include "Math/Nearing.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -51,6 +52,7 @@ bool boxesMeet(const ImpactQuery& query, double distance) {
 template <bool kSwapped, Kind kind, class F>
 void filterPairs(const Features<kind>& features, std::span<const FeaturePair> pairs,
                  const TimeOfImpactSettings& settings, F&& f) {
+  PALPATE_ASSERT(!kSwapped || kind == Kind::VertexTriangle);
   ImpactBlock block;
   const auto test = [&](const FeaturePair& pair, auto&& with) {
     return kSwapped ? with(pair.b, pair.a) : with(pair.a, pair.b);
@@ -106,6 +108,7 @@ class ContactFinder {
   template <Kind kind>
   bool operator()(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
                   bool swapped) {
+    PALPATE_ASSERT(!m_pair.self() || kind == Kind::VertexTriangle || firstId < secondId);
     const ImpactQuery query = features.query(firstId, secondId);
     const ImpactResult answer =
         m_pair.keepsApart ? findNearing(query, radiiOf(m_pair, features, firstId, secondId),
@@ -121,6 +124,7 @@ class ContactFinder {
   template <Kind kind>
   bool add(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
            bool swapped, const ImpactQuery& query, double time, bool store) {
+    PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
     const std::array<Vector3d, 4> p = positionsAt(query, time);
     std::array<MeshFeature, 2> closestFeatures;
     const auto complete = [&](auto& contact) {
@@ -132,6 +136,7 @@ class ContactFinder {
                                              {closestFeatures[swapped], closestFeatures[!swapped]},
                                              time, contact.normal, m_out.exactDecisions);
       contact.normal = normal.direction;
+      PALPATE_ASSERT(!contact.normal.isZero(0.0));
       m_out.facts.sideUnknown |= !normal.isSideKnown;
     };
     if (m_pair.settings.continuous.earliestTimeOnly) m_out.facts.clearance = 0.0;
@@ -271,6 +276,7 @@ double findEarliestImpact(const MeshPair& pair, std::span<const ElementPair> can
          finder.add(features, firstId, secondId, swapped, query, answer.time, false)))
       earliest = answer.time;
   };
+  PALPATE_ASSERT(earliest >= 0.0);
   if (earliest <= 0.0) return earliest;
   MeshPair boxed = pair;
   FloatPair floats;

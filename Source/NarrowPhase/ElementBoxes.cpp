@@ -1,6 +1,7 @@
 #include "NarrowPhase/ElementBoxes.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -56,6 +57,7 @@ class BoxCache {
 
 void keepOverlapping(const MeshPair& meshes, bool swept, double thickness,
                      Buffer<ElementPair>& pairs) {
+  PALPATE_ASSERT(thickness >= 0.0);
   BoxCache ofA(meshes.a, swept), ofB(meshes.b, swept);
   std::erase_if(pairs, [&](const ElementPair& pair) {
     return !mayBeWithin(ofA.box(pair.a), ofB.box(pair.b), thickness);

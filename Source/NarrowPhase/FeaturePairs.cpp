@@ -2,6 +2,7 @@
 
 #include "NarrowPhase/FeatureTests.h"
 #include "Math/Box.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -410,11 +411,16 @@ HWY_EXPORT(keepOverlappingKernel);
 
 void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatPair* floats,
                       std::span<const ElementPair> pairs, FeaturePairs& out) {
+  PALPATE_ASSERT(!floats || (!floats->a == !floats->b && !floats->beforeA == !floats->beforeB &&
+                             floats->upTo >= 0.0f && floats->upTo <= 1.0f));
   HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats ? *floats : FloatPair{}, pairs, out);
+  PALPATE_ASSERT(out.vertexTriangle.size() + out.triangleVertex.size() + out.edgeEdge.size() <=
+                 out.owned);
 }
 
 void keepOverlapping(const MeshTopology& a, const MeshTopology& b, const FloatPair& floats,
                      Buffer<ElementPair>& pairs) {
+  PALPATE_ASSERT(floats.a && floats.b);
   HWY_DYNAMIC_DISPATCH(keepOverlappingKernel)(a, b, floats, pairs);
 }
 

@@ -1,6 +1,7 @@
 #include "NarrowPhase/Filters.h"
 
 #include "Math/ClosestPoint.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -66,6 +67,7 @@ class Surface {
   }
   double angleAt(std::uint32_t triangle, std::uint32_t vertex) const {
     Triangle corners = m_mesh.topology.triangles[triangle];
+    PALPATE_ASSERT(std::find(corners.begin(), corners.end(), vertex) != corners.end());
     while (corners[0] != vertex) corners = {corners[1], corners[2], corners[0]};
     const Vector3d p = at(vertex);
     return angleBetween((at(corners[1]) - p).stableNormalized(),
@@ -89,10 +91,11 @@ class Surface {
   bool isSecondBelowFirst(std::uint32_t edge, const std::array<std::uint32_t, 2>& triangles) const {
     const Segment& ends = m_mesh.topology.edges[edge];
     const Triangle& corners = m_mesh.topology.triangles[triangles[1]];
-    const std::uint32_t across = *std::find_if(corners.begin(), corners.end(), [&](auto corner) {
+    const auto across = std::find_if(corners.begin(), corners.end(), [&](auto corner) {
       return corner != ends[0] && corner != ends[1];
     });
-    return (at(across) - at(ends[0])).dot(normalOf(triangles[0])) < 0.0;
+    PALPATE_ASSERT(across != corners.end());
+    return (at(*across) - at(ends[0])).dot(normalOf(triangles[0])) < 0.0;
   }
 
   const TriangleMesh& m_mesh;
@@ -127,6 +130,7 @@ bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vecto
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,
                   const Vector3d& direction, double time) {
+  PALPATE_ASSERT(!direction.isZero(0.0) && time >= 0.0 && time <= 1.0);
   return (pair.a.outerSideOnly && Surface(pair.a, time).isBelow(features[0], -direction)) ||
          (pair.b.outerSideOnly && Surface(pair.b, time).isBelow(features[1], direction));
 }

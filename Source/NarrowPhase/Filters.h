@@ -2,6 +2,7 @@
 
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Proximity.h"
+#include "Core/Assert.h"
 
 #include <cstdint>
 
@@ -15,6 +16,7 @@ namespace palpate {
 template <class Vertices, class Others>
 bool areNearAtRest(const MeshPair& pair, const Vertices& vertices, const Others& others) {
   if (!pair.nearAtRest) return false;
+  PALPATE_ASSERT(pair.self());
   for (const std::uint32_t v : vertices)
     for (const std::uint32_t w : others) {
       const auto after = (*pair.nearAtRest)[std::min(v, w)];

@@ -10,6 +10,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/TriangleIntersection.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <bit>
@@ -50,7 +51,10 @@ ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) 
 }
 
 /// The corner between two edges, given as bits.
-int sharedCorner(unsigned twoEdges) { return twoEdges == 0b011 ? 1 : twoEdges == 0b110 ? 2 : 0; }
+int sharedCorner(unsigned twoEdges) {
+  PALPATE_ASSERT(std::popcount(twoEdges) == 2);
+  return twoEdges == 0b011 ? 1 : twoEdges == 0b110 ? 2 : 0;
+}
 
 /// The contacts of two triangles that intersect.
 class IntersectionContacts {
@@ -60,6 +64,7 @@ class IntersectionContacts {
       : m_pair(pair), m_a(a), m_b(b), m_out(out), m_check(pair, out), m_self(pair.self()) {}
 
   void addPierced(unsigned edgesOfA, unsigned edgesOfB) {
+    PALPATE_ASSERT(std::popcount(edgesOfA) + std::popcount(edgesOfB) <= 2);
     if (std::popcount(edgesOfA) == 2) {
       addCornerOfA(sharedCorner(edgesOfA));
     } else if (std::popcount(edgesOfB) == 2) {
@@ -220,6 +225,7 @@ TriangleIntersection intersectionOf(const MeshPair& pair, bool atStart, const El
 }
 
 void turnToFront(const Corners& triangle, VertexTriangleDistance& answer) {
+  PALPATE_ASSERT(answer.distance > 0.0);
   // At a face this is the direction of the difference, and has the same bits for every vertex.
   answer.normal = answer.feature == TriangleFeature::Face
                       ? windingNormal(triangle[0], triangle[1], triangle[2])

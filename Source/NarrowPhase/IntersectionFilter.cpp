@@ -1,6 +1,7 @@
 #include "NarrowPhase/IntersectionFilter.h"
 
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <utility>
@@ -249,6 +250,7 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
       keepLanes(ofA, ofB, batchPairs + first, std::min(hn::Lanes(d), size - first), end);
     }
   }
+  PALPATE_ASSERT(end <= out.data() + out.size());
   out.resize(static_cast<std::size_t>(end - out.data()));
 }
 

@@ -4,6 +4,7 @@
 #include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <utility>
@@ -126,6 +127,7 @@ std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edge
 
 void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
                    ContactBuffers& out) {
+  PALPATE_ASSERT(pair.has(GeometryType::Lines));
   const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB, &check);
   if (!nearby) return;
   out.exactDecisions += nearby->centres.exact;

@@ -7,6 +7,7 @@
 #include "NarrowPhase/IntersectionFilter.h"
 #include "Shapes/ShapeContacts.h"
 #include "Mesh/TriangleMesh.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 
 #include <algorithm>
@@ -89,6 +90,7 @@ struct MeshPair {
   /// tested as the vertex.
   bool excludesVertex(std::uint32_t vertex, std::uint32_t triangle) const {
     if (!self()) return false;
+    PALPATE_ASSERT(triangle < a.topology.triangles.size());
     const auto& [i, j, k] = a.topology.triangles[triangle];
     return vertex == i || vertex == j || vertex == k ||
            (a.topology.type == GeometryType::Points && triangle < vertex);

@@ -9,11 +9,12 @@ namespace palpate {
 
 namespace {
 
+/// Two ids of elements, each below 2^28.
 std::uint64_t packed(std::uint32_t first, std::uint32_t second) {
+  PALPATE_ASSERT(first >> 28 == 0 && second >> 28 == 0);
   return std::uint64_t{first} << 32 | second;
 }
 
-/// The ids of a contact's elements, each below 2^28.
 using Ids = std::array<std::uint64_t, 2>;
 Ids byVertex(const VertexTriangleContact& c) { return {packed(c.vertex, c.triangle), 0}; }
 Ids byTriangle(const VertexTriangleContact& c) { return {packed(c.triangle, c.vertex), 0}; }

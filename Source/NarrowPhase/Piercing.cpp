@@ -6,6 +6,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <tuple>
@@ -243,6 +244,7 @@ void PiercingContacts::findBehind(const MeshPair& pair) {
     const auto end = std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
       return c.ofB != first->ofB || c.edge != first->edge;
     });
+    PALPATE_ASSERT(first->edge < (first->ofB ? pair.b : pair.a).topology.edges.size());
     const int leaves = timesOfLeaving({first, end});
     const Segment& ends = (first->ofB ? pair.b : pair.a).topology.edges[first->edge];
     for (; first != end; ++first)

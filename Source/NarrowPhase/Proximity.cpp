@@ -9,6 +9,7 @@
 #include "NarrowPhase/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <bit>
@@ -126,6 +127,7 @@ class VertexTriangleFinder {
   bool isNearerThanEdge(const Vector3d& p, std::uint32_t edge, std::uint32_t triangle) const {
     const auto& sides = m_topology.triangleEdges[triangle];
     const auto side = std::find(sides.begin(), sides.end(), edge) - sides.begin();
+    PALPATE_ASSERT(side < 3);
     const Triangle& corners = m_topology.triangles[triangle];
     return liesInwards(p, m_positions[corners[side]], m_positions[corners[(side + 1) % 3]],
                        m_positions[corners[(side + 2) % 3]]);
@@ -197,6 +199,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
 
 /// The number of set bits, for `bits` below 2^16. The baseline processor has no instruction for it.
 std::size_t countOf(std::uint32_t bits) {
+  PALPATE_ASSERT(bits >> 16 == 0);
   bits -= bits >> 1 & 0x5555;
   bits = (bits & 0x3333) + (bits >> 2 & 0x3333);
   bits = (bits + (bits >> 4)) & 0x0f0f;
@@ -277,6 +280,7 @@ class ProximityFinder {
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
+    PALPATE_ASSERT(edgeA != kNoEdge && edgeB != kNoEdge);
     if (m_pair.has(GeometryType::Lines)) return testLineEdges(m_pair, edgeA, edgeB, m_check, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);
   }

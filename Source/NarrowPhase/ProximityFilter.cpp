@@ -1,6 +1,7 @@
 #include "NarrowPhase/ProximityFilter.h"
 
 #include "NarrowPhase/FeatureTests.h"
+#include "Core/Assert.h"
 
 // The coordinates of every pair are taken relative to its corner a0, scaled by a power of two to
 // below 2, and rounded to floats. The errors that follow, in units of e = 2^-22:
@@ -252,6 +253,7 @@ HWY_EXPORT(filterKernel);
 void findPossibleProximity(const TrianglePairBatch& batch, double thickness, bool distinct,
                            double checkedEdgeDistance,
                            std::uint32_t (&possible)[TrianglePairBatch::kSize]) {
+  PALPATE_ASSERT(thickness >= 0.0 && checkedEdgeDistance >= 0.0);
   HWY_DYNAMIC_DISPATCH(filterKernel)(batch, thickness, distinct, checkedEdgeDistance, possible);
 }
 

@@ -2,6 +2,7 @@
 
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/FeatureTests.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Core>
 
@@ -24,6 +25,7 @@ class SharedVertex {
   /// used if some triangles of a sample of the pairs have one.
   SharedVertex(const MeshTopology& topology, const FloatPair* floats,
                std::span<const ElementPair> pairs) {
+    PALPATE_ASSERT(!floats || floats->a == floats->b);
     if (!floats || !anyIsCrowded(topology, pairs)) return;
     m_floats = floats->a;
     m_reach = (1.0f + 0x1p-20f) *

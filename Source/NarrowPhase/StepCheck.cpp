@@ -46,6 +46,7 @@ template <Kind kind>
 void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t firstId,
                              std::uint32_t secondId, double time, double distance) {
   const StepPlan& step = m_pair.step;
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0 && distance >= 0.0);
   const double rounding = step.motionWithRounding - step.motion;
   double &clearance = m_out.facts.clearance, &gap = m_out.facts.gapAtStart;
   if (time == 0.0)

@@ -2,6 +2,7 @@
 
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <optional>
@@ -13,7 +14,9 @@ namespace palpate {
 /// records this in ContactBuffers::facts.
 class StepCheck {
  public:
-  StepCheck(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {}
+  StepCheck(const MeshPair& pair, ContactBuffers& out) : m_pair(pair), m_out(out) {
+    PALPATE_ASSERT(pair.step.motion >= 0.0 && pair.step.motionWithRounding >= pair.step.motion);
+  }
 
   /// L: edges up to this far apart are measured even where Contacts::Distinct reports no contact,
   /// because they may have touched in the step.
@@ -27,6 +30,7 @@ class StepCheck {
 
   /// Records a feature pair that is at most thicknessAtEnd() apart.
   void recordDistance(double distance) {
+    PALPATE_ASSERT(distance <= m_pair.thicknessAtEnd());
     m_out.facts.clearance = std::min(m_out.facts.clearance, distance);
   }
   /// Checks the same pair for a touch in the step. If it may have touched, appends its impact where

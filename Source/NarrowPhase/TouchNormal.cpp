@@ -4,6 +4,7 @@
 #include "Math/Foot.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -256,6 +257,7 @@ template <Kind kind>
 TouchNormal touchNormal(const Features<kind>& of, std::uint32_t firstId, std::uint32_t secondId,
                         const std::array<MeshFeature, 2>& holders, double time,
                         const Vector3d& normal, std::size_t& exactDecisions) {
+  PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
   const ImpactQuery query = of.query(firstId, secondId);
   using FeatureKind = MeshFeature::Kind;
   const bool interiors = kind == Kind::VertexTriangle ? holders[1].kind == FeatureKind::Face

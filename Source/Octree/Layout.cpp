@@ -152,6 +152,7 @@ void Layout::findParts(const KeySort& keys, OpenNode& node) const {
     return;
   }
   const std::uint32_t* ends = m_ends->data() + job.ends;
+  PALPATE_ASSERT(job.sorted > job.level);
   const std::size_t perOctant =
       PartEnds::kCounts[static_cast<std::size_t>(job.sorted - job.level - 1)];
   for (std::size_t octant = 0; octant < 9; ++octant) node.begins[octant] = ends[octant * perOctant];
@@ -165,6 +166,7 @@ std::uint32_t Layout::addBlock(const OpenNode& node) {
   }
   links.emplace_back();
   parents.push_back(node.job.node);
+  PALPATE_ASSERT(std::is_sorted(std::begin(node.begins), std::end(node.begins)));
   for (unsigned slot = 0; slot < kChildren; ++slot) {
     links[block].begin[slot] = node.begins[slot];
     links[block].child[slot] = OctreeBlock::kLeaf | (node.begins[slot + 1] - node.begins[slot]);
@@ -206,6 +208,7 @@ bool Layout::nextChild(OpenNode& parent, Job& child) {
 }
 
 std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode node) {
+  PALPATE_ASSERT(begin <= end && m_groupCount < groups.size());
   groups[m_groupCount] = begin;
   groupNodes[m_groupCount++] = node;
   reserveGroups();
@@ -214,6 +217,7 @@ std::uint32_t Layout::addLeaf(std::uint32_t begin, std::uint32_t end, OctreeNode
 
 /// Reserves space for the groups of a block's eight slots and one more.
 void Layout::reserveGroups() {
+  PALPATE_ASSERT(m_groupCount <= groups.size());
   if (m_groupCount + 9 <= groups.size()) return;
   groups.reserve(groups.size() + groups.size() / 8 + 16);
   groups.resize(groups.capacity());

@@ -90,6 +90,8 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
     m_order.clear();
     throw;
   }
+  PALPATE_ASSERT(m_nodes.groups.size() == m_nodes.groupNodes.size() + 1 &&
+                 m_nodes.groups.front() == 0 && m_nodes.groups.back() == size());
   m_isUnmeasured = true;
   m_stage = Stage::LaidOut;
 }
@@ -111,6 +113,7 @@ void Octree::fit(const Threads& threads) {
                       m_groupAreas[chunk] = areas;
                     });
   // In each part, children come after their parents, and all other parts come after the top.
+  PALPATE_ASSERT(nodes.partBlocks.size() >= 2 && nodes.partBlocks.back() == nodes.pool.used());
   const std::size_t parts = nodes.partBlocks.size() - 1;
   threads.forEach(parts - 1, [&](std::size_t task) {
     fitBlocks(nodes.pool.data(), nodes.parents.data(), nodes.partBlocks[task + 1],
@@ -131,6 +134,7 @@ OctreeDops& Octree::startDops(int directions) {
 }
 
 void Octree::fitDops(int directions) {
+  PALPATE_ASSERT(isBuilt() && m_dops.directions == 3);
   constexpr float kInfinity = FloatBox::kEmptyLower;
   OctreeDops& dops = m_dops;
   const auto further = static_cast<std::size_t>(directions - 3);

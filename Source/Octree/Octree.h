@@ -35,7 +35,10 @@ struct alignas(64) OctreeBlock {
   std::uint32_t child[kChildren];  ///< a block, or kLeaf | number of elements
 
   bool isLeaf(unsigned slot) const { return child[slot] & kLeaf; }
-  std::uint32_t count(unsigned slot) const { return child[slot] & ~kLeaf; }
+  std::uint32_t count(unsigned slot) const {
+    PALPATE_ASSERT(isLeaf(slot));
+    return child[slot] & ~kLeaf;
+  }
   bool isEmpty(unsigned slot) const { return child[slot] == kLeaf; }
   FloatBox box(unsigned slot) const {
     PALPATE_ASSERT(slot < kChildren);
@@ -188,7 +191,10 @@ class Octree {
   const BlockPool& pool() const { return m_nodes.pool; }
   const Cube& rootCube() const { return m_nodes.rootCube; }
   std::size_t bytes() const;
-  FloatBox box(OctreeNode node) const { return blocks()[blockOf(node)].box(slotOf(node)); }
+  FloatBox box(OctreeNode node) const {
+    PALPATE_ASSERT(blockOf(node) < m_nodes.pool.used());
+    return blocks()[blockOf(node)].box(slotOf(node));
+  }
   bool isEmpty(OctreeNode node) const { return blocks()[blockOf(node)].isEmpty(slotOf(node)); }
   /// The first of eight consecutive children. 0 for a leaf, as the root is nobody's child.
   OctreeNode firstChild(OctreeNode node) const {
@@ -197,10 +203,14 @@ class Octree {
     return block.isLeaf(slot) ? 0 : nodeOf(block.child[slot], 0);
   }
   /// The node whose children are in block `block`. For block 0, the root itself.
-  OctreeNode parent(std::size_t block) const { return m_nodes.parents[block]; }
+  OctreeNode parent(std::size_t block) const {
+    PALPATE_ASSERT(block < m_nodes.parents.size());
+    return m_nodes.parents[block];
+  }
 
   /// The range of elements that a node holds itself.
   std::pair<std::uint32_t, std::uint32_t> ownRange(OctreeNode node) const {
+    PALPATE_ASSERT(blockOf(node) < m_nodes.pool.used());
     const OctreeBlock& block = m_nodes.pool[blockOf(node)];
     const unsigned slot = slotOf(node);
     const std::uint32_t begin = block.begin[slot];

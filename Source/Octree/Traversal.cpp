@@ -208,6 +208,7 @@ HWY_ATTR void startPairsKernel(const TreePair& trees, std::size_t wanted, Traver
 
 HWY_ATTR void traverseKernel(const TreePair& trees, std::span<const NodePair> pairs,
                              TraversalStack& stack, PairSink& sink) {
+  PALPATE_ASSERT(!trees.swapped || !trees.self());
   stack.pairs.assign(pairs.rbegin(), pairs.rend());
   withWalk(trees, stack, sink, [](auto&& walk) HWY_ATTR { walk.all(0); });
 }

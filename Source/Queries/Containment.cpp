@@ -81,6 +81,7 @@ class BodyQuery {
   InsideVertex nearest(std::uint32_t vertex, const Eigen::Vector3d& p, const OuterSurface& outer) {
     const PointDistances distances(m_geometry, p, m_bruteForce);
     const auto near = distances.nearest(kInfinity, m_last);
+    PALPATE_ASSERT(near);
     m_last = near->place;
     const InsideVertex result{vertex,
                               near->element,

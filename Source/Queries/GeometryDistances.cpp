@@ -7,6 +7,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/ConvexMinimum.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <array>
@@ -163,6 +164,7 @@ GeometryDistance distanceBetween(const Body& geometry, GeometryId id, const Shap
             take(*found, found->weights);
         return nearest.distance;
       });
+  PALPATE_ASSERT(best != kNoElement);
   GeometryDistance out{surfacePointOf(geometry, best, nearest.weights, nearest.distance),
                        noPoint(id), nearest.distance};
   out.b.distance = nearest.distance;
@@ -196,6 +198,7 @@ Vector3d commonPoint(const Shape& a, const Shape& b, Vector3d point) {
 
 GeometryDistance distanceBetween(GeometryId idA, const Shape& a, GeometryId idB, const Shape& b,
                                  ShapePairScratch& scratch) {
+  PALPATE_ASSERT(!a.isPlane() || !b.isPlane());
   const ShapePairDistance found = a.distanceFrom(b, scratch);
   GeometryDistance out{noPoint(idA), noPoint(idB), std::max(0.0, found.distance)};
   out.a.distance = out.b.distance = out.distance;
@@ -207,6 +210,7 @@ GeometryDistance distanceBetween(GeometryId idA, const Shape& a, GeometryId idB,
 
 SegmentDistance distanceFromSegment(const Body& geometry, const Vector3d& p, const Vector3d& q,
                                     double maxDistance, bool bruteForce) {
+  PALPATE_ASSERT(maxDistance >= 0.0);
   ElementDistance best;
   best.distance = maxDistance;
   std::uint32_t nearest = kNoElement;

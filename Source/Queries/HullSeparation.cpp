@@ -2,6 +2,7 @@
 
 #include "Math/StableLength.h"
 #include "Exact/Predicates.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -60,6 +61,7 @@ class Difference {
 
 HullSeparation separateHulls(const Support& a, const Support& b, double wanted,
                              Polytope& polytope) {
+  PALPATE_ASSERT(wanted >= 0.0);
   const Difference difference(a, b);
   std::array<Vector3d, 4> first;
   if (!difference.start(first)) return {Vector3d::Zero(), 0.0, 0.0};

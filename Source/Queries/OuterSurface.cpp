@@ -8,6 +8,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Math/TriangleIntersection.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -258,6 +259,7 @@ std::optional<OuterSurface::Near> OuterSurface::nearest(const Vector3d& p, int n
   double distance = kInfinity;
   if (m_parts.outer) {
     const auto near = PointDistances(*m_parts.outer, p, m_bruteForce).nearest(kInfinity, 0);
+    PALPATE_ASSERT(near);
     best = Near{m_parts.elementOf[near->element], p - near->closest.difference};
     distance = near->closest.distance;
   }

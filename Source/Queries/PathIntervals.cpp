@@ -20,12 +20,14 @@ using Eigen::Vector3d;
 
 PathLine::PathLine(std::span<const Vector3d> points, std::vector<double>& scratch)
     : m_points(points), m_lengths(scratch) {
+  PALPATE_ASSERT(!points.empty());
   m_lengths.assign(1, 0.0);
   for (std::size_t i = 0; i + 1 < points.size(); ++i)
     m_lengths.push_back(m_lengths.back() + stableLength(points[i + 1] - points[i]));
 }
 
 Vector3d PathLine::operator()(double arcLength) const {
+  PALPATE_ASSERT(m_lengths.size() >= 2 && arcLength >= 0.0);
   const auto next = std::upper_bound(m_lengths.begin() + 1, m_lengths.end() - 1, arcLength);
   const auto segment = static_cast<std::size_t>(next - m_lengths.begin()) - 1;
   const double from = m_lengths[segment], length = m_lengths[segment + 1] - from;
@@ -49,6 +51,7 @@ void append(const PathPart& part, std::vector<PathPart>& parts) {
 /// A place of [from, to] where f changes from above 0, at `from`, to at most 0, at `to`.
 template <class F>
 double rootBetween(double from, double to, F&& f) {
+  PALPATE_ASSERT(from <= to);
   for (;;) {
     const double middle = from + 0.5 * (to - from);
     if (middle == from || middle == to) return to;

@@ -192,6 +192,7 @@ void PointDistances::search(double most, std::size_t count, F&& f) const {
 std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
                                                             std::uint32_t likely,
                                                             double bound) const {
+  PALPATE_ASSERT(maxDistance >= 0.0 && bound >= 0.0);
   std::optional<Near> best;
   const auto take = [&](const Near& near, double most) {
     if (best ? near.place != best->place && isNearer(near, *best) : isWithin(near, maxDistance))
@@ -207,7 +208,8 @@ std::optional<PointDistances::Near> PointDistances::nearest(double maxDistance,
 
 PointDistances::RoughlyNear PointDistances::roughlyNearest(
     double tolerance, std::span<const std::uint32_t> likely) const {
-  PALPATE_ASSERT(m_geometry.mesh.radii.empty() && !m_bruteForce);
+  PALPATE_ASSERT(m_geometry.mesh.radii.empty() && !m_bruteForce && tolerance >= 0.0);
+  PALPATE_ASSERT(likely.size() <= TriangleBatch::kSize);
   RoughlyNear best{kInfinity, 0};
   double lower = kInfinity, upper = kInfinity;
   const auto test = [&](std::span<const std::uint32_t> places) {

@@ -45,6 +45,7 @@ std::unique_ptr<SpatialQueries::Source::Scratch> SpatialQueries::Source::Pool::t
 }
 
 void SpatialQueries::Source::Pool::giveBack(std::unique_ptr<Scratch> scratch) {
+  PALPATE_ASSERT(scratch);
   Scratch* none = nullptr;
   if (m_spare.compare_exchange_strong(none, scratch.get())) {
     scratch.release();

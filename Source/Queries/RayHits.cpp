@@ -5,6 +5,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
@@ -227,6 +228,7 @@ RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) co
 /// The hits of the part of m_met in [begin, end), whose entry `furthest` ends last.
 template <class F>
 bool RayHits::hitsOfPart(std::size_t begin, std::size_t end, std::size_t furthest, F&& f) const {
+  PALPATE_ASSERT(begin <= furthest && furthest < end && end <= m_met.size());
   const Met& first = m_met[begin];
   if (!m_isSolid) {
     int crossing = 0;
@@ -287,6 +289,7 @@ std::optional<RayHit> RayHits::first(double bound) {
 void RayHits::first(const Body& geometry, std::span<const Ray> rays, bool bruteForce,
                     std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
                     std::span<RayHit> out) {
+  PALPATE_ASSERT(rays.size() == out.size());
   // The processor's caches hold a small octree, and turns then cost more than they save.
   constexpr std::size_t kLeastForTurns = 30'000;
   if (bruteForce || geometry.tree.ordered().size() < kLeastForTurns) {

@@ -106,6 +106,11 @@ class SnapshotPool::Slot : public Snapshot::Contents, public CountedObject {
   std::vector<GeometryCopy*>& geometries() { return m_geometries; }
   /// `self` holds the pool.
   void start(std::shared_ptr<Source> self, const Source& frame, std::uint64_t number, double time) {
+    PALPATE_ASSERT(isFree() && number != 0);
+    PALPATE_ASSERT(std::is_sorted(m_geometries.begin(), m_geometries.end(),
+                                  [](const GeometryCopy* l, const GeometryCopy* r) {
+                                    return l->geometry.id < r->geometry.id;
+                                  }));
     m_step = frame.step();
     m_engine = frame.engine();
     m_octreeSettings = frame.octreeSettings();

@@ -81,6 +81,7 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
     if (mayTouch(pair.a, pair.b, c))
       add(ofA.edgeTriangles[ofA.edgeOf(c.edgeA)], ofB.edgeTriangles[ofB.edgeOf(c.edgeB)]);
   if (!end.piercing && end.isKnown) check();
+  PALPATE_ASSERT(!end.piercing || end.meeting == Meeting::Piercing);
   return end;
 }
 

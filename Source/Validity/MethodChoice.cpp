@@ -117,11 +117,13 @@ PairPlan planOf(const SupportedPairs& support, const PairSettings& settings,
 }
 
 bool isWithinBand(const DistanceField& field, double thickness, double largestRadius) {
+  PALPATE_ASSERT(thickness >= 0.0 && largestRadius >= 0.0);
   return thickness + largestRadius < field.band() - field.errorBound();
 }
 
 std::optional<PairPlan> planByField(const PairSettings& settings, const GeometryInStep& a,
                                     const GeometryInStep& b, const PairPlan& exact) {
+  PALPATE_ASSERT(exact.motion >= 0.0);
   const GeometryInStep& body = answersByFieldOfSecond(a.type(), b.field) ? b : a;
   const GeometryInStep& other = &body == &b ? a : b;
   if (settings.method != Method::Auto || exact.kind != PairKind::Meshes || !body.field ||

@@ -136,6 +136,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
                       (a.mesh.largestRadius + b.mesh.largestRadius);
   plan.step.motionWithRounding = plan.step.motion + 2.0 * kMotionError * (plan.step.motion + size);
 
+  PALPATE_ASSERT(plan.step.motionWithRounding >= plan.step.motion);
   const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
   if (!m_atStart.version.isCurrent(before)) {
     m_atStart = {};
@@ -168,6 +169,7 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   plan.runsIntersection = isAuto && haveTriangles(a, b);
   plan.step.checksStart = !m_atStart.meeting && (isAuto || m_checkCredit >= kFramesPerCheck);
   if (plan.step.checksStart) m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
+  PALPATE_ASSERT(m_checkCredit <= most);
   // The result cannot be trusted, so the step need not be examined.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
     plan.step.motion = 0.0;
@@ -255,6 +257,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   } else if (plan.step.motion > 0.0 && findsImpacts) {
     findEnd(plan, facts, meshes, contents, counts);
   }
+  PALPATE_ASSERT(!m_atEnd.witness || m_atEnd.meeting == Meeting::Piercing);
   m_atEnd.version.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
 }
 
