@@ -32,7 +32,7 @@ struct BodyState {
 
 /// Revisions of the parts of a body that users can change, besides its positions.
 struct BodyRevisions {
-  RevisionCounter counter;
+  Revision::Counter counter;
   ElementsState elements;
   Revision filter;
   Revision field;  ///< of all that is attached to the body

@@ -68,7 +68,7 @@ class GeometryStep {
   Positions m_detected;
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
-  RevisionCounter m_revisions;
+  Revision::Counter m_revisions;
   /// Positions are checked while they are copied into one of these that nothing else uses. Three
   /// ends, two incoming arrays and the copies of snapshots use them.
   CountedVector<std::shared_ptr<CountedVector<Eigen::Vector3d>>> m_bodies;

@@ -154,7 +154,7 @@ class PairTable {
 
   CountedVector<std::unique_ptr<PairRecord>> m_records;  ///< in the order added
   CountedVector<CollisionPair> m_pairs;                  ///< copies of those in m_records
-  RevisionCounter m_revisions;
+  Revision::Counter m_revisions;
   std::unordered_map<std::uint64_t, PairRecord*, std::hash<std::uint64_t>, std::equal_to<>,
                      CountedAllocator<std::pair<const std::uint64_t, PairRecord*>>>
       m_byIds;

@@ -7,17 +7,17 @@ namespace palpate {
 /// Identifies one state of an object that changes: equal revisions mean equal states.
 class Revision {
  public:
+  class Counter;
   Revision() = default;  ///< the initial state, before any change
   friend bool operator==(Revision, Revision) = default;
 
  private:
-  friend class RevisionCounter;
   explicit Revision(std::uint64_t number) : m_number(number) {}
   std::uint64_t m_number = 0;
 };
 
 /// Creates revisions, each of them once. Revisions of different counters are not comparable.
-class RevisionCounter {
+class Revision::Counter {
  public:
   Revision next() { return Revision(++m_last); }
 

@@ -61,7 +61,7 @@ class Searched {
   Body geometry{GeometryId{0}};
 
  private:
-  RevisionCounter m_revisions;
+  Revision::Counter m_revisions;
   Threads m_thread{1};
 };
 

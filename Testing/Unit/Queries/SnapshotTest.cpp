@@ -240,7 +240,7 @@ class TestSource : public SpatialQueries::Source {
 
  private:
   std::vector<std::unique_ptr<Body>> m_geometries;
-  RevisionCounter m_revisions;
+  Revision::Counter m_revisions;
   std::uint32_t m_nextId = 0;
   OctreeSettings m_settings;
   Threads m_thread{1};
