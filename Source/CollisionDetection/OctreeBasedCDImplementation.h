@@ -91,7 +91,7 @@ struct OctreeBasedCD::Implementation {
               bool skips, Trace* traced = nullptr);
 
   bool needsNoOctree(const PairRecord& record) const {
-    return record.support->kind == PairKind::Proxy || mayUseLeaves(record);
+    return record.support->kind == PairKind::Proxy || mayUseProxy(record);
   }
 
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries

@@ -5,7 +5,7 @@
 
 #include "CollisionDetection/FieldWork.h"
 #include "CollisionDetection/MeshWork.h"
-#include "CollisionDetection/ParticleWork.h"
+#include "CollisionDetection/AttachedProxyWork.h"
 #include "CollisionDetection/ProxyWork.h"
 #include "CollisionDetection/ShapeWork.h"
 
@@ -20,7 +20,7 @@ namespace palpate {
 /// run(n, i, scratch) runs the i-th one, on any thread,
 /// join()             writes the results to PairRecord::next.
 /// runByBruteForce()  does the work of all jobs without octrees, and without start().
-using PairWork = std::variant<MeshWork, ShapeWork, FieldWork, ProxyWork, ParticleWork>;
+using PairWork = std::variant<MeshWork, ShapeWork, FieldWork, ProxyWork, AttachedProxyWork>;
 
 /// The work for the pair's plan.
 inline PairWork workOf(PairRecord& record) {
@@ -34,8 +34,8 @@ inline PairWork workOf(PairRecord& record) {
       return FieldWork(record);
     case PairKind::Proxy:
       return ProxyWork(record);
-    case PairKind::ParticlesByLeaves:
-      return ParticleWork(record);
+    case PairKind::AttachedProxy:
+      return AttachedProxyWork(record);
   }
   return MeshWork(record);
 }

@@ -10,7 +10,7 @@ void planWithoutMotion(PairRecord& record) {
       planOf(*record.support, record.pair.settings, record.a->inStep(), record.b->inStep());
 }
 
-bool mayUseLeaves(const PairRecord& record) {
+bool mayUseProxy(const PairRecord& record) {
   const PairSettings& settings = record.pair.settings;
   const Geometry &a = *record.a, &b = *record.b;
   const double reach = settings.thickness + a.body.mesh.largestRadius;
@@ -27,7 +27,7 @@ void planStep(PairRecord& record, bool detecting) {
   if (moves)
     for (Geometry* geometry : {record.a, record.b}) geometry->motion.update(*geometry);
   record.plan = planOf(*record.support, settings, record.a->inStep(), record.b->inStep(), moves);
-  if (detecting && mayUseLeaves(record)) record.plan = planByLeaves(settings, record.plan);
+  if (detecting && mayUseProxy(record)) record.plan = planByProxy(settings, record.plan);
 }
 
 void planByFieldIfProven(PairRecord& record, Engine engine) {

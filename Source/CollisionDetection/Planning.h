@@ -13,8 +13,8 @@ namespace palpate {
 /// The plan of a pair before anything is known about its motion.
 void planWithoutMotion(PairRecord&);
 
-/// Auto: whether the settings allow the leaves that are attached to b.
-bool mayUseLeaves(const PairRecord&);
+/// Auto: whether the settings allow the surface proxy that is attached to b.
+bool mayUseProxy(const PairRecord&);
 
 /// Plans by the motion in the step, which it updates. detecting: contacts are wanted; otherwise
 /// only the motion on which candidates depend is included. Whether the boxes of both octrees have

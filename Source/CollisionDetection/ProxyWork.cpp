@@ -8,7 +8,7 @@
 namespace palpate {
 
 std::size_t ProxyWork::place() {
-  return m_particles.start(*m_record, m_record->proxy.get(), m_record->pair.settings.thickness);
+  return m_proxyJobs.start(*m_record, m_record->proxy.get(), m_record->pair.settings.thickness);
 }
 
 std::size_t ProxyWork::start(const FrameStart&) { return place(); }
@@ -16,7 +16,7 @@ std::size_t ProxyWork::start(const FrameStart&) { return place(); }
 void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  m_particles.find(job, scratch);
+  m_proxyJobs.find(job, scratch);
   scratch.narrowMilliseconds += watch.lap();
 }
 
@@ -24,7 +24,7 @@ void ProxyWork::runByBruteForce(JobScratch& scratch) {
   place();
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  m_particles.findByBruteForce(scratch);
+  m_proxyJobs.findByBruteForce(scratch);
   scratch.narrowMilliseconds += watch.lap();
 }
 
@@ -44,9 +44,9 @@ void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   join.threads.forEach(jobs.size(), [&](std::size_t i) {
     std::size_t first = 0;
     for (std::size_t k = 0; k < i; ++k) first += jobs[k]->hits.count;
-    m_particles.write(*jobs[i], contents.shape.data() + first);
+    m_proxyJobs.write(*jobs[i], contents.shape.data() + first);
   });
-  m_particles.describe(jobs, contents);
+  m_proxyJobs.describe(jobs, contents);
   join.results.start(jobs);
   join.results.assess(record, false, join.statistics);
   countContacts(0, contents);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/ParticleJobs.h"
+#include "CollisionDetection/ProxyJobs.h"
 
 #include <cstddef>
 
@@ -22,7 +22,7 @@ class ProxyWork {
   std::size_t place();
 
   PairRecord* m_record;
-  ParticleJobs m_particles;
+  ProxyJobs m_proxyJobs;
 };
 
 }  // namespace palpate

@@ -56,7 +56,7 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
   for (const auto& record : pairs.records()) {
     problem.pairs.push_back(
         {indices.at(record->a), indices.at(record->b), record->pair.settings,
-         record->plan.kind == PairKind::ParticlesByLeaves ? Method::Proxy : record->plan.method,
+         record->plan.kind == PairKind::AttachedProxy ? Method::Proxy : record->plan.method,
          static_cast<bool>(record->predicate)});
     if (record->pair.settings.restDistance > 0.0)
       copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,

@@ -188,7 +188,7 @@ void PlacedProxy::findLeaves(std::size_t size, bool byBruteForce, Block& block) 
 }
 
 void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_t end,
-                       bool byBruteForce, const ParticleStep* step, ProxyHits& out) const {
+                       bool byBruteForce, const ProxyStep* step, ProxyHits& out) const {
   PALPATE_ASSERT(begin <= end && end <= points.now.size());
   out.normals.clear();
   out.others.clear();

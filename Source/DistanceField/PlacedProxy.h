@@ -33,7 +33,7 @@ struct ProxyHits {
 };
 
 /// A step, for a proxy that answers particles without an impact.
-struct ParticleStep {
+struct ProxyStep {
   MotionRange body;   ///< of the body's vertices
   double thickness;   ///< L: that of the pair
   double slowMotion;  ///< L: particles that move further are answered only if they stay far away
@@ -60,7 +60,7 @@ class PlacedProxy {
   /// none if its distance at the end, less the error, exceeds its motion relative to the body and
   /// its radius. A fast one must in addition be apart by the thickness.
   void find(const TriangleMesh& points, std::size_t begin, std::size_t end, bool byBruteForce,
-            const ParticleStep* step, ProxyHits& out) const;
+            const ProxyStep* step, ProxyHits& out) const;
   /// Writes a contact for each hit.
   void write(const TriangleMesh& points, const ProxyHits&, ShapeContact* out) const;
 

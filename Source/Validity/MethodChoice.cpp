@@ -151,9 +151,9 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
   return plan;
 }
 
-PairPlan planByLeaves(const PairSettings& settings, PairPlan exact) {
+PairPlan planByProxy(const PairSettings& settings, PairPlan exact) {
   PALPATE_ASSERT(exact.kind == PairKind::Meshes);
-  exact.kind = PairKind::ParticlesByLeaves;
+  exact.kind = PairKind::AttachedProxy;
   exact.motionTolerance = motionToleranceOf(settings);
   exact.proxyThickness = settings.thickness +
                          extraThicknessOf(settings, std::min(exact.motion, exact.motionTolerance));

@@ -41,7 +41,7 @@ struct PairPlan {
   double searchDistance = 0;
   StepPlan step;
   bool runsIntersection = false;    ///< Auto: Intersection runs, too, if the start intersects
-  double proxyThickness = 0;        ///< L: ParticlesByLeaves: up to which leaves report contacts
+  double proxyThickness = 0;        ///< L, AttachedProxy: up to which leaves report contacts
   bool startsIntersecting = false;  ///< triangles are known to intersect at the step's start
   /// Whether the boxes enclose the motion over the whole step.
   bool swept() const { return method == Method::Continuous || method == Method::Auto; }
@@ -73,7 +73,7 @@ bool isWithinBand(const DistanceField&, double thickness, double largestRadius);
 /// further apart at its end than PairPlan::motion. None where the settings do not allow it.
 std::optional<PairPlan> planByField(const PairSettings&, const GeometryInStep& a,
                                     const GeometryInStep& b, const PairPlan& exact);
-/// The same for the leaves of an attached proxy, which the settings allow.
-PairPlan planByLeaves(const PairSettings&, PairPlan exact);
+/// The same for an attached surface proxy, which the settings allow.
+PairPlan planByProxy(const PairSettings&, PairPlan exact);
 
 }  // namespace palpate

@@ -9,13 +9,12 @@ namespace palpate {
 
 /// How a pair is answered. CollisionDetection/PairWork.h names the work of each kind.
 enum class PairKind : std::uint8_t {
-  Meshes,             ///< candidates of two octrees
-  MeshAndShape,       ///< the elements near an analytical shape
-  Shapes,             ///< two analytical shapes
-  Field,              ///< the elements near a distance field
-  Proxy,              ///< particles by a surface proxy
-  ParticlesByLeaves,  ///< Auto: particles by attached leaves, those that may touch by another
-                      ///< method
+  Meshes,         ///< candidates of two octrees
+  MeshAndShape,   ///< the elements near an analytical shape
+  Shapes,         ///< two analytical shapes
+  Field,          ///< the elements near a distance field
+  Proxy,          ///< particles by a surface proxy
+  AttachedProxy,  ///< Auto: the same, and another method for particles that may touch
 };
 
 /// A set of geometry types. A tetrahedral mesh has Triangles, those of its surface.

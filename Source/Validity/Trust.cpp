@@ -81,7 +81,7 @@ double roundingOf(const StepPlan& step) { return step.motionWithRounding - step.
 /// knows only the motion of all.
 bool measuredApart(const MeshPair& meshes, const PairPlan& plan, const StepFacts& facts,
                    double earliestTime) {
-  if (plan.kind == PairKind::ParticlesByLeaves) return false;
+  if (plan.kind == PairKind::AttachedProxy) return false;
   if (plan.method == Method::Continuous) {
     // Earliest times come without distances, and without features that a filter refuses.
     if (meshes.settings.continuous.earliestTimeOnly)
@@ -181,11 +181,11 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                    ContactBuffers& counts) {
   PALPATE_ASSERT(m_topologies.isValid());
   Validity& validity = contents.validity;
-  const bool byLeaves = plan.kind == PairKind::ParticlesByLeaves;
-  validity.method = byLeaves ? Method::Proxy : plan.method;
-  validity.reason = byLeaves ? MethodReason::AllowedError : plan.reason;
+  const bool byProxy = plan.kind == PairKind::AttachedProxy;
+  validity.method = byProxy ? Method::Proxy : plan.method;
+  validity.reason = byProxy ? MethodReason::AllowedError : plan.reason;
   validity.displacement = plan.motion;
-  validity.effectiveThickness = byLeaves ? plan.proxyThickness
+  validity.effectiveThickness = byProxy ? plan.proxyThickness
                                 : plan.method == Method::Intersection
                                     ? 0.0
                                     : settings.thickness + plan.step.extraThickness;

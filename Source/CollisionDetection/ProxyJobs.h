@@ -12,12 +12,12 @@
 namespace palpate {
 
 /// The particles of a pair, in jobs of equal size, and the proxy that answers them.
-class ParticleJobs {
+class ProxyJobs {
  public:
   /// Places the proxy of the pair's body. Returns the number of jobs. thickness: L. step: see
   /// PlacedProxy::find().
   std::size_t start(const PairRecord& record, const SurfaceProxy* proxy, double thickness,
-                    const std::optional<ParticleStep>& step = {}) {
+                    const std::optional<ProxyStep>& step = {}) {
     PALPATE_ASSERT(proxy != nullptr);
     m_points = &record.a->body.mesh;
     m_step = step;
@@ -55,7 +55,7 @@ class ParticleJobs {
 
   const TriangleMesh* m_points = nullptr;
   std::optional<PlacedProxy> m_proxy;
-  std::optional<ParticleStep> m_step;
+  std::optional<ProxyStep> m_step;
 };
 
 }  // namespace palpate

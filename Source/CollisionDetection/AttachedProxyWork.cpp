@@ -1,4 +1,4 @@
-#include "CollisionDetection/ParticleWork.h"
+#include "CollisionDetection/AttachedProxyWork.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/PairResults.h"
@@ -24,11 +24,11 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
                                 [](const auto& a, const auto& b) { return a.vertex < b.vertex; }));
   PALPATE_ASSERT(std::is_sorted(all.begin(), all.end(),
                                 [](const auto& a, const auto& b) { return a.id < b.id; }));
-  std::size_t byLeaves = all.size(), left = exact.size();
-  all.resize(byLeaves + left);
+  std::size_t byProxy = all.size(), left = exact.size();
+  all.resize(byProxy + left);
   for (std::size_t place = all.size(); left > 0;) {
-    if (byLeaves > 0 && all[byLeaves - 1].id > exact[left - 1].vertex) {
-      all[--place] = all[--byLeaves];
+    if (byProxy > 0 && all[byProxy - 1].id > exact[left - 1].vertex) {
+      all[--place] = all[--byProxy];
       continue;
     }
     const VertexTriangleContact& contact = exact[--left];
@@ -50,40 +50,40 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 
 }  // namespace
 
-std::size_t ParticleWork::place() {
+std::size_t AttachedProxyWork::place() {
   const PairPlan& plan = m_record->plan;
-  std::optional<ParticleStep> step;
+  std::optional<ProxyStep> step;
   if (plan.motion > 0.0)
     step = {m_record->b->motion.range(), m_record->pair.settings.thickness, plan.motionTolerance};
-  return m_particles.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, step);
+  return m_proxyJobs.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, step);
 }
 
-std::size_t ParticleWork::start(const FrameStart&) { return place(); }
+std::size_t AttachedProxyWork::start(const FrameStart&) { return place(); }
 
-void ParticleWork::run(int, std::size_t job, JobScratch& scratch) const {
+void AttachedProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  m_particles.find(job, scratch);
+  m_proxyJobs.find(job, scratch);
   writeHits(scratch);
   findOthers(scratch);
   scratch.narrowMilliseconds += watch.lap();
 }
 
-void ParticleWork::runByBruteForce(JobScratch& scratch) {
+void AttachedProxyWork::runByBruteForce(JobScratch& scratch) {
   place();
-  m_particles.findByBruteForce(scratch);
+  m_proxyJobs.findByBruteForce(scratch);
   writeHits(scratch);
   detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
 }
 
-void ParticleWork::writeHits(JobScratch& scratch) const {
+void AttachedProxyWork::writeHits(JobScratch& scratch) const {
   auto& found = scratch.contacts.shapes.shape;
   PALPATE_ASSERT(std::is_sorted(scratch.hits.others.begin(), scratch.hits.others.end()));
   found.resize(scratch.hits.count);
-  m_particles.write(scratch, found.data());
+  m_proxyJobs.write(scratch, found.data());
 }
 
-void ParticleWork::findOthers(JobScratch& scratch) const {
+void AttachedProxyWork::findOthers(JobScratch& scratch) const {
   const TriangleMesh& points = m_record->a->body.mesh;
   const MeshPair meshes = m_record->meshes();
   const bool swept = m_record->plan.swept();
@@ -103,7 +103,7 @@ void ParticleWork::findOthers(JobScratch& scratch) const {
   }
 }
 
-void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
+void AttachedProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
   const bool continuous = record.plan.method == Method::Continuous;
@@ -113,7 +113,7 @@ void ParticleWork::join(Jobs jobs, const FrameJoin& join) const {
   results.order(record);
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
-  m_particles.describe(jobs, contents);
+  m_proxyJobs.describe(jobs, contents);
   results.assess(record, false, join.statistics);
   if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
   countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);

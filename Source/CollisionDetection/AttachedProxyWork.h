@@ -1,16 +1,16 @@
 #pragma once
 
-#include "CollisionDetection/ParticleJobs.h"
+#include "CollisionDetection/ProxyJobs.h"
 
 #include <cstddef>
 
 namespace palpate {
 
-/// Work of Auto on particles by attached leaves. The plan's method finds the contacts of particles
-/// that may have an impact in the step.
-class ParticleWork {
+/// Work of Auto on particles by an attached surface proxy. The plan's method finds the contacts of
+/// particles that may have an impact in the step.
+class AttachedProxyWork {
  public:
-  explicit ParticleWork(PairRecord& record) : m_record(&record) {}
+  explicit AttachedProxyWork(PairRecord& record) : m_record(&record) {}
 
   std::size_t start(const FrameStart&);
   bool hasRound(int round, Jobs) const { return round == 0; }
@@ -24,7 +24,7 @@ class ParticleWork {
   void findOthers(JobScratch&) const;
 
   PairRecord* m_record;
-  ParticleJobs m_particles;
+  ProxyJobs m_proxyJobs;
 };
 
 }  // namespace palpate
