@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Bodies/OctreeFrame.h"
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
 #include "Math/StableLength.h"
@@ -41,13 +42,11 @@ bool mayContain(const Body& outer, const Body& inner) {
 
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
-  const auto cornersOf = [&](std::size_t i) -> Corners {
-    const auto& [a, b, c] = outer.mesh.topology.triangles[i];
-    const Positions& before = outer.mesh.before;
-    return {before[a], before[b], before[c]};
+  const auto cornersAt = [&](std::size_t i) {
+    return cornersOf(outer.mesh.topology.triangles[i], outer.mesh.before);
   };
   SignCounts counts;
-  const int number = windingNumber(outer.mesh.topology.triangles.size(), cornersOf,
+  const int number = windingNumber(outer.mesh.topology.triangles.size(), cornersAt,
                                    inner.mesh.before[inner.mesh.topology.triangles[0][0]], counts);
   stack.exactDecisions += counts.undecided;
   return number != 0;
@@ -98,16 +97,16 @@ Vector3d normalOfEdge(const TriangleMesh& mesh, const Segment& edge) {
   Vector3d sum = Vector3d::Zero();
   const std::uint32_t id = mesh.topology.edgeOf(edge);
   for (const std::uint32_t t : mesh.topology.edgeTriangles[id]) {
-    const auto& [p, q, r] = mesh.topology.triangles[t];
-    sum += windingNormal(mesh.now[p], mesh.now[q], mesh.now[r]);
+    const auto [p, q, r] = cornersOf(mesh.topology.triangles[t], mesh.now);
+    sum += windingNormal(p, q, r);
   }
   return sum;
 }
 
 /// Whether an impact's normal is that of a feature which leaves a body.
 bool leaves(const TriangleMesh& body, const VertexTriangleContact& c) {
-  const auto& [p, q, r] = c.vertices;
-  return c.normal.dot(windingNormal(body.now[p], body.now[q], body.now[r])) < 0;
+  const auto [p, q, r] = cornersOf(c.vertices, body.now);
+  return c.normal.dot(windingNormal(p, q, r)) < 0;
 }
 bool leaves(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
   return c.normal.dot(normalOfEdge(b, c.edgeB)) < 0 || c.normal.dot(normalOfEdge(a, c.edgeA)) > 0;
@@ -199,10 +198,9 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
     const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, end);
     if (!exit) continue;
     const Triangle& corners = pair.geometry(!ofA).mesh.topology.triangles[exit->element];
-    const auto& [p, q, r] = corners;
-    const auto& positions = pair.vertices(!ofA).positions;
-    const VertexTriangleDistance at = finiteVertexTriangleDistance(
-        own.positions[v] + exit->distance * direction, positions[p], positions[q], positions[r]);
+    const auto [p, q, r] = cornersOf(corners, pair.vertices(!ofA).positions);
+    const VertexTriangleDistance at =
+        finiteVertexTriangleDistance(own.positions[v] + exit->distance * direction, p, q, r);
     m_scratch.pair.stack.exactDecisions += at.exact;
     auto& list = ofA ? m_contacts.vertexTriangle : m_contacts.triangleVertex;
     list.push_back(

@@ -2,7 +2,7 @@
 #include <palpate/Meshes.h>
 #include <palpate/OctreeBasedCD.h>
 
-#include "Math/TriangleIntersection.h"
+#include "Mesh/Corners.h"
 #include "Core/DisjointSets.h"
 
 #include <algorithm>
@@ -67,16 +67,15 @@ MeshDefects findMeshDefects(const TriangleMeshView& mesh) {
   defects.insideOut = defects.closed() && hasNegativeVolume(mesh);
   const DisjointSets parts = partsOf(mesh);
   const auto partOf = [&](std::uint32_t t) { return parts.find(mesh.triangles[t][0]); };
-  const auto cornersOf = [&](std::uint32_t t) {
-    const auto& [p, q, r] = mesh.triangles[t];
-    return Corners{mesh.positions[p], mesh.positions[q], mesh.positions[r]};
+  const auto cornersAt = [&](std::uint32_t t) {
+    return cornersOf(mesh.triangles[t], mesh.positions);
   };
   SignCounts counts;
   collisions.addCollisionPair(id, id, {Method::Intersection, 0.0});
   collisions.forEachCandidate(id, id, [&](std::span<const ElementPair> candidates) {
     for (const ElementPair& pair : candidates)
       if (partOf(pair.a) != partOf(pair.b) &&
-          intersectTriangles(cornersOf(pair.a), cornersOf(pair.b), counts).intersect())
+          intersectTriangles(cornersAt(pair.a), cornersAt(pair.b), counts).intersect())
         defects.overlapping.push_back(pair);
   });
   std::sort(defects.overlapping.begin(), defects.overlapping.end());

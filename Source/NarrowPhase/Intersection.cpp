@@ -7,6 +7,7 @@
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/TriangleIntersection.h"
 #include "Exact/Predicates.h"
@@ -29,7 +30,7 @@ struct MeshTriangle {
       : mesh(ofMesh),
         id(triangle),
         vertices(mesh.topology.triangles[id]),
-        positions{at[vertices[0]], at[vertices[1]], at[vertices[2]]} {}
+        positions(cornersOf(vertices, at)) {}
 
   /// kNoEdge between two corners that are one vertex.
   std::uint32_t edge(int i) const { return mesh.topology.triangleEdges[id][i]; }

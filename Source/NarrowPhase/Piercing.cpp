@@ -4,6 +4,7 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
@@ -23,8 +24,7 @@ struct PlacedMesh {
   PlacedMesh(const TriangleMesh& mesh, bool atStart)
       : topology(mesh.topology), at(atStart ? mesh.before : mesh.now) {}
   Corners corners(std::uint32_t triangle) const {
-    const auto& [a, b, c] = topology.triangles[triangle];
-    return {at[a], at[b], at[c]};
+    return cornersOf(topology.triangles[triangle], at);
   }
 };
 

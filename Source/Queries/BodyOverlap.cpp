@@ -1,5 +1,6 @@
 #include "Queries/BodyOverlap.h"
 
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
@@ -97,9 +98,8 @@ bool isConvex(const BodyPair& pair, bool ofA) {
   if (number != 1 && number != -1) return false;
   // Whether no point is in front of a triangle's outer side.
   const auto isBehind = [&](std::uint32_t triangle, const Vector3d& p) {
-    const Triangle& t = topology.triangles[triangle];
-    const Vector3d normal = windingNormal(positions[t[0]], positions[t[1]], positions[t[2]]);
-    return number * normal.dot(p - positions[t[0]]) <= most;
+    const auto [a, b, c] = cornersOf(topology.triangles[triangle], positions);
+    return number * windingNormal(a, b, c).dot(p - a) <= most;
   };
   for (std::uint32_t e = 0; e < topology.edges.size(); ++e) {
     const auto both = topology.edgeTriangles[e];

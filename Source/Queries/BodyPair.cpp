@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Queries/GeometryDistances.h"
+#include "Mesh/Corners.h"
 #include "Math/RayCrossing.h"
 #include "Math/Tolerances.h"
 
@@ -85,9 +86,7 @@ Corners BodyPair::cornersOfA(std::uint32_t element, const Vector3d& shift) const
 }
 
 Corners BodyPair::cornersOfB(std::uint32_t element) const {
-  const Triangle& t = m_b.mesh.topology.triangles[element];
-  const auto& p = m_scratch.b.positions;
-  return {p[t[0]], p[t[1]], p[t[2]]};
+  return cornersOf(m_b.mesh.topology.triangles[element], m_scratch.b.positions);
 }
 
 void BodyPair::forEachIntersecting(
@@ -152,10 +151,10 @@ bool BodyPair::isInBoth(const Vector3d& p) const {
 /// must be tested.
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   SignCounts counts;
-  const auto cornersOf = [&](std::size_t i) {
+  const auto cornersAt = [&](std::size_t i) {
     return cornersOfA(static_cast<std::uint32_t>(i), shift);
   };
-  const int number = windingNumber(m_a.mesh.topology.triangles.size(), cornersOf, p, counts);
+  const int number = windingNumber(m_a.mesh.topology.triangles.size(), cornersAt, p, counts);
   m_scratch.stack.exactDecisions += counts.undecided;
   return number != 0;
 }

@@ -7,7 +7,6 @@
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Math/TriangleIntersection.h"
 #include "Core/Assert.h"
 
 #include <Eigen/Geometry>
@@ -86,10 +85,8 @@ Vector3d closestOnSegment(const Vector3d& p, const Vector3d& a, const Vector3d& 
 OuterSurface::OuterSurface(const Body& geometry, bool bruteForce)
     : m_geometry(geometry), m_bruteForce(bruteForce) {}
 
-std::array<Vector3d, 3> OuterSurface::cornersOf(std::uint32_t element) const {
-  const auto& [i, j, k] = m_geometry.mesh.topology.triangles[element];
-  const Positions& now = m_geometry.mesh.now;
-  return {now[i], now[j], now[k]};
+Corners OuterSurface::cornersOf(std::uint32_t element) const {
+  return palpate::cornersOf(m_geometry.mesh.topology.triangles[element], m_geometry.mesh.now);
 }
 
 /// L: how far beside the surface winding numbers are asked for.

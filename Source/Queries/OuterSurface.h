@@ -2,6 +2,7 @@
 
 #include "Queries/PointDistances.h"
 #include "Bodies/Body.h"
+#include "Mesh/Corners.h"
 #include "Core/CountedVector.h"
 
 #include <Eigen/Core>
@@ -65,7 +66,7 @@ class OuterSurface {
                  const WindingNumber&) const;
   bool holdsPoint(const Eigen::Vector3d& q, const Eigen::Vector3d& from, int number,
                   const WindingNumber&) const;
-  std::array<Eigen::Vector3d, 3> cornersOf(std::uint32_t element) const;
+  Corners cornersOf(std::uint32_t element) const;
   double aside(const Eigen::Vector3d& p) const;
 
   const Body& m_geometry;

@@ -3,6 +3,7 @@
 #include <palpate/Error.h>
 
 #include "Queries/QuerySource.h"
+#include "Mesh/Corners.h"
 #include "Math/Tolerances.h"
 #include "Exact/Predicates.h"
 #include "Core/FloatingPoint.h"
@@ -14,13 +15,6 @@
 namespace palpate {
 
 namespace {
-
-using Corners = std::array<Eigen::Vector3d, 3>;
-
-Corners cornersOf(const Body& body, const Triangle& t) {
-  const Positions& now = body.mesh.now;
-  return {now[t[0]], now[t[1]], now[t[2]]};
-}
 
 Eigen::Vector3d pointAt(const Corners& corners, const Eigen::Vector3d& weights) {
   return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
@@ -111,7 +105,7 @@ class PenetrationTracker::Implementation::Search {
     const auto testOne = [&](std::uint32_t i) {
       const std::uint32_t id = m_body.tree.octree().order()[i];
       const Triangle& triangle = m_body.tree.ordered()[i];
-      const Corners corners = cornersOf(m_body, triangle);
+      const Corners corners = cornersOf(triangle, m_body.mesh.now);
       const auto weights = crossing(p, q, corners, counts);
       if (!weights) return;
       const double depth = (pointAt(corners, *weights) - p).dot(direction);
@@ -134,7 +128,8 @@ class PenetrationTracker::Implementation::Search {
   TrackedVertex operator()(const InsideVertex& nearest, const Eigen::Vector3d& p,
                            const VertexState* earlier) {
     if (!earlier) return {nearest, nearest, DirectionChange::Entered};
-    const Corners corners = cornersOf(m_body, m_body.mesh.topology.triangles[earlier->triangle]);
+    const Corners corners =
+        cornersOf(m_body.mesh.topology.triangles[earlier->triangle], m_body.mesh.now);
     const Eigen::Matrix3d rotation = rotationOf(earlier->triangleAt, corners);
     const Eigen::Vector3d direction = (rotation * earlier->direction).normalized();
     const Eigen::Vector3d moved =
@@ -209,8 +204,13 @@ std::span<const TrackedVertex> PenetrationTracker::update(const SpatialQueries& 
       const Eigen::Vector3d p = vertices.mesh.now[vertex];
       all.found[i] = search(all.inside[i], p, known ? &*last : nullptr);
       const InsideVertex& at = all.found[i].penetration;
-      all.now[i] = {
-          vertex, at.triangle, at.weights, at.direction, at.depth, p, cornersOf(body, at.vertices)};
+      all.now[i] = {vertex,
+                    at.triangle,
+                    at.weights,
+                    at.direction,
+                    at.depth,
+                    p,
+                    cornersOf(at.vertices, body.mesh.now)};
     }
   });
   all.nowTopology.commit(topologies);

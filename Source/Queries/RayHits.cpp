@@ -2,6 +2,7 @@
 
 #include "Queries/ElementDistance.h"
 #include "Bodies/OctreeFrame.h"
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
 #include "Math/Tolerances.h"
@@ -209,7 +210,7 @@ int RayHits::compare(const Met& one, bool lastOfFirst, const Met& two, bool last
 RayHit RayHits::hitOf(const Met& met, double t, bool frontFace, bool crosses) const {
   const Triangle& corners = m_geometry.tree.ordered()[met.place];
   const Positions& now = m_geometry.mesh.now;
-  const Vector3d a = now[corners[0]], b = now[corners[1]], c = now[corners[2]];
+  const auto [a, b, c] = cornersOf(corners, now);
   if (!m_isSolid) {
     const RayPoint at = firstPoint(m_ray, met.interval, a, b, c, &m_exactDecisions);
     return {m_geometry.id, met.element, corners, at.weights, at.t, frontFace, crosses};

@@ -4,6 +4,7 @@
 #include "Queries/OverlapSearch.h"
 #include "Queries/PointDistances.h"
 #include "Shapes/Shape.h"
+#include "Mesh/Corners.h"
 #include "Math/ConvexMinimum.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
@@ -293,9 +294,8 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
                     near);
   for (const std::uint32_t place : near) {
     const std::uint32_t element = geometry.tree.octree().order()[place];
-    const auto& [a, b, c] = ordered[place];
     const auto decided = convex->slabCount > 0
-                             ? meetsSlabs(*convex, {mesh.now[a], mesh.now[b], mesh.now[c]})
+                             ? meetsSlabs(*convex, cornersOf(ordered[place], mesh.now))
                              : std::nullopt;
     if (!decided)
       test(element);

@@ -1,5 +1,6 @@
 #include "Queries/SurfaceNormal.h"
 
+#include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Foot.h"
 #include "Math/StableLength.h"
@@ -38,11 +39,6 @@ double angleAt(const std::array<Vector3d, 3>& p, std::size_t corner) {
   return angleOf(stableLength(u.cross(v)), u.dot(v));
 }
 
-std::array<Vector3d, 3> cornersOf(const TriangleMesh& mesh, std::uint32_t triangle) {
-  const Triangle& t = mesh.topology.triangles[triangle];
-  return {mesh.now[t[0]], mesh.now[t[1]], mesh.now[t[2]]};
-}
-
 /// The sum of the unit normals of these triangles, each times weight(triangle, corners). A triangle
 /// without area counts for nothing.
 template <class Weight>
@@ -50,7 +46,7 @@ Vector3d sumOfNormals(const TriangleMesh& mesh, std::span<const std::uint32_t> t
                       Weight&& weight) {
   Vector3d sum = Vector3d::Zero();
   for (const std::uint32_t t : triangles) {
-    const std::array<Vector3d, 3> p = cornersOf(mesh, t);
+    const Corners p = cornersOf(mesh.topology.triangles[t], mesh.now);
     sum += weight(t, p) * unitCross(p[0], p[1], p[0], p[2]);
   }
   return sum;
@@ -92,7 +88,7 @@ Vector3d surfaceNormal(const Body& body, std::uint32_t element, const Vector3d& 
     const Vector3d sum = sumAround(mesh, mesh.topology.triangles[element], weights);
     if (stableLength(sum) > kOpposedNormals) return stableUnit(sum);
   }
-  const auto [a, b, c] = cornersOf(mesh, element);
+  const auto [a, b, c] = cornersOf(mesh.topology.triangles[element], mesh.now);
   return windingNormal(a, b, c);
 }
 

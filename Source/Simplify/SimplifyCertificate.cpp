@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Queries/PointDistances.h"
+#include "Mesh/Corners.h"
 #include "Core/Assert.h"
 
 #include <Eigen/Geometry>
@@ -47,12 +48,10 @@ void SimplifyCertificate::forEachTouched(const Corners& triangle, PointQueryStac
   box.add(m_frame.boxOf(triangle[1]));
   box.add(m_frame.boxOf(triangle[2]));
   findOverlapping(m_geometry.tree.octree(), m_frame.map(), box, stack);
-  const Positions& now = m_geometry.mesh.now;
   SignCounts counts;
   for (const std::uint32_t place : stack.found) {
-    const auto& [a, b, c] = m_geometry.tree.ordered()[place];
-    if (intersectTriangles(triangle, {now[a], now[b], now[c]}, counts).intersect() && !f(place))
-      return;
+    const Corners other = cornersOf(m_geometry.tree.ordered()[place], m_geometry.mesh.now);
+    if (intersectTriangles(triangle, other, counts).intersect() && !f(place)) return;
   }
 }
 

@@ -9,6 +9,7 @@
 #include "Queries/ClosedBody.h"
 #include "Queries/PointDistances.h"
 #include "Octree/Traversal.h"
+#include "Mesh/Corners.h"
 #include "Core/Assert.h"
 #include "Core/Text.h"
 
@@ -258,10 +259,6 @@ Moved moveOutward(const Source& source, const Collapsed& collapsed,
   return moved;
 }
 
-Corners cornersOf(std::span<const Vector3d> positions, const Triangle& triangle) {
-  return {positions[triangle[0]], positions[triangle[1]], positions[triangle[2]]};
-}
-
 /// L: how far a triangle that touches the mesh has to move; 0 if it has met another side of it.
 /// touched: places of the mesh's triangles, in the octree's order. error: L, that of the triangle.
 double liftOf(const Source& source, const Corners& corners, const Vector3d& normal,
@@ -287,7 +284,7 @@ Marks liftTouching(const Source& source, const Collapsed& collapsed, Loops& loop
     loops.forEach(size, [&](std::size_t t, PointQueryStack& stack) {
       if (isOld[t]) return;
       const Triangle& triangle = collapsed.triangles[t];
-      const Corners corners = cornersOf(moved.positions, triangle);
+      const Corners corners = cornersOf(triangle, moved.positions);
       std::vector<std::uint32_t> touched;
       source.certificate.findTouched(corners, stack, touched);
       isTouching[t] = !touched.empty();
@@ -319,7 +316,7 @@ std::vector<double> distanceBounds(const Source& source, std::span<const Triangl
   std::vector<double> bounds(triangles.size(), kInfinity);
   loops.forEach(triangles.size(), [&](std::size_t t, PointQueryStack& stack) {
     if (failed[t]) return;
-    const Corners corners = cornersOf(moved.positions, triangles[t]);
+    const Corners corners = cornersOf(triangles[t], moved.positions);
     bounds[t] = source.certificate.distanceBound(corners, stack).value_or(kInfinity);
   });
   return bounds;
@@ -406,7 +403,7 @@ std::optional<Failure> refineFailed(const Source& source, const Collapsed& colla
 std::optional<ElementPair> findCrossing(const Body& body) {
   std::optional<ElementPair> first;
   const auto corners = [&](std::uint32_t t) {
-    return cornersOf(body.mesh.now.body(), body.mesh.topology.triangles[t]);
+    return cornersOf(body.mesh.topology.triangles[t], body.mesh.now.body());
   };
   auto test = [&](std::span<const ElementPair> pairs) {
     SignCounts counts;
