@@ -38,7 +38,9 @@ struct Features {
     return vertex < (kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2) ? first : second;
   }
   ImpactQuery query(std::uint32_t firstId, std::uint32_t secondId) const {
-    const auto ids = vertices(firstId, secondId);
+    return query(vertices(firstId, secondId));
+  }
+  ImpactQuery query(const std::array<std::uint32_t, 4>& ids) const {
     ImpactQuery result{kind, {}};
     for (int i = 0; i < 4; ++i)
       result.vertices[i] = {meshOf(i).before[ids[i]], meshOf(i).now[ids[i]]};

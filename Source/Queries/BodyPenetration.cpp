@@ -48,6 +48,19 @@ struct Translation {
   bool separates = false;  ///< proven; else it ended at the limit
 };
 
+/// Calls f(direction) for directions around the sphere: to a grid on the surface of a cube.
+template <class F>
+void forEachAround(F&& f) {
+  constexpr int kSteps = 2;
+  for (int x = -kSteps; x <= kSteps; ++x)
+    for (int y = -kSteps; y <= kSteps; ++y)
+      for (int z = -kSteps; z <= kSteps; ++z)
+        if (std::max({std::abs(x), std::abs(y), std::abs(z)}) == kSteps) {
+          const Vector3d direction(x, y, z);
+          f(Vector3d(direction / stableLength(direction)));
+        }
+}
+
 class Search {
  public:
   Search(const BodyPair& pair, PenetrationScratch& scratch, const PenetrationEffort& effort)
@@ -222,7 +235,8 @@ class Search {
     auto& seeds = m_scratch.seeds;
     seeds.clear();
     addNormals();
-    if (m_effort.aroundTheSphere || !m_best.separates) addSphere();
+    if (m_effort.aroundTheSphere || !m_best.separates)
+      forEachAround([&](const Vector3d& direction) { seeds.push_back({direction, seeds.size()}); });
     for (auto& seed : seeds) seed.bound = boundOf(seed.direction);
     std::sort(seeds.begin(), seeds.end(), [](const auto& l, const auto& r) {
       return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
@@ -269,18 +283,6 @@ class Search {
         sum += (ofA ? -1.0 : 1.0) * normalOf(ofA, m_pair.vertices(ofA).triangleOf[v]);
     const double length = stableLength(sum);
     return length > 0 ? Vector3d(sum / length) : sum;
-  }
-  /// Directions around the sphere: to a grid on the surface of a cube.
-  void addSphere() {
-    constexpr int kSteps = 2;
-    for (int x = -kSteps; x <= kSteps; ++x)
-      for (int y = -kSteps; y <= kSteps; ++y)
-        for (int z = -kSteps; z <= kSteps; ++z)
-          if (std::max({std::abs(x), std::abs(y), std::abs(z)}) == kSteps) {
-            const Vector3d direction(x, y, z);
-            m_scratch.seeds.push_back(
-                {direction / stableLength(direction), m_scratch.seeds.size()});
-          }
   }
 
   // ---- The answer ----

@@ -1,10 +1,10 @@
 #include "Validity/IntersectionAtEnd.h"
 
+#include "NarrowPhase/Continuous.h"
 #include "Math/MotionBound.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <span>
 
@@ -15,27 +15,16 @@ namespace {
 /// Triangle pairs that may be tested besides one for each contact, and pairs tested together.
 constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
 
-/// motionBound() of features whose vertices are `ids`, the first ones of mesh `a`.
-template <ImpactQuery::Kind kind>
-double motionOf(const TriangleMesh& a, const TriangleMesh& b,
-                const std::array<std::uint32_t, 4>& ids) {
-  constexpr std::size_t kFirsts = kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2;
-  ImpactQuery query{kind, {}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const TriangleMesh& mesh = i < kFirsts ? a : b;
-    query.vertices[i] = {mesh.before[ids[i]], mesh.now[ids[i]]};
-  }
-  return motionBound<kind>(query);
-}
-
 double motionOf(const TriangleMesh& vertices, const TriangleMesh& triangles,
                 const VertexTriangleContact& c) {
+  constexpr auto kKind = ImpactQuery::Kind::VertexTriangle;
   const auto& [i, j, k] = c.vertices;
-  return motionOf<ImpactQuery::Kind::VertexTriangle>(vertices, triangles, {c.vertex, i, j, k});
+  return motionBound<kKind>(Features<kKind>{vertices, triangles}.query({c.vertex, i, j, k}));
 }
 double motionOf(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
-  return motionOf<ImpactQuery::Kind::EdgeEdge>(a, b,
-                                               {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]});
+  constexpr auto kKind = ImpactQuery::Kind::EdgeEdge;
+  return motionBound<kKind>(
+      Features<kKind>{a, b}.query({c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}));
 }
 
 }  // namespace

@@ -117,6 +117,21 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
   }
 }
 
+/// Writes the lists of features. reportsImpacts: vertices that touched have impacts, and are
+/// trusted.
+void listFeatures(const StepFacts& facts, bool reportsImpacts, Validity& validity) {
+  const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
+    out.assign(ids.begin(), ids.end());
+  };
+  take(validity.degenerateTrianglesA, facts.degenerateA);
+  take(validity.degenerateTrianglesB, facts.degenerateB);
+  validity.untrustedVerticesA.clear();
+  validity.untrustedVerticesB.clear();
+  if (reportsImpacts) return;
+  take(validity.untrustedVerticesA, facts.verticesA);
+  take(validity.untrustedVerticesB, facts.verticesB);
+}
+
 }  // namespace
 
 std::array<Trust::SurfaceState, 2> Trust::statesOf(const GeometryInStep& a, const Positions& ofA,
@@ -189,17 +204,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                                 : plan.method == Method::Intersection
                                     ? 0.0
                                     : settings.thickness + plan.step.extraThickness;
-  const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
-    out.assign(ids.begin(), ids.end());
-  };
-  take(validity.degenerateTrianglesA, facts.degenerateA);
-  take(validity.degenerateTrianglesB, facts.degenerateB);
-  validity.untrustedVerticesA.clear();
-  validity.untrustedVerticesB.clear();
-  if (!plan.step.reportsImpacts) {
-    take(validity.untrustedVerticesA, facts.verticesA);
-    take(validity.untrustedVerticesB, facts.verticesB);
-  }
+  listFeatures(facts, plan.step.reportsImpacts, validity);
   if (plan.step.checksStart) {
     m_atStart = {};
     m_atStart.meeting = facts.atStart;
