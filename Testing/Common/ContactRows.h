@@ -102,6 +102,18 @@ inline void expectSameRows(const Rows& found, const Rows& truth) {
   EXPECT_EQ(found.earliestTimeOfImpact, truth.earliestTimeOfImpact);
 }
 
+/// Expects equal contacts of every kind, bit by bit, and prints the first that differs.
+inline void expectSameContacts(const CollisionData& found, const CollisionData& truth) {
+  expectSameRows(Rows(found), Rows(truth));
+  const auto expectSameList = [](const auto& l, const auto& r) {
+    EXPECT_EQ(l.size(), r.size());
+    const auto at = std::mismatch(l.begin(), l.end(), r.begin(), r.end()).first - l.begin();
+    EXPECT_TRUE(std::equal(l.begin(), l.end(), r.begin(), r.end())) << "contact " << at;
+  };
+  expectSameList(found.shape(), truth.shape());
+  expectSameList(found.shapeShape(), truth.shapeShape());
+}
+
 /// Rows ascend by their first ids, and each row occurs once.
 inline bool ascend(const std::vector<Row>& rows, std::size_t idWords) {
   return std::adjacent_find(rows.begin(), rows.end(), [&](const Row& p, const Row& q) {

@@ -2,6 +2,8 @@
 
 #include <palpate/Types.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -97,6 +99,42 @@ inline Mesh boxMesh(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
                                 v & 4 ? high[2] : low[2]);
   mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
                     {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  return mesh;
+}
+
+/// The cube [low, high]³.
+inline Mesh cube(double low, double high) {
+  return boxMesh(Eigen::Vector3d::Constant(low), Eigen::Vector3d::Constant(high));
+}
+
+/// A box whose faces are divided into n x n squares, wound outward.
+inline Mesh dividedBox(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper, int n = 1) {
+  Mesh mesh;
+  std::vector<std::array<int, 3>> places;
+  const auto vertexAt = [&](const std::array<int, 3>& place) {
+    const auto known = std::find(places.begin(), places.end(), place);
+    if (known != places.end()) return static_cast<std::uint32_t>(known - places.begin());
+    const Eigen::Vector3d share = Eigen::Vector3d(place[0], place[1], place[2]) / n;
+    mesh.positions.push_back(lower + share.cwiseProduct(upper - lower));
+    places.push_back(place);
+    return static_cast<std::uint32_t>(places.size() - 1);
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const int side : {0, 1})
+      for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+          const auto corner = [&](int u, int v) {
+            std::array<int, 3> place{};
+            place[axis] = side * n;
+            place[(axis + 1) % 3] = u;
+            place[(axis + 2) % 3] = v;
+            return vertexAt(place);
+          };
+          const std::uint32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
+                              d = corner(i, j + 1);
+          mesh.triangles.push_back(side ? Triangle{a, b, c} : Triangle{a, c, b});
+          mesh.triangles.push_back(side ? Triangle{a, c, d} : Triangle{a, d, c});
+        }
   return mesh;
 }
 

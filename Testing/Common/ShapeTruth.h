@@ -17,6 +17,20 @@ namespace palpate::testing {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+/// The minimum of a convex function over [0, 1].
+template <class F>
+double minimumOf(F&& f) {
+  double low = 0, high = 1;
+  for (int i = 0; i < 50; ++i) {
+    const double third = (high - low) / 3;
+    if (f(low + third) <= f(high - third))
+      high -= third;
+    else
+      low += third;
+  }
+  return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
+}
+
 struct PlacedShape {
   AnalyticalGeometry geometry;
   Matrix3d rotation = Matrix3d::Identity();

@@ -44,6 +44,15 @@ struct TestGeometry {
     }
     return {};
   }
+  /// As contacts and queries name their vertices: {p, q, q} for a segment and {p, p, p} for a
+  /// point.
+  std::vector<Triangle> elements() const {
+    std::vector<Triangle> all = triangles;
+    for (const auto& [p, q] : segments) all.push_back({p, q, q});
+    if (type == GeometryType::Points)
+      for (std::uint32_t p = 0; p < positions.size(); ++p) all.push_back({p, p, p});
+    return all;
+  }
   double radius(std::uint32_t vertex) const { return radii.size() == 1 ? radii[0] : radii[vertex]; }
   std::vector<Segment> edges() const {
     std::set<Segment> all;

@@ -73,22 +73,13 @@ std::size_t compare(const std::map<Ids, Exact>& all, const std::map<Ids, double>
   return found.size();
 }
 
-std::vector<Triangle> elementsOf(const TestGeometry& geometry) {
-  std::vector<Triangle> elements = geometry.triangles;
-  for (const auto& [p, q] : geometry.segments) elements.push_back({p, q, q});
-  for (std::uint32_t i = 0; geometry.type == GeometryType::Points && i < geometry.positions.size();
-       ++i)
-    elements.push_back({i, i, i});
-  return elements;
-}
-
 /// Points against lines or points, and lines against lines.
 std::size_t compareWithRationals(const TestGeometry& a, const TestGeometry& b, double thickness) {
   const CollisionData data = answer(a, b, {Method::Proximity, thickness, Contacts::All});
   std::map<Ids, Exact> vertexTriangle, edges;
   std::map<Ids, double> foundVertexTriangle, foundEdges;
   if (a.type == GeometryType::Points) {
-    const std::vector<Triangle> elements = elementsOf(b);
+    const std::vector<Triangle> elements = b.elements();
     for (std::uint32_t v = 0; v < a.positions.size(); ++v)
       for (std::uint32_t t = &a == &b ? v + 1 : 0; t < elements.size(); ++t)
         vertexTriangle.emplace(Ids{v, t}, pointElement(a, v, b, elements[t]));
@@ -199,7 +190,7 @@ TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
     std::map<Ids, double> found;
     for (const auto& c : data.vertexTriangle())
       found.emplace(Ids{c.vertex, c.triangle}, c.timeOfImpact);
-    const std::vector<Triangle> elements = elementsOf(other);
+    const std::vector<Triangle> elements = other.elements();
     for (std::uint32_t v = 0; v < now.size(); ++v)
       for (std::uint32_t t = 0; t < elements.size(); ++t) {
         const auto& [i, j, k] = elements[t];

@@ -2,14 +2,12 @@
 
 #include "Common/PairRun.h"
 #include "Common/Sanitized.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
+#include "Common/StepBodies.h"
 #include "Common/DegenerateCases.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <limits>
 #include <map>
 #include <string>
@@ -272,94 +270,7 @@ class Law {
   const bool m_hasCylinder;
 };
 
-/// Anything that an OctreeBasedCD holds, with its motion in the step.
-struct PlacedBody {
-  std::string name;
-  std::function<GeometryId(OctreeBasedCD&)> add;
-  Side side;  ///< empty for a shape
-  std::function<void(OctreeBasedCD&, GeometryId)> move;
-};
-
-PlacedBody bodyOf(std::string name, const TestGeometry& geometry, Positions now) {
-  return {std::move(name),
-          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); },
-          {geometry.positions, now, geometry.radii},
-          [=](OctreeBasedCD& collisions, GeometryId id) {
-            collisions.setPositions(id, geometry.positions, now);
-          }};
-}
-
-/// The same as a placed body: its frame is turned and shifted, and turns further in the step.
-PlacedBody placed(std::string name, const TestGeometry& geometry, double angle,
-                  const Vector3d& shift) {
-  using Turn = Eigen::AngleAxisd;
-  const Vector3d axis = Vector3d(1, 2, 3).normalized(), centre(0.5, 0.5, 0.5);
-  const std::array<Eigen::Matrix3d, 2> turns{Turn(0.3, axis).toRotationMatrix(),
-                                             Turn(0.3 + angle, axis).toRotationMatrix()};
-  const std::array<Vector3d, 2> shifts{centre - turns[0] * centre,
-                                       centre - turns[1] * centre + shift};
-  Side side{{}, {}, geometry.radii};
-  for (const Vector3d& x : geometry.positions) {
-    side.before.push_back(turns[0] * x + shifts[0]);
-    side.now.push_back(turns[1] * x + shifts[1]);
-  }
-  return {std::move(name),
-          [geometry](OctreeBasedCD& collisions) { return geometry.addTo(collisions); }, side,
-          [=](OctreeBasedCD& collisions, GeometryId id) {
-            collisions.setTransform(id, {turns[0], shifts[0]}, {turns[1], shifts[1]});
-          }};
-}
-
-PlacedBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
-  return {std::move(name),
-          [=](OctreeBasedCD& collisions) { return collisions.addAnalyticalGeometry(shape); },
-          {},
-          [=](OctreeBasedCD& collisions, GeometryId id) {
-            const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
-            collisions.setTransform(id, {none, Vector3d::Zero()}, {none, motion});
-          }};
-}
-
-/// Every geometry type in the unit cube, with steps of about `motion`.
-std::vector<PlacedBody> bodies(Random& random, double motion) {
-  const TestGeometry triangles = testGeometry(soup(random, 60, 0.15)),
-                     sheets = testGeometry(sheet(6, 0.5, 0.3)),
-                     line = thread(random, 40, 0.15, 0.02, false),
-                     points = particles(random, 50, 0.03);
-  const TestGeometry taperedLine = tapered(random, line, 0.05),
-                     taperedPoints = tapered(random, points, 0.05);
-  Solid block = cells(2, random);
-  for (Vector3d& x : block.positions) x = 0.25 * x + Vector3d(0.3, 0.25, 0.27);
-  const Positions blockNow = moved(random, block.positions, motion);
-  std::vector<PlacedBody> all;
-  all.push_back(bodyOf("triangles", triangles, moved(random, triangles.positions, motion)));
-  all.push_back(bodyOf("sheet", sheets, moved(random, sheets.positions, motion)));
-  all.push_back(placed("placed triangles", triangles, motion, Vector3d::Constant(motion)));
-  all.push_back({"tetrahedra",
-                 [=](OctreeBasedCD& collisions) {
-                   return collisions.addTetrahedralMesh(block.positions, block.tetrahedra);
-                 },
-                 {block.positions, blockNow, {}},
-                 [=](OctreeBasedCD& collisions, GeometryId id) {
-                   collisions.setPositions(id, block.positions, blockNow);
-                 }});
-  all.push_back(bodyOf("line", line, moved(random, line.positions, motion)));
-  all.push_back(bodyOf("tapered line", taperedLine, moved(random, line.positions, motion)));
-  all.push_back(bodyOf("points", points, moved(random, points.positions, motion)));
-  all.push_back(placed("placed points", points, motion, Vector3d::Constant(-motion)));
-  all.push_back(bodyOf("tapered points", taperedPoints, moved(random, points.positions, motion)));
-  const Vector3d way(motion, 0, -motion);
-  all.push_back(shapeOf("sphere", Sphere{{0.5, 0.5, 0.5}, 0.2}, way));
-  all.push_back(shapeOf("capsule", Capsule{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.1}, way));
-  all.push_back(shapeOf("plane", Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}}, way));
-  all.push_back(shapeOf("two-sided plane", Plane{{0.5, 0.5, 0.5}, {0.3, 0.1, 1}, true}, way));
-  all.push_back(shapeOf("box", Box{{0.5, 0.5, 0.5}, {0.2, 0.1, 0.15}}, way));
-  all.push_back(shapeOf("cylinder", Cylinder{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.1}, way));
-  all.push_back(shapeOf(
-      "hull", ConvexHull{{{0.3, 0.3, 0.3}, {0.7, 0.4, 0.3}, {0.5, 0.7, 0.4}, {0.5, 0.5, 0.8}}},
-      way));
-  return all;
-}
+Side sideOf(const StepBody& body) { return {body.before, body.now, body.radii}; }
 
 std::vector<PairSettings> everySetting(double thickness) {
   std::vector<PairSettings> all{{Method::Intersection, 0.0}, {Method::Auto, 0.0}};
@@ -391,13 +302,13 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
   std::size_t number = 0;
   for (const double motion : {0.0, 0.01, 0.2}) {
     Random random(181);
-    const std::vector<PlacedBody> all = bodies(random, motion);
+    const std::vector<StepBody> all = bodiesOfEveryType(random, motion);
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = i; j < all.size(); ++j) {
-        const PlacedBody &first = all[i], &second = all[j];
+        const StepBody &first = all[i], &second = all[j];
         for (const bool turned : {false, true}) {
           if (turned && i == j) continue;
-          const PlacedBody &a = turned ? second : first, &b = turned ? first : second;
+          const StepBody &a = turned ? second : first, &b = turned ? first : second;
           for (const PairSettings& settings : everySetting(0.05)) {
             if (isLeftOut(number++)) continue;
             OctreeBasedCD collisions;
@@ -419,7 +330,8 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
                          std::to_string(settings.thickness) + ", motion " + std::to_string(motion));
             Seen& seen = byMethod[std::to_string(static_cast<int>(settings.method)) + "/" +
                                   std::to_string(static_cast<int>(method))];
-            Law(data, a.side, b.side, settings, seen, a.name == "cylinder" || b.name == "cylinder")
+            Law(data, sideOf(a), sideOf(b), settings, seen,
+                a.name == "cylinder" || b.name == "cylinder")
                 .expect();
             if (HasFatalFailure() || HasNonfatalFailure()) return;
           }
@@ -456,10 +368,12 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
 /// Degenerate meshes, coordinates near the ends of the range of double, and self-collision.
 TEST(ContactLaw, HoldsForDegenerateMeshes) {
   Seen seen;
+  std::size_t number = 0;
   for (const DegenerateCase& input : degenerateCases()) {
     const auto aBefore = input.aBefore(), bBefore = input.bBefore();
     const Side a{aBefore, input.a.positions, {}}, b{bBefore, input.b.positions, {}};
     for (const MethodCase& method : methodCases(input.thickness)) {
+      if (isLeftOut(number++)) continue;
       SCOPED_TRACE(input.name + ", " + method.name);
       PairRun run(settingsOf(Engine::Octree), input.a, input.b, method.settings, !input.large);
       run.step(aBefore, a.now, bBefore, b.now);
@@ -470,8 +384,8 @@ TEST(ContactLaw, HoldsForDegenerateMeshes) {
       if (HasFatalFailure() || HasNonfatalFailure()) return;
     }
   }
-  EXPECT_GT(seen.counts["touching"], 1000u);
-  EXPECT_GT(seen.counts["edges"], 1000u);
+  EXPECT_GT(seen.counts["touching"], leastOf(1000));
+  EXPECT_GT(seen.counts["edges"], leastOf(1000));
 }
 
 /// The tip of a spike below a face: a solver that corrects it to a gap of 0.05 brings it above.

@@ -15,7 +15,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <map>
 
 namespace palpate::testing {
 
@@ -35,44 +34,6 @@ struct Scene {
   bool isPlaced = false;
 };
 
-/// A box with n x n quads on each side.
-Mesh finePlate(std::uint32_t n, const Vector3d& half) {
-  Mesh mesh;
-  const auto addSide = [&](int axis, double sign) {
-    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-    for (std::uint32_t j = 0; j <= n; ++j)
-      for (std::uint32_t i = 0; i <= n; ++i) {
-        Vector3d p;
-        p[axis] = sign * half[axis];
-        p[(axis + 1) % 3] = half[(axis + 1) % 3] * (2.0 * i / n - 1);
-        p[(axis + 2) % 3] = half[(axis + 2) % 3] * (2.0 * j / n - 1);
-        mesh.positions.push_back(p);
-      }
-    for (std::uint32_t j = 0; j < n; ++j)
-      for (std::uint32_t i = 0; i < n; ++i) {
-        std::uint32_t v = first + j * (n + 1) + i, a = v + 1, b = v + n + 1;
-        if (sign < 0) std::swap(a, b);
-        mesh.triangles.push_back({v, a, v + n + 2});
-        mesh.triangles.push_back({v, v + n + 2, b});
-      }
-  };
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double sign : {-1.0, 1.0}) addSide(axis, sign);
-  // Joins the sides.
-  std::map<std::array<double, 3>, std::uint32_t> places;
-  Mesh joined;
-  std::vector<std::uint32_t> names;
-  for (const Vector3d& p : mesh.positions) {
-    const auto [place, isNew] =
-        places.try_emplace({p[0], p[1], p[2]}, static_cast<std::uint32_t>(joined.positions.size()));
-    if (isNew) joined.positions.push_back(p);
-    names.push_back(place->second);
-  }
-  for (const auto& [a, b, c] : mesh.triangles)
-    joined.triangles.push_back({names[a], names[b], names[c]});
-  return joined;
-}
-
 Mesh organ(Random& random) {
   Mesh mesh = sphere(28, 40, Vector3d::Zero(), 1.0);
   const Vector3d phase = randomPoint(random, 0, 6);
@@ -88,8 +49,8 @@ std::vector<Scene> scenes() {
       {"sphere", sphere(24, 36, {0.1, 0.2, 0.3}, 1.0), true, 0.05, 0.02},
       {"torus", torusMesh(40, 20), true, 0.04, 0.02},
       {"box", boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25}), true, 0.03, 1e-3},
-      {"fine box", finePlate(6, {1, 0.7, 0.5}), true, 0.05, 1e-4},
-      {"thin plate", finePlate(8, {1, 1, 0.004}), true, 0.05, 1e-3},
+      {"fine box", dividedBox({-1, -0.7, -0.5}, {1, 0.7, 0.5}, 6), true, 0.05, 1e-4},
+      {"thin plate", dividedBox({-1, -1, -0.004}, {1, 1, 0.004}, 8), true, 0.05, 1e-3},
       {"open sheet", sheet(24, 0.0, 0.4), false, 0.03, 4e-3},
       {"organ", organ(random), true, 0.05, 0.02},
       {"star", starMesh(random), true, 0.05, 0.01},

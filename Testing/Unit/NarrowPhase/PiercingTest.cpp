@@ -1,6 +1,8 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
 
+#include "Common/RandomMeshes.h"
+
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
@@ -49,22 +51,8 @@ TriangleMesh plate() {
 }
 
 TriangleMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
-  Vertices positions;
-  for (int i = 0; i < 8; ++i)
-    positions.emplace_back(i & 1 ? upper.x() : lower.x(), i & 2 ? upper.y() : lower.y(),
-                           i & 4 ? upper.z() : lower.z());
-  return piercingMesh(positions, {{0, 2, 3},
-                                  {0, 3, 1},
-                                  {4, 5, 7},
-                                  {4, 7, 6},
-                                  {0, 1, 5},
-                                  {0, 5, 4},
-                                  {2, 6, 7},
-                                  {2, 7, 3},
-                                  {0, 4, 6},
-                                  {0, 6, 2},
-                                  {1, 3, 7},
-                                  {1, 7, 5}});
+  const testing::Mesh box = testing::boxMesh(lower, upper);
+  return piercingMesh(box.positions, box.triangles);
 }
 
 TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector3d& shift) {

@@ -2,6 +2,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -14,38 +15,7 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
-using testing::Mesh;
-
-/// A box whose faces are divided into n x n squares, wound outward.
-Mesh dividedBox(const Vector3d& lower, const Vector3d& upper, int n = 1) {
-  Mesh mesh;
-  std::vector<std::array<int, 3>> places;
-  const auto vertexAt = [&](const std::array<int, 3>& place) {
-    const auto known = std::find(places.begin(), places.end(), place);
-    if (known != places.end()) return static_cast<std::uint32_t>(known - places.begin());
-    const Vector3d share = Vector3d(place[0], place[1], place[2]) / n;
-    mesh.positions.push_back(lower + share.cwiseProduct(upper - lower));
-    places.push_back(place);
-    return static_cast<std::uint32_t>(places.size() - 1);
-  };
-  for (int axis = 0; axis < 3; ++axis)
-    for (const int side : {0, 1})
-      for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
-          const auto corner = [&](int u, int v) {
-            std::array<int, 3> place{};
-            place[static_cast<std::size_t>(axis)] = side * n;
-            place[static_cast<std::size_t>((axis + 1) % 3)] = u;
-            place[static_cast<std::size_t>((axis + 2) % 3)] = v;
-            return vertexAt(place);
-          };
-          const std::uint32_t a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
-                              d = corner(i, j + 1);
-          mesh.triangles.push_back(side ? Triangle{a, b, c} : Triangle{a, c, b});
-          mesh.triangles.push_back(side ? Triangle{a, c, d} : Triangle{a, d, c});
-        }
-  return mesh;
-}
+using testing::dividedBox, testing::Mesh;
 
 /// A flat square of n x n squares in the plane z = height, wound up, or down if flipped.
 Mesh plate(int n, double halfSide, double height, bool flipped = false) {
@@ -252,7 +222,7 @@ class TouchSides : public ::testing::TestWithParam<Method> {
 /// came.
 TEST_P(TouchSides, OfParallelEdgesAreWhereTheyCameFrom) {
   Sides lines, triangles;
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < testing::casesOf(1000); ++i) {
     const Vector3d u = vector(8), at = vector(4), w = vector(9);
     if (w.cross(u).isZero()) continue;
     std::vector<Vector3d> a{at, at + u};
@@ -264,8 +234,8 @@ TEST_P(TouchSides, OfParallelEdgesAreWhereTheyCameFrom) {
     b.push_back(rounded(b[0] - across + 0.1 * between(-9, 9) * u.cross(across)));
     countSides({a, b}, {a, moved(b, 2 * w)}, GetParam(), addTriangle, triangles);
   }
-  EXPECT_GT(lines.contacts, 800);
-  EXPECT_GT(triangles.contacts, 2000);
+  EXPECT_GT(lines.contacts, 800 / testing::kShareOfCases);
+  EXPECT_GT(triangles.contacts, 2000 / testing::kShareOfCases);
   for (const Sides& sides : {lines, triangles}) {
     EXPECT_EQ(sides.wrong, 0);
     EXPECT_EQ(sides.across, 0);
@@ -275,7 +245,7 @@ TEST_P(TouchSides, OfParallelEdgesAreWhereTheyCameFrom) {
 /// Law: motion within one plane has normals in that plane.
 TEST_P(TouchSides, OfMotionInOnePlaneAreInThePlane) {
   Sides sides;
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < testing::casesOf(1000); ++i) {
     const Vector3d e = vector(4), f = vector(4);
     if (e.cross(f).isZero()) continue;
     const auto at = [&](double centre) {
@@ -284,7 +254,7 @@ TEST_P(TouchSides, OfMotionInOnePlaneAreInThePlane) {
     const std::vector<Vector3d> a{at(-10), at(-10), at(-10)}, b{at(10), at(10), at(10)};
     countSides({a, b}, {a, moved(b, -24 * e + between(-3, 3) * f)}, GetParam(), addTriangle, sides);
   }
-  EXPECT_GT(sides.contacts, 2000);
+  EXPECT_GT(sides.contacts, 2000 / testing::kShareOfCases);
   EXPECT_EQ(sides.wrong, 0);
   EXPECT_EQ(sides.across, 0);
 }

@@ -1,10 +1,8 @@
 #include "Common/ExpectRefused.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
 #include "Core/SimdPath.h"
-#include "Unit/Math/RationalOracle.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <palpate/OctreeBasedCD.h>
 
@@ -21,21 +19,10 @@
 namespace palpate::testing {
 namespace {
 
-using oracle::Rational;
-
 /// Two geometries searched by octrees, and by brute force.
-struct TwoBodies {
+struct TwoBodies : Both {
   template <class A, class B>
-  TwoBodies(const A& geometryA, const B& geometryB) {
-    for (OctreeBasedCD* each : {&octree, &bruteForce}) {
-      a = addTo(*each, geometryA);
-      b = addTo(*each, geometryB);
-    }
-  }
-  template <class F>
-  void change(F&& f) {
-    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
-  }
+  TwoBodies(const A& geometryA, const B& geometryB) : a(add(geometryA)), b(add(geometryB)) {}
   /// Moves a geometry to a pose, by setTransform() or by its positions.
   void put(GeometryId id, const TestGeometry& geometry, const Matrix3d& turn, const Vector3d& shift,
            bool isPlaced) {
@@ -49,35 +36,15 @@ struct TwoBodies {
     });
   }
 
-  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
-  GeometryId a{}, b{};
-
- private:
-  static GeometryId addTo(OctreeBasedCD& collisions, const TestGeometry& geometry) {
-    return geometry.addTo(collisions);
-  }
-  static GeometryId addTo(OctreeBasedCD& collisions, const Solid& solid) {
-    return collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  }
-  static GeometryId addTo(OctreeBasedCD& collisions, const AnalyticalGeometry& shape) {
-    return collisions.addAnalyticalGeometry(shape);
-  }
+  GeometryId a, b;
 };
-
-bool haveSameBits(const SurfacePoint& a, const SurfacePoint& b) {
-  return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
-         a.weights == b.weights && a.position == b.position && a.distance == b.distance;
-}
-bool haveSameBits(const GeometryDistance& a, const GeometryDistance& b) {
-  return haveSameBits(a.a, b.a) && haveSameBits(a.b, b.b) && a.distance == b.distance;
-}
 
 /// Expects the answer of brute force, and witnesses at the distance. size: L, of the coordinates.
 GeometryDistance expectSameAnswers(const TwoBodies& both, double radii, double size) {
   const SpatialQueries queries = both.octree.queries();
   const GeometryDistance found = queries.distance(both.a, both.b),
                          truth = both.bruteForce.queries().distance(both.a, both.b);
-  EXPECT_TRUE(haveSameBits(found, truth))
+  EXPECT_TRUE(isSame(found, truth))
       << found.distance << " of " << found.a.element << ", " << found.b.element << "; "
       << truth.distance << " of " << truth.a.element << ", " << truth.b.element;
   EXPECT_EQ(found.a.distance, found.distance);
@@ -184,7 +151,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       (found.distance > 0 ? apart : touching) += 1;
       for (const std::string& path : simdPaths()) {
         useSimdPath(path);
-        EXPECT_TRUE(haveSameBits(both.octree.queries().distance(both.a, both.b), found)) << path;
+        EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
       }
       useSimdPath("");
       ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
@@ -294,7 +261,7 @@ void expectRational(const TwoBodies& both, const RationalDistance& truth, double
 TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
   Random random(205);
   std::size_t meet = 0, apart = 0;
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < casesOf(400); ++round) {
     const double size = round % 2 ? 3 : 6;
     const auto onGrid = [&](const Vector3d& shift) {
       TestGeometry mesh;
@@ -315,8 +282,8 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
     (truth.square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
   }
-  EXPECT_GT(meet, 80u);
-  EXPECT_GT(apart, 80u);
+  EXPECT_GT(meet, leastOf(80));
+  EXPECT_GT(apart, leastOf(80));
 }
 
 /// A corner of b lies on a face or edge of a up to rounding. Only exact arithmetic knows whether it
@@ -421,7 +388,7 @@ TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
     const GeometryDistance one = queries.distance(both.a, both.b),
                            two = queries.distance(both.b, both.a);
     EXPECT_GT(one.distance, 0.0);
-    EXPECT_TRUE(haveSameBits(one, {two.b, two.a, two.distance}));
+    EXPECT_TRUE(isSame(one, GeometryDistance{two.b, two.a, two.distance}));
   }
 }
 
@@ -497,12 +464,13 @@ TEST(GeometryDistances, FansAnswerAsBruteForce) {
 /// Triangles around one edge, each with vertices of its own, are all equally near to a point above
 /// it. The cost does not follow the number of pairs.
 TEST(GeometryDistances, ManyUnweldedTrianglesAroundAnEdge) {
+  constexpr std::uint32_t kCount = casesOf(10000);
   std::array<Mesh, 2> wheels;
   for (int side = 0; side < 2; ++side) {
     Mesh& wheel = wheels[static_cast<std::size_t>(side)];
     const double up = side == 0 ? 1.0 : -1.0, height = side == 0 ? 0.0 : 0.5;
-    for (std::uint32_t i = 0; i < 10000; ++i) {
-      const double angle = 6.0 * i / 10000;
+    for (std::uint32_t i = 0; i < kCount; ++i) {
+      const double angle = 6.0 * i / kCount;
       wheel.positions.insert(wheel.positions.end(),
                              {{0, 0, height},
                               {0, 0, height - up},

@@ -1,8 +1,7 @@
 #include "Common/ExpectRefused.h"
+#include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
-#include "Unit/Queries/Cube.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
@@ -64,25 +63,19 @@ class Line {
 };
 
 /// Geometries of one scene searched by octrees, and by brute force.
-struct PathScene {
-  template <class F>
-  GeometryId addBy(F&& f) {
-    bodies.push_back(f(octree));
-    f(bruteForce);
+struct PathScene : Both {
+  template <class Geometry>
+  GeometryId add(const Geometry& geometry) {
+    bodies.push_back(Both::add(geometry));
     return bodies.back();
   }
   GeometryId add(const TestGeometry& geometry) {
     meshes.resize(bodies.size());
     meshes.push_back(geometry);
-    return addBy([&](OctreeBasedCD& each) { return geometry.addTo(each); });
+    return add<TestGeometry>(geometry);
   }
   GeometryId add(const Mesh& mesh) { return add(testGeometry(mesh)); }
-  template <class F>
-  void change(F&& f) {
-    for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
-  }
 
-  OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
   std::vector<GeometryId> bodies;
   std::vector<TestGeometry> meshes;  ///< of the first bodies, where added as such
 };
@@ -234,7 +227,7 @@ TEST(Path, AgreesWithSamplesForEveryGeometryType) {
       {tapered(random, particles(random, 60, 0.02), 0.1), false}};
   std::size_t intervals = 0, clearances = 0, index = 0;
   for (const auto& [geometry, isBody] : cases) {
-    for (int round = 0; round < 40; ++round) {
+    for (int round = 0; round < casesOf(40); ++round) {
       PathScene scene;
       const GeometryId body = scene.add(geometry);
       const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.15);
@@ -247,15 +240,15 @@ TEST(Path, AgreesWithSamplesForEveryGeometryType) {
     }
     ++index;
   }
-  EXPECT_GT(intervals, 200u);
-  EXPECT_GT(clearances, 100u);
+  EXPECT_GT(intervals, leastOf(200));
+  EXPECT_GT(clearances, leastOf(100));
 }
 
 TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
   Random random(302);
   const Solid solid = cells(3, random, [](const auto& at) { return at[0] + at[1] + at[2] != 3; });
   PathScene scene;
-  const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
+  const GeometryId body = scene.add([&](OctreeBasedCD& each) {
     return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
   });
   for (int round = 0; round < 60; ++round) {
@@ -273,7 +266,7 @@ TEST(Path, AgreesWithSamplesForFoldedTetrahedralMeshes) {
   std::size_t withoutElement = 0;
   for (int round = 0; round < 60; ++round) {
     PathScene scene;
-    const GeometryId body = scene.addBy([&](OctreeBasedCD& each) {
+    const GeometryId body = scene.add([&](OctreeBasedCD& each) {
       return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
     });
     Positions folded = solid.positions;
@@ -336,7 +329,7 @@ TEST(Path, AgreesWithSamplesForEveryShape) {
     for (int round = 0; round < 40; ++round) {
       PathScene scene;
       const GeometryId body =
-          scene.addBy([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
+          scene.add([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = randomPoint(random, 0, 1);
       scene.change([&](OctreeBasedCD& each) { each.setTransform(body, {turn, shift}); });

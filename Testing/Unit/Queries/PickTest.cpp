@@ -1,6 +1,5 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
-#include "Unit/Queries/Cube.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>

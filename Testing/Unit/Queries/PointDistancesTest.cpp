@@ -114,7 +114,7 @@ struct TrueDistance {
 /// Of all elements, by distance and then by element.
 std::vector<TrueDistance> trueDistances(const TestGeometry& geometry, const Positions& now,
                                         const Vector3d& p) {
-  const std::vector<Triangle> elements = elementsOf(geometry);
+  const std::vector<Triangle> elements = geometry.elements();
   std::vector<TrueDistance> all;
   for (std::uint32_t e = 0; e < elements.size(); ++e) {
     const auto& [a, b, c] = elements[e];
@@ -147,7 +147,7 @@ void expectTrueAnswers(const Both& both, const TestGeometry& geometry, const Pos
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       const SurfacePoint& found = nearest[i];
       ASSERT_EQ(found.element, truth[i].element) << i;
-      const Triangle vertices = elementsOf(geometry)[found.element];
+      const Triangle vertices = geometry.elements()[found.element];
       ASSERT_EQ(found.vertices, vertices);
       const double size = box.sizes().maxCoeff();
       // 1e-15 of the diagonal, and the rounding of coordinates.

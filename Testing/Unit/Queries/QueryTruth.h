@@ -23,28 +23,50 @@ namespace palpate::testing {
 using Eigen::Matrix3d;
 using oracle::Rational;
 
+inline GeometryId addTo(OctreeBasedCD& collisions, const TestGeometry& geometry) {
+  return geometry.addTo(collisions);
+}
+inline GeometryId addTo(OctreeBasedCD& collisions, const Mesh& mesh) {
+  return collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+}
+inline GeometryId addTo(OctreeBasedCD& collisions, const Solid& solid) {
+  return collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
+}
+inline GeometryId addTo(OctreeBasedCD& collisions, const AnalyticalGeometry& shape) {
+  return collisions.addAnalyticalGeometry(shape);
+}
+inline GeometryId addTo(OctreeBasedCD& collisions,
+                        const std::function<GeometryId(OctreeBasedCD&)>& add) {
+  return add(collisions);
+}
+
 /// The same geometries searched by octrees, and by brute force.
-class Both {
- public:
+struct Both {
   using Add = std::function<GeometryId(OctreeBasedCD&)>;
 
-  explicit Both(const Add& add) {
-    change([&](OctreeBasedCD& each) { id = add(each); });
+  Both() = default;
+  template <class First>
+  explicit Both(const First& first) : id(add(first)) {}
+  template <class Geometry>
+  GeometryId add(const Geometry& geometry) {
+    addTo(bruteForce, geometry);
+    return addTo(octree, geometry);
   }
-  explicit Both(const TestGeometry& geometry)
-      : Both([&](OctreeBasedCD& each) { return geometry.addTo(each); }) {}
   template <class F>
   void change(F&& f) {
     for (OctreeBasedCD* each : {&octree, &bruteForce}) f(*each);
   }
 
   OctreeBasedCD octree{settingsOf(Engine::Octree)}, bruteForce{settingsOf(Engine::BruteForce)};
-  GeometryId id{};
+  GeometryId id{};  ///< of the first geometry
 };
 
 inline bool isSame(const SurfacePoint& a, const SurfacePoint& b) {
   return a.geometry == b.geometry && a.element == b.element && a.vertices == b.vertices &&
          a.weights == b.weights && a.position == b.position && a.distance == b.distance;
+}
+inline bool isSame(const GeometryDistance& a, const GeometryDistance& b) {
+  return isSame(a.a, b.a) && isSame(a.b, b.b) && a.distance == b.distance;
 }
 inline bool isSame(const SignedDistance& a, const SignedDistance& b) {
   return isSame(a.nearest, b.nearest) && a.distance == b.distance;
@@ -65,15 +87,6 @@ template <class T>
 bool isSame(const std::vector<T>& a, const std::vector<T>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const T& one, const T& two) { return isSame(one, two); });
-}
-
-/// Elements as queries name their vertices: {p, q, q} for a segment and {p, p, p} for a point.
-inline std::vector<Triangle> elementsOf(const TestGeometry& geometry) {
-  std::vector<Triangle> elements = geometry.triangles;
-  for (const auto& [p, q] : geometry.segments) elements.push_back({p, q, q});
-  if (geometry.type == GeometryType::Points)
-    for (std::uint32_t p = 0; p < geometry.positions.size(); ++p) elements.push_back({p, p, p});
-  return elements;
 }
 
 /// Positions of a placed body in the world, rounded as the library documents it.

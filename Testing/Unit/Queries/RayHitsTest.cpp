@@ -167,7 +167,7 @@ TEST(RayHits, AreThoseOfRationalArithmeticForEveryGeometryType) {
     const Vector3d shift =
         &geometry == &geometries[5] ? Vector3d(1e3, -2e3, 5e2) : Vector3d(0, 0, 0);
     Both both(geometry);
-    const std::vector<Triangle> elements = elementsOf(geometry);
+    const std::vector<Triangle> elements = geometry.elements();
     std::size_t hits = 0;
     const auto test = [&](const Positions& now, int count) {
       for (int i = 0; i < count; ++i) {
@@ -453,7 +453,7 @@ TEST(RayHits, AreTheSameOnEverySimdPath) {
     useSimdPath(path);
     Random random(210);
     const TestGeometry geometry = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
-    const std::vector<Triangle> elements = elementsOf(geometry);
+    const std::vector<Triangle> elements = geometry.elements();
     const Both both(geometry);
     std::size_t hits = 0;
     for (int i = 0; i < casesOf(300); ++i)
@@ -511,7 +511,7 @@ TEST(RayHits, AscendAtAnyMagnitude) {
 TEST(RayHits, BatchesEqualSingleCalls) {
   Random random(207);
   const TestGeometry geometry = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
-  const std::vector<Triangle> elements = elementsOf(geometry);
+  const std::vector<Triangle> elements = geometry.elements();
   for (const int threads : {1, 3}) {
     OctreeBasedCD collisions(settingsOf(Engine::Octree, threads));
     const GeometryId id = geometry.addTo(collisions);

@@ -1,6 +1,5 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
-#include "Unit/Queries/Cube.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
@@ -51,7 +50,7 @@ long double roundDistance(const Wide& x, const Wide& p, const Wide& q, long doub
 
 /// Of lines and points with radii.
 Depth depthOf(const TestGeometry& geometry, const Positions& positions) {
-  return [&geometry, positions, elements = elementsOf(geometry)](const Wide& x) {
+  return [&geometry, positions, elements = geometry.elements()](const Wide& x) {
     long double least = INFINITY;
     for (const auto& [p, q, _] : elements) {
       // No ball reaches further than the larger one from the segment's middle.

@@ -90,7 +90,7 @@ TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
                                      tapered(random, particles(random, 200, 0.0), 0.1)};
   for (const TestGeometry& geometry : geometries) {
     Both both(geometry);
-    const std::vector<Triangle> elements = elementsOf(geometry);
+    const std::vector<Triangle> elements = geometry.elements();
     std::size_t found = 0;
     for (int i = 0; i < casesOf(6); ++i) {
       const Vector3d p = geometry.positions[random() % geometry.positions.size()] +
@@ -115,7 +115,7 @@ TEST(ShapeOverlap, SpheresAreDecidedExactly) {
        {testGeometry(soup(random, 80, 0.2)), thread(random, 80, 0.1, 0.0, true),
         tapered(random, particles(random, 80, 0.0), 0.01)}) {
     const Both both(geometry);
-    const std::vector<Triangle> elements = elementsOf(geometry);
+    const std::vector<Triangle> elements = geometry.elements();
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
       const Vector3d centre = randomPoint(random, -1, 2);
       const Rational square = squaredDistance(centre, geometry.positions, elements[e]),
@@ -259,7 +259,7 @@ TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
       thread(random, 100, 0.1, 0.0, true), particles(random, 150, 0.0)};
   for (const TestGeometry& geometry : geometries) {
     Both both(geometry);
-    const std::vector<Triangle> elements = elementsOf(geometry);
+    const std::vector<Triangle> elements = geometry.elements();
     std::size_t found = 0;
     const auto test = [&](const Positions& now, const Vector3d& offset, double error) {
       for (int i = 0; i < casesOf(6); ++i) {
@@ -362,20 +362,6 @@ TEST(ShapeOverlap, InsideAndBetween) {
 
 // ---- Planes and cylinders: a search for the least distance ----
 
-/// The least value of a convex function over [0, 1].
-template <class F>
-double least(F&& f) {
-  double low = 0, high = 1;
-  for (int i = 0; i < 50; ++i) {
-    const double third = (high - low) / 3;
-    if (f(low + third) <= f(high - third))
-      high -= third;
-    else
-      low += third;
-  }
-  return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
-}
-
 /// Triangles with a vertex twice are segments, whichever vertex it is.
 TEST(ShapeOverlap, TrianglesWithAVertexTwiceAreSegments) {
   const std::vector<Vector3d> ends{{0, 0, 0}, {10, 0, 0}};
@@ -425,7 +411,7 @@ TEST(ShapeOverlap, PlanesAndCylinders) {
         return std::max(axis.cross(x - centre).norm() - 0.2,
                         std::abs(axis.dot(x - centre)) - 0.5 * (p1 - p0).norm());
       };
-      found += expectGaps(both, shape, elementsOf(geometry), 1e-6, [&](const Triangle& t) {
+      found += expectGaps(both, shape, geometry.elements(), 1e-6, [&](const Triangle& t) {
         const Vector3d a = geometry.positions[t[0]], b = geometry.positions[t[1]],
                        c = geometry.positions[t[2]];
         if (twoSided) {  // zero where the corners are on both sides
@@ -435,8 +421,8 @@ TEST(ShapeOverlap, PlanesAndCylinders) {
           const auto [low, high] = std::minmax({height(a), height(b), height(c)});
           if (low < 0 && high > 0) return -1.0;
         }
-        return least([&](double s) {
-          return least([&](double r) {
+        return minimumOf([&](double s) {
+          return minimumOf([&](double r) {
             return depth(a + s * (b - a) + r * (a + s * (c - a) - a - s * (b - a)));
           });
         });
@@ -452,7 +438,7 @@ TEST(ShapeOverlap, PlanesAndCylinders) {
 /// of its own closest point.
 double gapOfBalls(const SpatialQueries& queries, GeometryId shape, const TestGeometry& line,
                   const Triangle& t) {
-  return least([&](double s) {
+  return minimumOf([&](double s) {
     const Vector3d centre = (1 - s) * line.positions[t[0]] + s * line.positions[t[1]];
     return queries.closestPoint(shape, centre)->distance -
            ((1 - s) * line.radius(t[0]) + s * line.radius(t[1]));
@@ -465,7 +451,7 @@ TEST(ShapeOverlap, TaperedLinesAreHullsOfBalls) {
   for (std::size_t v = 0; v < line.radii.size(); v += 2) line.radii[v] *= 0.05;
   for (const std::size_t v : {10u, 30u, 50u}) line.positions[v] = line.positions[v - 1];
   const Both both(line);
-  const std::vector<Triangle> elements = elementsOf(line);
+  const std::vector<Triangle> elements = line.elements();
   std::vector<Vector3d> cloud;
   for (int i = 0; i < 7; ++i) cloud.push_back(randomPoint(random, -0.2, 0.2));
   std::size_t found = 0, beyondClosest = 0;

@@ -4,11 +4,10 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/DistinctTruth.h"
-#include "Common/PairRun.h"
-#include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/SupportedMethods.h"
+#include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
@@ -24,8 +23,6 @@
 
 namespace palpate::testing {
 namespace {
-
-using Positions = std::vector<Vector3d>;
 
 /// n x n squares of the size `edge` around the origin, whose heights a function gives.
 template <class Height>
@@ -302,7 +299,8 @@ TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
     const Matrix3d floorTurn = randomTurn(random);
     const Mesh floor = flatFloor(random, irregular, floorTurn);
     for (const AnalyticalGeometry& shape : bodies(random))
-      for (const bool lies : {false, true})
+      for (const bool lies : {false, true}) {
+        if (kShareOfCases > 1 && lies == irregular) continue;
         for (const Method method : supportedMethods(GeometryType::Shape, GeometryType::Triangles))
           for (const double depth : {0.0, 0.2}) {
             const bool isRound = shape.index() < 2,
@@ -316,6 +314,7 @@ TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
                 << shape.index() << ' ' << int(method);
             EXPECT_NEAR(result.height, 0.025, 1e-3) << shape.index() << ' ' << int(method);
           }
+      }
   }
 }
 

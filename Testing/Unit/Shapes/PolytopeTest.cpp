@@ -1,4 +1,4 @@
-#include "Common/RandomMeshes.h"
+#include "Common/TestGeometry.h"
 #include "Shapes/Polytope.h"
 #include "Exact/Predicates.h"
 
@@ -21,7 +21,6 @@ namespace palpate::testing {
 namespace {
 
 using Eigen::Vector3d;
-using Positions = std::vector<Vector3d>;
 
 /// Whether the triangles are closed, wound outward, and have every point behind them or on them.
 void expectHullOf(const Polytope& hull, const Positions& cloud) {

@@ -17,7 +17,7 @@ using namespace testing;
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 
-constexpr double kThickness = 0.02;
+constexpr double kSheetThickness = 0.02;
 
 /// The exact events of a step.
 struct Truth {
@@ -83,13 +83,13 @@ Tally historiesOf(const PairSettings& settings, double speed, std::uint64_t seed
     bool crossed = false;  // until now; afterwards no side is defined
     double height = 0;
     for (int frame = 0; frame < 12 && !crossed; ++frame) {
-      height += uniform(random, -1.2, 1.0) * speed * kThickness;
+      height += uniform(random, -1.2, 1.0) * speed * kSheetThickness;
       Positions ballNow = start, sheetNow = scene.sheet.positions, ballBefore = ball;
       for (Vector3d& p : ballNow)
-        p += Vector3d(0, 0, height) + randomPoint(random, -0.1, 0.1) * speed * kThickness;
-      for (Vector3d& p : sheetNow) p += randomPoint(random, -0.1, 0.1) * speed * kThickness;
+        p += Vector3d(0, 0, height) + randomPoint(random, -0.1, 0.1) * speed * kSheetThickness;
+      for (Vector3d& p : sheetNow) p += randomPoint(random, -0.1, 0.1) * speed * kSheetThickness;
       if (response && frame % 3 == 2)  // corrected since by a solver
-        for (Vector3d& p : ballBefore) p.z() += 0.2 * kThickness;
+        for (Vector3d& p : ballBefore) p.z() += 0.2 * kSheetThickness;
       const Truth truth = truthOf(scene.ball, scene.sheet, ballBefore, ballNow, sheet, sheetNow);
       if (response) {
         run.step(ballBefore, ballNow, sheet, sheetNow);
@@ -328,8 +328,8 @@ TEST(Displacement, IsTheRelativeMotionOfTheStep) {
     const Mesh mesh = soup(random, 7000, 0.01);
     Mesh away = soup(random, 1, 0.1);
     for (Vector3d& p : away.positions) p += Vector3d(100, 0, 0);
-    PairRun run(settingsOf(Engine::Octree, threads), mesh, away, {Method::Proximity, kThickness},
-                false);
+    PairRun run(settingsOf(Engine::Octree, threads), mesh, away,
+                {Method::Proximity, kSheetThickness}, false);
     Positions last = mesh.positions;
     const auto moved = [&](const Positions& from) {
       Positions to = from;
@@ -361,12 +361,13 @@ TEST(Displacement, IsTheRelativeMotionOfTheStep) {
 INSTANTIATE_TEST_SUITE_P(
     Validity, ValidityOfMethod,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},
-                      MethodCase{"ProximityDistinct", {Method::Proximity, kThickness}},
-                      MethodCase{"ProximityAll", {Method::Proximity, kThickness, Contacts::All}},
+                      MethodCase{"ProximityDistinct", {Method::Proximity, kSheetThickness}},
+                      MethodCase{"ProximityAll",
+                                 {Method::Proximity, kSheetThickness, Contacts::All}},
                       MethodCase{"Continuous", {Method::Continuous, 0}},
-                      MethodCase{"ContinuousWithThickness", {Method::Continuous, kThickness}},
-                      MethodCase{"AutoDistinct", {Method::Auto, kThickness}},
-                      MethodCase{"AutoAll", {Method::Auto, kThickness, Contacts::All}},
+                      MethodCase{"ContinuousWithThickness", {Method::Continuous, kSheetThickness}},
+                      MethodCase{"AutoDistinct", {Method::Auto, kSheetThickness}},
+                      MethodCase{"AutoAll", {Method::Auto, kSheetThickness, Contacts::All}},
                       MethodCase{"AutoWithoutThickness", {Method::Auto, 0}}),
     [](const auto& test) { return test.param.name; });
 

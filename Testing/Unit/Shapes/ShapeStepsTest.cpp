@@ -76,20 +76,6 @@ double distanceAt(const Plane& plane, const Tool& tool, const std::array<Vector3
   return std::max({0.0, least, plane.twoSided ? -most : 0.0});
 }
 
-/// The minimum of a convex function over [0, 1].
-template <class F>
-double least(F&& f) {
-  double low = 0, high = 1;
-  for (int i = 0; i < 60; ++i) {
-    const double third = (high - low) / 3;
-    if (f(low + third) <= f(high - third))
-      high -= third;
-    else
-      low += third;
-  }
-  return std::min({f(0.0), f(1.0), f(0.5 * (low + high))});
-}
-
 double distanceAt(const Cylinder& cylinder, const Tool& tool, const Vector3d& x, double t) {
   const Vector3d p = tool.at(cylinder.p0, t), q = tool.at(cylinder.p1, t),
                  axis = (q - p).normalized();
@@ -102,10 +88,10 @@ double distanceAt(const Cylinder& cylinder, const Tool& tool, const Vector3d& x,
 double distanceAt(const Cylinder& cylinder, const Tool& tool, const std::array<Vector3d, 3>& x,
                   double t) {
   const auto onEdge = [&](const Vector3d& p, const Vector3d& q) {
-    return least([&](double s) { return distanceAt(cylinder, tool, p + s * (q - p), t); });
+    return minimumOf([&](double s) { return distanceAt(cylinder, tool, p + s * (q - p), t); });
   };
   if (x[1] == x[2]) return x[0] == x[1] ? distanceAt(cylinder, tool, x[0], t) : onEdge(x[0], x[1]);
-  return least(
+  return minimumOf(
       [&](double s) { return onEdge(x[0] + s * (x[1] - x[0]), x[0] + s * (x[2] - x[0])); });
 }
 

@@ -3,12 +3,11 @@
 
 #include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
-#include "Common/ContactRows.h"
 #include "Common/PairRun.h"
-#include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -24,15 +23,14 @@
 #include <string>
 #include <vector>
 
-// Analytical shapes against triangles, lines and points: brute force bit by bit, and the definition
-// by a signed distance and a search that are written here.
+// Analytical shapes against triangles, lines and points: the definition by a signed distance and a
+// search that are written here.
 
 namespace palpate::testing {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Positions = std::vector<Vector3d>;
 
 /// Triangles that cover a hull's surface, each with its plane: every three points with all others
 /// on one side. If all points are in one plane: every three.
@@ -105,42 +103,6 @@ struct Placed {
   }
 };
 
-/// A geometry with elements: triangles, segments {p, q, q} or points {p, p, p}.
-struct Body {
-  GeometryType type;
-  Positions positions;
-  std::vector<Triangle> elements;
-  double radius = 0.0;
-
-  GeometryId addTo(OctreeBasedCD& collisions) const {
-    if (type == GeometryType::Triangles) return collisions.addTriangleMesh(positions, elements);
-    if (type == GeometryType::Points) return collisions.addPointSet(positions, radius);
-    std::vector<Segment> segments;
-    for (const auto& [p, q, _] : elements) segments.push_back({p, q});
-    return collisions.addLineMesh(positions, segments, radius);
-  }
-};
-
-Body organ(const Mesh& mesh) { return {GeometryType::Triangles, mesh.positions, mesh.triangles}; }
-
-Body thread(Random& random, std::uint32_t segments, double radius) {
-  Body line{GeometryType::Lines, {randomPoint(random, 0.2, 0.8)}, {}, radius};
-  for (std::uint32_t i = 1; i <= segments; ++i) {
-    line.positions.push_back(line.positions.back() + randomPoint(random, -0.1, 0.1));
-    line.elements.push_back({i - 1, i, i});
-  }
-  return line;
-}
-
-Body particlesInCube(Random& random, std::uint32_t count, double radius) {
-  Body points{GeometryType::Points, {}, {}, radius};
-  for (std::uint32_t i = 0; i < count; ++i) {
-    points.positions.push_back(randomPoint(random, 0, 1));
-    points.elements.push_back({i, i, i});
-  }
-  return points;
-}
-
 /// One of each type, around the middle of the unit cube.
 std::vector<Placed> shapes(Random& random) {
   std::vector<Placed> all;
@@ -174,7 +136,7 @@ std::vector<Placed> shapes(Random& random) {
   return all;
 }
 
-CollisionData answer(const Settings& settings, const Body& body, const Placed& shape,
+CollisionData answer(const Settings& settings, const TestGeometry& body, const Placed& shape,
                      const PairSettings& pair, bool shapeFirst = false) {
   OctreeBasedCD collisions(settings);
   const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry),
@@ -186,7 +148,7 @@ CollisionData answer(const Settings& settings, const Body& body, const Placed& s
   return collisions.collisionData(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool);
 }
 
-CollisionData answer(const Body& body, const Placed& shape, const PairSettings& pair) {
+CollisionData answer(const TestGeometry& body, const Placed& shape, const PairSettings& pair) {
   return answer(settingsOf(Engine::Octree), body, shape, pair);
 }
 
@@ -195,41 +157,12 @@ using Element = std::array<std::uint32_t, 3>;
 Element elementOf(const ShapeContact& c) {
   return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
 }
-std::map<Element, ShapeContact> byElement(const CollisionData& data) {
+std::map<Element, ShapeContact> contactsByElement(const CollisionData& data) {
   std::map<Element, ShapeContact> contacts;
   for (const ShapeContact& c : data.shape()) contacts.emplace(elementOf(c), c);
   EXPECT_EQ(contacts.size(), data.shape().size());
+  EXPECT_TRUE(std::ranges::is_sorted(data.shape(), {}, elementOf));
   return contacts;
-}
-
-TEST(Shapes, MatchBruteForce) {
-  Random random(1);
-  const std::vector<Body> bodies{organ(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
-                                 organ(sheet(14, 0.5, 0)), organ(soup(random, 150, 0.2)),
-                                 thread(random, 120, 0.02), particlesInCube(random, 300, 0.01)};
-  std::size_t contacts = 0;
-  for (const Body& body : bodies)
-    for (const Placed& shape : shapes(random))
-      for (const Contacts which : {Contacts::Distinct, Contacts::All})
-        for (const double thickness : {0.0, 0.03}) {
-          const PairSettings pair{Method::Proximity, thickness, which};
-          const CollisionData truth = answer(settingsOf(Engine::BruteForce), body, shape, pair);
-          EXPECT_EQ(truth.vertexTriangle().size() + truth.edgeEdge().size(), 0u);
-          EXPECT_TRUE(std::is_sorted(
-              truth.shape().begin(), truth.shape().end(),
-              [](const auto& l, const auto& r) { return elementOf(l) < elementOf(r); }));
-          for (const bool swapped : {false, true})
-            for (const int threads : {1, 2}) {
-              const CollisionData found =
-                  answer(settingsOf(Engine::Octree, threads), body, shape, pair, swapped);
-              EXPECT_TRUE(std::equal(found.shape().begin(), found.shape().end(),
-                                     truth.shape().begin(), truth.shape().end()))
-                  << "shape " << shape.geometry.index();
-              EXPECT_EQ(found.hash(), truth.hash());
-            }
-          contacts += truth.shape().size();
-        }
-  EXPECT_GT(contacts, 8000u);
 }
 
 // ---- The definition ----
@@ -264,23 +197,11 @@ double signedDistance(const Placed& placed, const Vector3d& world) {
       {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
 }
 
-/// The minimum of a convex function over [0, 1].
-double leastOn(const std::function<double(double)>& f) {
-  double low = 0, high = 1;
-  for (int i = 0; i < 45; ++i) {
-    const double third = (high - low) / 3;
-    if (f(low + third) <= f(high - third))
-      high -= third;
-    else
-      low += third;
-  }
-  return std::min({f(0), f(1), f(0.5 * (low + high))});
-}
 double leastOn(const Placed& shape, const Vector3d& p, const Vector3d& q) {
-  return leastOn([&](double t) { return signedDistance(shape, p + t * (q - p)); });
+  return minimumOf([&](double t) { return signedDistance(shape, p + t * (q - p)); });
 }
 double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  return leastOn([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
+  return minimumOf([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
 }
 
 constexpr double kSearch = 1e-7;  ///< error of the search above where distances are constant
@@ -290,12 +211,13 @@ struct Truth {
   double own, boundary;
 };
 /// The least distance of a face beyond `reach` is a lower bound only.
-std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double reach) {
+std::map<Element, Truth> truthOf(const TestGeometry& body, const Placed& shape, double reach) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::map<Element, Truth> truth;
   const auto& at = body.positions;
-  for (std::uint32_t t = 0; t < body.elements.size(); ++t) {
-    const Triangle& corners = body.elements[t];
+  const std::vector<Triangle> elements = body.elements();
+  for (std::uint32_t t = 0; t < elements.size(); ++t) {
+    const Triangle& corners = elements[t];
     double edges = kNone;
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t p = std::min(corners[i], corners[(i + 1) % 3]),
@@ -318,13 +240,13 @@ std::map<Element, Truth> truthOf(const Body& body, const Placed& shape, double r
   return truth;
 }
 
-void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& shape) {
+void expectWellFormed(const ShapeContact& c, const TestGeometry& body, const Placed& shape) {
   EXPECT_NEAR(c.normal.norm(), 1, 1e-14);
   EXPECT_GE(c.weights.minCoeff(), 0);
   EXPECT_NEAR(c.weights.sum(), 1, 1e-15);
   Vector3d point = Vector3d::Zero();
   for (int i = 0; i < 3; ++i) point += c.weights[i] * body.positions[c.vertices[i]];
-  const double centre = c.distance + body.radius;
+  const double centre = c.distance + body.radius(0);
   EXPECT_LE((point - c.point).norm(), 1e-14);
   EXPECT_LE((c.point - centre * c.normal - c.pointOnShape).norm(), 1e-14);
   EXPECT_NEAR(signedDistance(shape, c.point), centre, 1e-13);
@@ -334,11 +256,12 @@ void expectWellFormed(const ShapeContact& c, const Body& body, const Placed& sha
 
 /// The least distance of the triangles around a vertex or an edge, or of the segments around a
 /// vertex. Infinite for a triangle.
-double leastAround(const Body& body, const Element& element,
+double leastAround(const TestGeometry& body, const Element& element,
                    const std::map<Element, ShapeContact>& all) {
   double least = std::numeric_limits<double>::infinity();
-  for (std::uint32_t t = 0; element[0] < 2 && t < body.elements.size(); ++t) {
-    const Triangle& corners = body.elements[t];
+  const std::vector<Triangle> elements = body.elements();
+  for (std::uint32_t t = 0; element[0] < 2 && t < elements.size(); ++t) {
+    const Triangle& corners = elements[t];
     const auto has = [&](std::uint32_t v) {
       return std::find(corners.begin(), corners.end(), v) != corners.end();
     };
@@ -354,30 +277,32 @@ double leastAround(const Body& body, const Element& element,
 
 TEST(Shapes, MatchTheDefinition) {
   Random random(2);
-  const std::vector<Body> bodies{organ(soup(random, 60, 0.3)), organ(soup(random, 60, 0.8)),
-                                 organ(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.02),
-                                 particlesInCube(random, 100, 0.01)};
+  const std::vector<TestGeometry> bodies{
+      testGeometry(soup(random, 60, 0.3)), testGeometry(soup(random, 60, 0.8)),
+      testGeometry(sphere(8, 12, {.5, .5, .5}, .4)), thread(random, 60, 0.1, 0.02, false),
+      particles(random, 100, 0.01)};
   std::array<std::size_t, 3> distinct{}, inside{};
   for (std::size_t bodyIndex = 0; bodyIndex < bodies.size(); ++bodyIndex) {
-    const Body& body = bodies[bodyIndex];
+    const TestGeometry& body = bodies[bodyIndex];
     std::size_t number = bodyIndex;
     for (const Placed& shape : shapes(random)) {
       if (isLeftOut(number++)) continue;
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
       const double thickness = 0.05;
-      const auto all =
-                     byElement(answer(body, shape, {Method::Proximity, thickness, Contacts::All})),
-                 own = byElement(
+      const auto all = contactsByElement(
+                     answer(body, shape, {Method::Proximity, thickness, Contacts::All})),
+                 own = contactsByElement(
                      answer(body, shape, {Method::Proximity, thickness, Contacts::Distinct}));
-      for (const auto& [element, truth] : truthOf(body, shape, thickness + body.radius)) {
+      for (const auto& [element, truth] : truthOf(body, shape, thickness + body.radius(0))) {
         const auto found = all.find(element);
         if (found == all.end()) {
-          EXPECT_GT(truth.own - body.radius, thickness - kSearch) << element[0];
+          EXPECT_GT(truth.own - body.radius(0), thickness - kSearch) << element[0];
           continue;
         }
         const ShapeContact& c = found->second;
-        EXPECT_NEAR(c.distance + body.radius, truth.own, kSearch) << element[0];
-        EXPECT_LE(c.distance + body.radius, truth.own + 1e-13) << "the search found a nearer point";
+        EXPECT_NEAR(c.distance + body.radius(0), truth.own, kSearch) << element[0];
+        EXPECT_LE(c.distance + body.radius(0), truth.own + 1e-13)
+            << "the search found a nearer point";
         expectWellFormed(c, body, shape);
         const auto held = own.find(element);
         EXPECT_TRUE(held != own.end() || truth.boundary <= truth.own + kSearch ||
@@ -400,17 +325,18 @@ TEST(Shapes, MatchTheDefinition) {
 
 TEST(Shapes, MoveWithTheirBodies) {
   Random random(3);
-  const Body body = organ(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry body = testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
   for (const Placed& shape : shapes(random)) {
     const PairSettings pair{Method::Proximity, 0.05};
-    const auto here = byElement(answer(body, shape, pair));
+    const auto here = contactsByElement(answer(body, shape, pair));
     for (int run = 0; run < 5; ++run) {
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = randomPoint(random, -4, 4);
-      Body moved = body;
-      for (Vector3d& p : moved.positions) p = turn * p + shift;
-      const auto there = byElement(answer(
-          moved, {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
+      TestGeometry movedBody = body;
+      for (Vector3d& p : movedBody.positions) p = turn * p + shift;
+      const auto there = contactsByElement(
+          answer(movedBody,
+                 {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
       for (const auto& [element, c] : here) {
         const auto found = there.find(element);
         if (found == there.end()) {  // on the border of being a contact
@@ -431,7 +357,7 @@ TEST(Shapes, MoveWithTheirBodies) {
 
 TEST(Shapes, MatchTheirTessellations) {
   Random random(4);
-  const Body body = organ(soup(random, 60, 0.15));
+  const TestGeometry body = testGeometry(soup(random, 60, 0.15));
   const auto nearest = [](const CollisionData& data) {
     double distance = std::numeric_limits<double>::infinity();
     for (const auto& c : data.vertexTriangle()) distance = std::min(distance, c.distance);
@@ -441,21 +367,7 @@ TEST(Shapes, MatchTheirTessellations) {
     return distance;
   };
   const Mesh ball = sphere(30, 60, Vector3d::Zero(), 0.3);
-  Mesh cube{{},
-            {{0, 2, 1},
-             {1, 2, 3},
-             {4, 5, 6},
-             {5, 7, 6},
-             {0, 1, 4},
-             {1, 5, 4},
-             {2, 6, 3},
-             {3, 6, 7},
-             {0, 4, 2},
-             {2, 4, 6},
-             {1, 3, 5},
-             {3, 7, 5}}};
-  for (int v = 0; v < 8; ++v)
-    cube.positions.push_back({v & 1 ? 0.3 : -0.3, v & 2 ? 0.2 : -0.2, v & 4 ? 0.1 : -0.1});
+  const Mesh cube = boxMesh({-0.3, -0.2, -0.1}, {0.3, 0.2, 0.1});
   int apart = 0;
   for (int run = 0; run < casesOf(20); ++run) {
     const Matrix3d turn = randomTurn(random);
@@ -466,7 +378,7 @@ TEST(Shapes, MatchTheirTessellations) {
       const Placed shape{isBall ? AnalyticalGeometry(Sphere{{0, 0, 0}, 0.3})
                                 : AnalyticalGeometry(Box{{0, 0, 0}, {0.3, 0.2, 0.1}}),
                          turn, at};
-      const Mesh own{body.positions, body.elements};
+      const Mesh own{body.positions, body.triangles};
       PairRun meshes(settingsOf(Engine::Octree), own, mesh, {Method::Proximity, 1.0}, false);
       meshes.detect();
       const double truth = nearest(meshes.data()),
@@ -482,29 +394,27 @@ TEST(Shapes, MatchTheirTessellations) {
 
 TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
   Random random(7);
-  const Body body = organ(soup(random, 100, 0.3));
-  Positions corners, round;
-  for (int v = 0; v < 8; ++v)
-    corners.push_back({v & 1 ? 0.3 : -0.3, v & 2 ? 0.2 : -0.2, v & 4 ? 0.1 : -0.1});
+  const TestGeometry body = testGeometry(soup(random, 100, 0.3));
+  Positions corners = boxMesh({-0.3, -0.2, -0.1}, {0.3, 0.2, 0.1}).positions;
   for (int i = 0; i < 30; ++i)  // on its faces and inside
     corners.push_back(
         {uniform(random, -.3, .3), uniform(random, -.2, .2), i % 2 ? 0.1 : uniform(random, 0, .1)});
-  const Mesh ball = sphere(16, 32, Vector3d::Zero(), 0.3);
-  round = ball.positions;
+  const Positions round = sphere(16, 32, Vector3d::Zero(), 0.3).positions;
   for (int run = 0; run < 6; ++run) {
     const Matrix3d turn = randomTurn(random);
     const Vector3d at = randomPoint(random, 0.3, 0.7);
     const PairSettings pair{Method::Proximity, 0.05, Contacts::All};
-    const auto hull = byElement(answer(body, {ConvexHull{corners}, turn, at}, pair)),
-               box = byElement(answer(body, {Box{{0, 0, 0}, {0.3, 0.2, 0.1}}, turn, at}, pair));
+    const auto hull = contactsByElement(answer(body, {ConvexHull{corners}, turn, at}, pair)),
+               box = contactsByElement(
+                   answer(body, {Box{{0, 0, 0}, {0.3, 0.2, 0.1}}, turn, at}, pair));
     EXPECT_GT(box.size(), 50u);
     EXPECT_EQ(box.size(), hull.size());
     for (const auto& [element, c] : box) {
       ASSERT_TRUE(hull.contains(element));
       EXPECT_NEAR(hull.at(element).distance, c.distance, 1e-14) << element[0];
     }
-    const auto facets = byElement(answer(body, {ConvexHull{round}, turn, at}, pair)),
-               exact = byElement(answer(body, {Sphere{{0, 0, 0}, 0.3}, turn, at}, pair));
+    const auto facets = contactsByElement(answer(body, {ConvexHull{round}, turn, at}, pair)),
+               exact = contactsByElement(answer(body, {Sphere{{0, 0, 0}, 0.3}, turn, at}, pair));
     EXPECT_GT(facets.size(), 50u);
     for (const auto& [element, c] : facets) {
       ASSERT_TRUE(exact.contains(element));
@@ -519,21 +429,7 @@ TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
 // ---- Hand-computed contacts ----
 
 TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
-  Body cube = organ({{},
-                     {{0, 2, 1},
-                      {1, 2, 3},
-                      {4, 5, 6},
-                      {5, 7, 6},
-                      {0, 1, 4},
-                      {1, 5, 4},
-                      {2, 6, 3},
-                      {3, 6, 7},
-                      {0, 4, 2},
-                      {2, 4, 6},
-                      {1, 3, 5},
-                      {3, 7, 5}}});
-  for (int v = 0; v < 8; ++v)
-    cube.positions.push_back({double(v & 1), double(v >> 1 & 1), double(v >> 2)});
+  const TestGeometry cube = testGeometry(boxMesh({0, 0, 0}, {1, 1, 1}));
   const auto table = [](double height, bool twoSided) {
     return Placed{Plane{{0, 0, height}, {0, 0, 7}, twoSided}};
   };
@@ -558,7 +454,8 @@ TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
 }
 
 TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
-  const Body triangle = organ({{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});
+  const TestGeometry triangle =
+      testGeometry(Mesh{{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});
   const auto only = [&](const AnalyticalGeometry& shape) {
     const CollisionData data = answer(triangle, {shape}, {Method::Proximity, 1.0});
     EXPECT_EQ(data.shape().size(), 1u);
@@ -616,7 +513,7 @@ TEST(Shapes, DegenerateElementsMatchTheDefinition) {
                           {ConvexHull{{{1, 1, 1}}}},
                           {ConvexHull{unitCube}}};
   for (int run = 0; run < casesOf(6); ++run) {
-    Body degenerate{GeometryType::Triangles, {}, {}, 0};  // on a coarse grid
+    TestGeometry degenerate;  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
       const auto at = [&] { return static_cast<double>(random() % 3); };
       const double x = at(), y = at(), z = at();
@@ -625,7 +522,7 @@ TEST(Shapes, DegenerateElementsMatchTheDefinition) {
     const auto any = [&] { return static_cast<std::uint32_t>(random() % 12); };
     for (int t = 0; t < 14; ++t) {
       const std::uint32_t a = any(), b = any(), c = any();
-      degenerate.elements.push_back({a, b, c});
+      degenerate.triangles.push_back({a, b, c});
     }
     for (const Placed& shape : all) {
       if (shape.geometry.index() == 1 &&
@@ -633,7 +530,7 @@ TEST(Shapes, DegenerateElementsMatchTheDefinition) {
         continue;  // the test's own formula needs a length
       SCOPED_TRACE("shape " + std::to_string(shape.geometry.index()));
       const auto found =
-          byElement(answer(degenerate, shape, {Method::Proximity, 0.75, Contacts::All}));
+          contactsByElement(answer(degenerate, shape, {Method::Proximity, 0.75, Contacts::All}));
       for (const auto& [element, truth] : truthOf(degenerate, shape, 0.75)) {
         const auto c = found.find(element);
         if (c == found.end())
@@ -731,7 +628,7 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
 
 TEST(Shapes, CapturesAndAuditIncludeThem) {
   Random random(6);
-  const Body body = organ(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
+  const TestGeometry body = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
   for (const int features : {20, 100000}) {
     Settings audited = settingsOf(Engine::Octree);
     audited.audit.features = features;
