@@ -58,24 +58,25 @@ TEST_P(DegenerateCases, EachCaseMatchesBruteForce) {
   for (const DegenerateCase& input : degenerateCases()) {
     SCOPED_TRACE(input.name);
     const PairSettings settings = settingsFor(input);
+    if (isLeftOut(number++)) continue;
     const Truth truth = truthOf(input, settings);
     met += truth.there.front().anything();
     for (const Settings& octree : octreeSettings()) {
-      if (isLeftOut(number++)) continue;
       SCOPED_TRACE(nameOf(octree));
       PairRun run(octree, input.a, input.b, settings, !input.large);
       expectTruth(run, input, truth);
     }
   }
-  EXPECT_GT(met, 20u);
+  EXPECT_GT(met, leastOf(20));
 }
 
 TEST_P(DegenerateCases, TopologyMayChangeFromCaseToCase) {
+  std::size_t number = 0;
   for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
     PairRun run(settingsOf(Engine::Octree, 2, update), {}, {}, GetParam().settings);
     PairRun oracle(settingsOf(Engine::BruteForce), {}, {}, GetParam().settings);
     for (const DegenerateCase& input : degenerateCases()) {
-      if (input.large) continue;
+      if (input.large || isLeftOut(number++)) continue;
       SCOPED_TRACE(input.name);
       for (PairRun* each : {&run, &oracle}) {
         each->setTriangles(input.a, input.b);

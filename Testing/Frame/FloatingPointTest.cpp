@@ -251,10 +251,11 @@ std::string contentOf(const std::filesystem::path& path) {
 TEST(FloatingPointInCaptures, ModeOfTheCallerChangesNoByte) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path(),
                               path = folder / ("FloatingPoint" + std::to_string(getpid()));
+  std::size_t number = 0;
   for (const DegenerateCase& input : degenerateCases()) {
     PairSettings settings;
     settings.method = Method::Continuous;
-    if (input.large) continue;
+    if (input.large || isLeftOut(number++)) continue;
     SCOPED_TRACE(input.name);
     PairRun run({.threads = 1}, input.a, input.b, settings);
     run.step(input.aBefore(), input.a.positions, input.bBefore(), input.b.positions);

@@ -83,8 +83,8 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
                         std::back_inserter(gained));
     m_same += own.size() - lost.size();
     m_different += lost.size() + gained.size();
-    for (const Item& item : lost) check(item, true);
-    for (const Item& item : gained) check(item, false);
+    for (std::size_t i = 0; i < lost.size(); i += kShareOfCases) check(lost[i], true);
+    for (std::size_t i = 0; i < gained.size(); i += kShareOfCases) check(gained[i], false);
   }
 
   void compare(const StepScene& scene, Transformation how) {

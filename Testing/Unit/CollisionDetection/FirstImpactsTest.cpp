@@ -3,6 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
@@ -321,7 +322,7 @@ TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
   const TestGeometry line = thread(random, 60, 0.12, 0.01, false),
                      loop = thread(random, 40, 0.15, 0, true);
   const TestGeometry smoke = particles(random, 60, 0.02), dust = particles(random, 80, 0);
-  std::size_t dropped = 0;
+  std::size_t dropped = 0, number = 0;
   for (const auto& [a, b] : Pairs{{&organ, &cloth},
                                   {&cloth, &organ},
                                   {&organ, &organ},
@@ -339,6 +340,7 @@ TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
                                   {&dust, &smoke},
                                   {&smoke, &smoke}})
     for (const double thickness : {0.0, 0.05, 0.15}) {
+      if (isLeftOut(number++)) continue;
       PairSettings pair{Method::Continuous, thickness};
       const Positions nowA = moved(random, a->positions, 0.06),
                       nowB = moved(random, b->positions, 0.06);
@@ -349,7 +351,7 @@ TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
       }
       if (HasFailure()) return;
     }
-  EXPECT_GT(dropped, 1000u);
+  EXPECT_GT(dropped, leastOf(1000));
 }
 
 /// Lines and points that slide over a flat mesh have no contacts with its inner edges.

@@ -349,7 +349,7 @@ TEST(Rigid, FlatBodiesTouchInOneFrame) {
       {{{{0, 0, 1}, {0, 1, 0}}}, {{{0, 0, 1}, {1, -1, 0}}}, {{{1, -1, 0}, {0, 1, -1}}}}};
   for (const auto& [right, up] : planes)
     for (const Method method : {Method::Intersection, Method::Continuous})
-      for (int repeat = 0; repeat < casesOf(20); ++repeat) {
+      for (int repeat = 0; repeat < (kShareOfCases == 1 ? 20 : 1); ++repeat) {
         TestGeometry body = flat;
         for (Vector3d& p : body.positions)
           p = (1000 * p[0] - 500) * right + (1000 * p[1] - 500) * up;
@@ -376,7 +376,7 @@ TEST(Rigid, NearMissesMatchBruteForce) {
   PairSettings pair{Method::Continuous, 0.01, Contacts::All};
   pair.continuous.timeTolerance = 0.5;
   std::size_t contacts = 0;
-  for (int repeat = 0; repeat < casesOf(150); ++repeat) {
+  for (int repeat = 0; repeat < (kShareOfCases == 1 ? 150 : 7); ++repeat) {
     const TestGeometry first = testGeometry(soup(random, 60, 0.3)),
                        second = testGeometry(soup(random, 60, 0.3));
     const Place still = somewhere(random), before = somewhere(random),
@@ -478,7 +478,7 @@ TEST(Rigid, BoundsReduceCandidates) {
   std::vector<std::size_t> candidates, bytes;
   for (const int threads : {1, 2})
     for (Settings settings : boundsSettings(threads)) {
-      if (settings.engine == Engine::BruteForce) continue;
+      if (settings.engine == Engine::BruteForce || isLeftOut(threads - 1u)) continue;
       settings.octree.maxElementsPerLeaf = 32;
       OctreeBasedCD collisions(settings);
       const GeometryId a = rod.addTo(collisions), b = rod.addTo(collisions);
@@ -503,7 +503,7 @@ TEST(Rigid, BoundsReduceCandidates) {
       expectSameRows(rows.back(), rows[1]);
     }
   EXPECT_GT(rows[0].contacts(), 10u);
-  for (const std::size_t first : {0, 3}) {
+  for (std::size_t first = 0; first < candidates.size(); first += 3) {
     EXPECT_LT(candidates[first + 1], 0.7 * static_cast<double>(candidates[first]));
     EXPECT_LT(candidates[first + 2], 0.7 * static_cast<double>(candidates[first]));
     EXPECT_LT(bytes[first], bytes[first + 1]);

@@ -4,6 +4,7 @@
 #include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/Sanitized.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 
@@ -134,7 +135,7 @@ TEST(StepGuard, NothingTouchesAfterItAndEachVertexMakesItsFraction) {
     for (const Settings& settings : {settingsOf(Engine::Octree, 1), settingsOf(Engine::Octree, 8),
                                      settingsOf(Engine::BruteForce, 1)})
       guards.push_back(std::make_unique<Guarded>(all, settings));
-    for (int step = 0; step < 2; ++step) {
+    for (int step = 0; step < (kShareOfCases == 1 || most == 0.1 ? 2 : 1); ++step) {
       for (std::size_t i = 0; i < all.now.size(); ++i)
         all.now[i] = moved(random, all.before[i], most);
       EXPECT_GT(countTouches(all, all.now), 0u);
@@ -386,7 +387,9 @@ TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
     const Vector3d reached = collisions.transform(tool).translation;
     still += (reached - at).norm() < 0.01 * (wanted - at).norm();
     at = reached;
-    ASSERT_EQ(countTouches(all, {now, toolAt(at)}), 0u) << "step " << step;
+    if (!isLeftOut(static_cast<std::size_t>(step))) {
+      ASSERT_EQ(countTouches(all, {now, toolAt(at)}), 0u) << "step " << step;
+    }
     collisions.advance();
   }
   EXPECT_GT(held, 10);
@@ -626,7 +629,7 @@ TEST(StepGuard, LinesWithinTheirRadiiMayMoveApartAndAlong) {
 TEST(StepGuard, SegmentsWithVaryingRadiiDoNotOverlap) {
   Random random(187);
   std::size_t held = 0, near = 0;
-  for (int scene = 0; scene < 200; ++scene) {
+  for (int scene = 0; scene < casesOf(200); ++scene) {
     Guarding all;
     all.add({GeometryType::Lines,
              {randomPoint(random, 0, 1), randomPoint(random, 0, 1)},
@@ -663,8 +666,8 @@ TEST(StepGuard, SegmentsWithVaryingRadiiDoNotOverlap) {
     held += !guarded.guard.held().empty();
     EXPECT_GE(clearance(ends), 0.0) << "scene " << scene;
   }
-  EXPECT_GT(held, 20u);
-  EXPECT_GT(near, 20u);
+  EXPECT_GT(held, leastOf(20));
+  EXPECT_GT(near, leastOf(20));
 }
 
 TEST(StepGuard, ShapesDoNotSinkIntoAMesh) {

@@ -7,6 +7,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 #include "Common/SupportedMethods.h"
 
 #include <gtest/gtest.h>
@@ -266,7 +267,7 @@ TEST(Executor, ReturningWhileTasksRunWaitsForThem) {
     while (begun++ < 1000) std::this_thread::yield();
   });
   const Threads threads(0, executor);
-  for (int repeat = 0; repeat < 20; ++repeat) {
+  for (int repeat = 0; repeat < testing::casesOf(20); ++repeat) {
     std::vector<int> runs(40, 0);
     bool complete = true;
     try {

@@ -74,7 +74,7 @@ Four configuration(int kind, RandomFeatures& random) {
 /// The number of cases of each category. Long tests run more, and others.
 int pairsOfEachKind() {
   const char* asked = std::getenv("PALPATE_DISTANCE_PAIRS");
-  return asked ? std::atoi(asked) / kKindsOfPoints : 1500;
+  return asked ? std::atoi(asked) / kKindsOfPoints : testing::casesOf(1500);
 }
 
 TEST(ClosestPoint, AgreesWithRationalArithmetic) {

@@ -2,6 +2,7 @@
 
 #include <palpate/FeaturePairs.h>
 
+#include "Common/Sanitized.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <gmpxx.h>
@@ -113,7 +114,7 @@ void checkIntervals(const std::vector<RayInterval>& intervals, const RaySegment&
 TEST(RoundSegment, IntervalsHoldThePointsWithinTheRadius) {
   Random random(1);
   std::size_t none = 0;
-  for (int repeat = 0; repeat < 6000; ++repeat) {
+  for (int repeat = 0; repeat < testing::casesOf(6000); ++repeat) {
     Case c = makeCase(repeat, random);
     const int exponent = repeat % 7 == 0 ? random.between(-300, 300) : 0;
     scale(c, exponent);
@@ -127,7 +128,7 @@ TEST(RoundSegment, IntervalsHoldThePointsWithinTheRadius) {
       return outside(at, unit.p, unit.q, unit.radiusP, unit.radiusQ);
     })) << repeat;
   }
-  EXPECT_GT(none, 100u);
+  EXPECT_GT(none, testing::leastOf(100));
 }
 
 /// The ends are within the stated error where one end's ball holds the rest, however small that is.
@@ -165,7 +166,7 @@ TEST(RoundSegment, IntervalsOfRaysAlongACone) {
     for (const double length : {1.0, 2.0, 0.5})
       for (const Vector3d& along : {Vector3d(1, 1, 0), Vector3d(-1, -1, 0), Vector3d(1, 0, -1),
                                     Vector3d(1, 0.125, 0), Vector3d(1, 3, 0)})
-        for (int repeat = 0; repeat < 60; ++repeat) {
+        for (int repeat = 0; repeat < testing::casesOf(60); ++repeat) {
           const Vector3d q(length, 0, 0);
           const double wide = narrow + length;  // an angle of 45 degrees
           Vector3d through = repeat % 3 == 0 ? Vector3d(-narrow, 0, 0) : Vector3d(narrow, 0, 0);

@@ -1,5 +1,6 @@
 #include "Math/VertexTriangleDistances.h"
 
+#include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "Math/ClosestPoint.h"
 
@@ -85,7 +86,7 @@ TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
     Cases cases;
-    for (int i = 0; i < 20'000; ++i) {
+    for (int i = 0; i < testing::casesOf(20'000); ++i) {
       const std::size_t count = 1 + i % TriangleBatch::kSize;
       std::array<Four, TriangleBatch::kSize> x;
       TriangleBatch batch;

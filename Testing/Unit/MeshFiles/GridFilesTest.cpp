@@ -1,6 +1,8 @@
 // Files with tetrahedra, written by hand from the descriptions of their formats.
 #include "MeshFileFixture.h"
 
+#include "Common/Sanitized.h"
+
 #include <string>
 #include <vector>
 
@@ -218,7 +220,7 @@ TEST_F(GridFiles, TruncatedFilesAreRefusedOrComplete) {
 
 TEST_F(GridFiles, DamagedFilesAreReadOrRefused) {
   for (const auto& [name, content] : goodFiles())
-    for (std::size_t at = 0; at < content.size(); ++at)
+    for (std::size_t at = 0; at < content.size(); at += kShareOfCases)
       for (const char damage : {'\0', '9', '-', '\xff'}) {
         std::string damaged = content;
         damaged[at] = damage;

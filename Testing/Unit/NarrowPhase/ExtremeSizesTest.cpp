@@ -26,12 +26,6 @@ Mesh atOnePoint(std::uint32_t n) {
   return mesh;
 }
 
-Mesh identical(std::uint32_t n) {
-  Mesh mesh;
-  for (std::uint32_t i = 0; i < n; ++i) addTriangle(mesh, {0, 0, 0}, {1, 0, 0.3}, {0.1, 1, 0});
-  return mesh;
-}
-
 /// Triangle i is about `width` 2^e wide and `distance` 2^e from the origin; e is evenly spaced.
 Mesh spaced(std::uint32_t n, double first, double last, double width, double distance) {
   Mesh mesh;
@@ -87,8 +81,6 @@ TEST(ExtremeSizes, TrianglesAtOnePointNeedNoExactArithmetic) {
   compare(atOnePoint(14), atOnePoint(9), 0.125);
 }
 
-TEST(ExtremeSizes, IdenticalTriangles) { compare(identical(8), identical(5), 0.125); }
-
 TEST(ExtremeSizes, SizesAndDistancesInPowersOfTwo) {
   for (const auto& [first, last] : {std::pair(-1074.0, 996.0), {-400.0, 0.0}, {-20.0, 0.0}}) {
     const Mesh sizes = spaced(9, first, last, 1, 0), distances = spaced(12, first, last, 0.02, 1);
@@ -99,7 +91,8 @@ TEST(ExtremeSizes, SizesAndDistancesInPowersOfTwo) {
 }
 
 TEST(ExtremeSizes, TrianglesAroundOneVertex) {
-  for (const double thickness : {1e-4, 0.05, 0.4}) compare(star(80), star(7), thickness);
+  for (const double thickness : {1e-4, 0.05, 0.4})
+    compare(star(kShareOfCases == 1 ? 80 : 20), star(7), thickness);
 }
 
 /// The number of pairs of a star's triangles that are near each other only at its vertex.

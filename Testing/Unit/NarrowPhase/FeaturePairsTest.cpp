@@ -4,6 +4,7 @@
 #include "Octree/Traversal.h"
 
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 #include "PublishedFrames.h"
 
 #include <gtest/gtest.h>
@@ -272,6 +273,7 @@ TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
     findFeaturePairs(topology, topology, &floats, testing::sweptCandidates(mesh), pairs);
     expectOverlapping(pairs.vertexTriangle, vertexTriangle);
     expectOverlapping(pairs.edgeEdge, edgeEdge);
+    if (testing::kShareOfCases > 1) break;  // the second step is much larger
   }
 }
 

@@ -78,7 +78,7 @@ void failEach(const Case& c, const Threads& threads, bool smaller) {
   fresh.build(c.boxes, c.settings, threads);
   ASSERT_EQ(validate(fresh.octree, true), std::vector<std::string>{});
   const Boxes part(c.boxes.begin(), c.boxes.begin() + static_cast<long>(c.boxes.size() / 3 + 1));
-  constexpr std::size_t kStep = testing::kThreadSanitizer ? 3 : 1;
+  constexpr std::size_t kStep = testing::kSanitized ? 3 : 1;
   std::size_t failures = 0;
   for (std::size_t n = 1;; n += kStep) {
     BoxOctree tree;

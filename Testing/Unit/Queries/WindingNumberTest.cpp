@@ -276,7 +276,7 @@ TEST(WindingNumber, BadCallsThrow) {
 TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
   Random random(11);
   std::size_t inside = 0, outside = 0;
-  for (int run = 0; run < 8; ++run) {
+  for (int run = 0; run < (testing::kShareOfCases == 1 ? 8 : 4); ++run) {
     Mesh body = lump(random, 6, 8);
     const Vector3d offset = run % 2 ? randomPoint(random, -100, 100) : Vector3d(0, 0, 0);
     for (Vector3d& p : body.positions) p += offset;
@@ -305,8 +305,8 @@ TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
     inside += truth.size();
     outside += points.size() - truth.size();
   }
-  EXPECT_GT(inside, 5000u);
-  EXPECT_GT(outside, 5000u);
+  EXPECT_GT(inside, testing::leastOf(5000));
+  EXPECT_GT(outside, testing::leastOf(5000));
 }
 
 /// Without a face the mesh is open. Faces far from the hole decide the side of points within
