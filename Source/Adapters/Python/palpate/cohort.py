@@ -66,6 +66,11 @@ class _Failure(NamedTuple):
     capture: str
 
 
+# Seconds without an answer of Dask until its state is examined.
+PATIENCE = 20.0
+# How often a task runs again, beside its retries, because Dask lost it.
+LOSSES = 3
+
 _local = threading.local()
 
 
@@ -170,16 +175,7 @@ def _distributed(
     except ImportError as error:
         raise ImportError(f"{error}: install Dask distributed, or use no workers (0)") from None
     with contextlib.ExitStack() as stack:
-        if scheduler is None:
-            cluster = distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address=None,
-                local_directory=stack.enter_context(tempfile.TemporaryDirectory()),
-                silence_logs=logging.ERROR,
-            )
-            scheduler = stack.enter_context(cluster)
-        client = stack.enter_context(distributed.Client(scheduler))
+        client = _connected(stack, distributed, workers, scheduler)
         waiting = [(number, 1) for number in reversed(range(len(tasks)))]
         running: dict[Any, tuple[int, int]] = {}
         while waiting or running:
@@ -188,11 +184,29 @@ def _distributed(
                 number, attempt = waiting.pop()
                 future = client.submit(_attempt, function, tasks[number], pure=False)
                 running[future] = number, attempt
-            done, _ = distributed.wait(list(running), return_when="FIRST_COMPLETED")
+            try:
+                done, _ = distributed.wait(list(running), PATIENCE, "FIRST_COMPLETED")
+            except TimeoutError:
+                lost = _lost(client, list(running))
+                if scheduler is None and not client.ncores():  # Dask has shut its workers down
+                    lost = list(running)
+                    stack.close()
+                    client = _connected(stack, distributed, workers, scheduler)
+                for future in lost:
+                    number, attempt = running.pop(future)
+                    if attempt < retries + LOSSES:
+                        waiting.append((number, attempt + 1))
+                    else:
+                        failure = _Failure("the worker died each time", "")
+                        yield _outcome(number, tasks[number], failure, attempt)
+                continue
             for future in done:
                 number, attempt = running.pop(future)
                 try:
-                    result = future.result()
+                    result = future.result(PATIENCE)
+                except TimeoutError:  # the worker that has the result died
+                    waiting.append((number, attempt))
+                    continue
                 except Exception as error:
                     text = f"{type(error).__name__}: {error}"
                     if isinstance(error, distributed.scheduler.KilledWorker):
@@ -202,6 +216,36 @@ def _distributed(
                     waiting.append((number, attempt + 1))
                 else:
                     yield _outcome(number, tasks[number], result, attempt)
+
+
+def _connected(
+    stack: contextlib.ExitStack, distributed: Any, workers: int | None, scheduler: str | None
+) -> Any:
+    """A client of a scheduler, or of a local cluster. The stack closes both."""
+    address: Any = scheduler
+    if scheduler is None:
+        cluster = distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            local_directory=stack.enter_context(tempfile.TemporaryDirectory()),
+            silence_logs=logging.ERROR,
+        )
+        address = stack.enter_context(cluster)
+    return stack.enter_context(distributed.Client(address))
+
+
+def _lost(client: Any, futures: list[Any]) -> list[Any]:
+    """Futures whose task is at no worker. Dask may forget to report one when its worker dies."""
+    keys = [future.key for future in futures]
+    states = client.run_on_scheduler(
+        lambda dask_scheduler: [
+            dask_scheduler.tasks[key].state if key in dask_scheduler.tasks else "lost"
+            for key in keys
+        ]
+    )
+    working = ("waiting", "processing", "queued", "no-worker")
+    return [future for future, state in zip(futures, states, strict=True) if state not in working]
 
 
 def _in_order(outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
