@@ -1,9 +1,8 @@
 #include "NarrowPhase/Proximity.h"
 
-#include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/LineEdges.h"
-#include "NarrowPhase/ProximityFilter.h"
+#include "NarrowPhase/OwnedTests.h"
 #include "NarrowPhase/SharedVertex.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
@@ -12,7 +11,6 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <bit>
 #include <optional>
 #include <utility>
 
@@ -222,7 +220,7 @@ class ProximityFinder {
                                                    : Corners::All,
                       out),
         m_sharedVertex(pair.a.topology, pair.self() ? pair.floats : nullptr, candidates),
-        m_allowed(allowedTests(pair.a.topology, pair.b.topology)),
+        m_tests(pair),
         m_distinct(pair.reportsDistinct() && !pair.has(GeometryType::Lines)) {}
 
   void find(std::span<const ElementPair> candidates) {
@@ -234,42 +232,23 @@ class ProximityFinder {
   using Corners = VertexTriangleFinder::Corners;
 
   void add(const ElementPair& candidate) {
-    const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
-    std::uint32_t tests =
-        kOwnedByA[a.owned[candidate.a]] & kOwnedByB[b.owned[candidate.b]] & m_allowed;
-    const Triangle &s = a.triangles[candidate.a], &t = b.triangles[candidate.b];
-    if (m_pair.self()) {
-      const unsigned same = sameCorners(s, t);
-      tests &= ~kSharingTests[same];
-      if (m_sharedVertex.isAlone(s, t, same)) {
-        m_out.featurePairs += countOf(tests);
-        return;
-      }
-    }
-    if (tests == 0) return;
-    m_tests[m_size] = tests;
-    m_candidates[m_size] = candidate;
-    for (int i = 0; i < 3; ++i) {
-      const Vector3d p = m_pair.a.now[s[i]], q = m_pair.b.now[t[i]];
-      for (int k = 0; k < 3; ++k) {
-        m_batch.coordinates[TrianglePairBatch::rowOfA(i, k)][m_size] = p[k];
-        m_batch.coordinates[TrianglePairBatch::rowOfB(i, k)][m_size] = q[k];
-      }
-    }
-    if (++m_size == TrianglePairBatch::kSize) flush();
+    const std::uint32_t tests = m_tests.of(candidate);
+    m_out.featurePairs += countOf(tests);
+    if (tests == 0 || isAlone(candidate)) return;
+    m_tests.add(candidate, tests);
+    if (m_tests.isFull()) flush();
+  }
+
+  bool isAlone(const ElementPair& candidate) const {
+    if (!m_sharedVertex.isUsed()) return false;
+    const Triangle &s = m_pair.a.topology.triangles[candidate.a],
+                   &t = m_pair.b.topology.triangles[candidate.b];
+    return m_sharedVertex.isAlone(s, t, sameCorners(s, t));
   }
 
   void flush() {
-    if (m_size == 0) return;
-    std::uint32_t possible[TrianglePairBatch::kSize];
-    findPossibleProximity(m_batch, m_pair.maxFeatureDistance(), m_distinct,
-                          m_check.checkedEdgeDistance(), possible);
-    for (int i = 0; i < m_size; ++i) {
-      m_out.featurePairs += countOf(m_tests[i]);
-      for (std::uint32_t left = m_tests[i] & possible[i]; left != 0; left &= left - 1)
-        measure(m_candidates[i], std::countr_zero(left));
-    }
-    m_size = 0;
+    m_tests.flush(m_pair.maxFeatureDistance(), m_distinct, m_check.checkedEdgeDistance(),
+                  [&](const ElementPair& candidate, int test) { measure(candidate, test); });
   }
 
   void measure(const ElementPair& candidate, int test) {
@@ -290,12 +269,8 @@ class ProximityFinder {
   StepCheck m_check;
   VertexTriangleFinder m_verticesOfA, m_verticesOfB;
   const SharedVertex m_sharedVertex;
-  const std::uint32_t m_allowed;  ///< tests that apply to the meshes' geometry types
-  const bool m_distinct;          ///< edges whose closest points are ends are no contacts
-  int m_size = 0;
-  std::uint32_t m_tests[TrianglePairBatch::kSize];
-  ElementPair m_candidates[TrianglePairBatch::kSize];
-  TrianglePairBatch m_batch{};
+  OwnedTests m_tests;
+  const bool m_distinct;  ///< edges whose closest points are ends are no contacts
 };
 
 }  // namespace
