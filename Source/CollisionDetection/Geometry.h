@@ -11,8 +11,10 @@
 #include "Octree/PointQueries.h"
 #include "Mesh/Motion.h"
 #include "Mesh/Revision.h"
+#include "Core/Buffer.h"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -58,11 +60,18 @@ struct Geometry : CountedObject {
   GeometryMotion motion;
   std::shared_ptr<const SurfaceProxy> proxy;  ///< attached, or null
   SurfaceProxySettings proxySettings;         ///< if there is one
+  /// L: OctreeBasedCD::freeMotion(), of the last detection and of the one that runs. Empty before
+  /// one is needed. unlimited: the answer without a pair.
+  Buffer<double> freeMotion, nextFreeMotion, unlimited;
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
   operator GeometryLabel() const { return body; }
   /// The data for the choice of a method. extent is 0 before the first update of the octree.
   GeometryInStep inStep() const;
+  /// One for each vertex; one for what has no elements.
+  std::size_t freeMotionCount() const {
+    return body.shape || body.isField() ? 1 : body.mesh.topology.vertexCount;
+  }
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -344,6 +345,22 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
                 nameOf(*record.a, *record.b) + " has no results yet: call detectCollision() first",
                 a);
   return record.data;
+}
+
+std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {
+  read();
+  Implementation& all = *m_implementation;
+  Geometry& geometry = all.geometries.at(id);
+  if (geometry.freeMotion.size() == geometry.freeMotionCount()) return geometry.freeMotion;
+  for (const auto& record : all.pairs.records())
+    if (record->pair.settings.freeMotionReach > 0.0 &&
+        (record->a == &geometry || record->b == &geometry))
+      throw Error(ErrorCode::NotAvailable,
+                  nameOf(geometry) + " has no free motion yet: call detectCollision() first", id);
+  const std::lock_guard lock(all.fillingUnlimited);
+  const MemoryScope memory(all.budget, MemoryStage::Results);
+  geometry.unlimited.assign(geometry.freeMotionCount(), std::numeric_limits<double>::infinity());
+  return geometry.unlimited;
 }
 
 const LooseOctree& OctreeBasedCD::octree() const { return read().shownOctrees.view; }

@@ -36,6 +36,7 @@ OctreeBasedCD::Implementation::~Implementation() {
 
 void OctreeBasedCD::Implementation::releaseMemory() {
   frame = Frame();
+  freeMotions = FreeMotionSearch();
   for (const auto& geometry : geometries.all()) {
     geometry->body.tree.releaseMemory();
     geometry->step.releaseMemory();
@@ -191,6 +192,8 @@ void OctreeBasedCD::Implementation::detect() {
     frame.detect(records, threads, next, traced);
   else
     frame.detectByBruteForce(records, next, traced);
+  freeMotions.find(geometries, pairs, settings.engine, threads);
+  freeMotions.commit(geometries);
   for (PairRecord* record : records) record->commit();
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))

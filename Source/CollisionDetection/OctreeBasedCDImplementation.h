@@ -4,6 +4,7 @@
 
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/Frame.h"
+#include "CollisionDetection/FreeMotionSearch.h"
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/Planning.h"
@@ -42,6 +43,7 @@ struct OctreeBasedCD::Implementation {
   GeometryTable geometries;
   PairTable pairs;
   Frame frame;
+  FreeMotionSearch freeMotions;
   FrameStatistics statistics;  ///< of the last frame or explicit update
   FrameStatistics updates;     ///< of the updates since the last frame
   bool hasUpdates = false;
@@ -54,6 +56,7 @@ struct OctreeBasedCD::Implementation {
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
+  std::mutex fillingUnlimited;  ///< locked while freeMotion(), a const call, fills
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
@@ -91,7 +94,8 @@ struct OctreeBasedCD::Implementation {
               bool skips, Trace* traced = nullptr);
 
   bool needsNoOctree(const PairRecord& record) const {
-    return record.support->kind == PairKind::Proxy || mayUseProxy(record);
+    return record.pair.settings.freeMotionReach == 0.0 &&
+           (record.support->kind == PairKind::Proxy || mayUseProxy(record));
   }
 
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries

@@ -99,8 +99,8 @@ class PairCheck {
   }
 
   void range() const {
-    const auto [method, thickness, contacts, rest, allowedError, continuous, automatic, proxy] =
-        m_settings;
+    const auto [method, thickness, contacts, rest, allowedError, freeReach, continuous, automatic,
+                proxy] = m_settings;
     const auto [timeTolerance, earliestTimeOnly] = continuous;
     const double motionTolerance = automatic.motionTolerance, normalCone = proxy.widestNormalCone;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);
@@ -124,6 +124,9 @@ class PairCheck {
     need(method == Method::Auto || method == Method::Proxy || allowedError == 0.0,
          "allowedError is " + textOf(allowedError) +
              "; only Auto and Proxy use it, so it must be 0 for Method::" + toString(method));
+    finite("freeMotionReach", freeReach, freeReach >= 0.0, kLengthRule);
+    support(freeReach == 0.0 || !(m_a.body.isField() || m_b.body.isField()),
+            "a distance field has no free motion; freeMotionReach must be 0");
     need(normalCone > 0.0 && normalCone <= kWidestNormalCone,
          "widestNormalCone is " + textOf(normalCone) + "; it must be above 0 and at most 1.5");
     need(method == Method::Auto || motionTolerance < 0.0,

@@ -25,7 +25,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 11;
+constexpr int kVersion = 12;
 
 // Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",       "Intersection",  "Proximity",
@@ -237,6 +237,7 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 9) fieldOf(file, pair.settings.continuous.earliestTimeOnly);
   if (version >= 11) file.real(pair.settings.allowedError);
   if (version >= 11) file.real(pair.settings.proxy.widestNormalCone);
+  if (version >= 12) file.real(pair.settings.freeMotionReach);
 }
 
 template <class File, class FilterType>

@@ -107,6 +107,16 @@ constexpr double kFirstStepBack = 0x1p-44;
 /// direction between two points at least this far apart is therefore right to 2^-24.
 constexpr double kCertainDirection = 0x1p-26;
 
+// ---- Free motion (FreeMotion.cpp) ----
+
+/// Relative to the largest magnitude of coordinates, radii and thickness: what rounding takes from
+/// a gap and from the motions that share it, some 140 u on both sides together, and a margin.
+constexpr double kFreeMotionError = 0x1p-44;
+/// Relative to the extent of two features and their distance of contact: how much nearer than that
+/// distance Continuous may report them. The motion increases the extent up to sixfold, so that this
+/// is eight times kApproachError.
+constexpr double kFreeMotionApproach = 8 * kApproachError;
+
 // ---- Normals of features that touch (NarrowPhase/TouchNormal.cpp) ----
 
 /// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24

@@ -294,7 +294,10 @@ PairSettings RandomHistory::randomSettings() {
   if (settings.method == Method::Continuous && m_random() % 4 == 0)
     settings.continuous.earliestTimeOnly = true;
   if (m_random() % 8 == 0) settings.restDistance = 0.2 * m_unit;
-  if (m_random() % 4 == 0) settings.continuous.timeTolerance = 1e-3;
+  if (m_random() % 4 == 0) {
+    settings.continuous.timeTolerance = 1e-3;
+    settings.freeMotionReach = 0.3 * m_unit;
+  }
   return settings;
 }
 
@@ -456,6 +459,9 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
       EXPECT_TRUE(startsApart(pair));
     }
   }
+  for (const auto& [id, body] : m_bodies)
+    EXPECT_TRUE(std::ranges::equal(m_collisions.freeMotion(id), other.freeMotion(ids.at(id))))
+        << "free motion of geometry " << static_cast<unsigned>(id);
 }
 
 void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,

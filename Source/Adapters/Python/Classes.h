@@ -91,6 +91,7 @@ inline constexpr auto kFields<PairSettings> = std::tuple(
     field(
         "earliest_time_only", [](auto& s) -> auto& { return s.continuous.earliestTimeOnly; }),
     field("allowed_error", &PairSettings::allowedError),
+    field("free_motion_reach", &PairSettings::freeMotionReach),
     field(
         "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }));
 template <>

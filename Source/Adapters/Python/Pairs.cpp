@@ -132,6 +132,18 @@ exception ends the frame, and detect_collision() raises it.)")
 
 A copy of the answer of the last detection, in the order in which the pair was added.)")
       .def(
+          "free_motion",
+          [](Collisions& self, Object geometry) {
+            const GeometryId id = geometryId(geometry);
+            return self.read([&](OctreeBasedCD& d) { return copyOf(d.freeMotion(id)); });
+          },
+          py::arg("geometry"),
+          R"(free_motion(geometry) -> numpy.ndarray
+
+(n,) lengths that the vertices may move from their positions in the last detection before anything
+new comes into contact; of a shape (1,) for all its points. Only pairs with
+PairSettings.free_motion_reach count; without one it is infinity.)")
+      .def(
           "candidate_pairs",
           [](Collisions& self, Object first, Object second) {
             const GeometryId a = geometryId(first), b = geometryId(second);

@@ -307,6 +307,16 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The answer of the last detectCollision(). (a, b) is in the order in which the pair was added.
   /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
+  /// L: how far vertices may move from their positions in the last detectCollision(), one length
+  /// for each; of a shape one for all its points. While no point of any geometry moves further than
+  /// its own, on whatever path, features that were no contact come no nearer than the thickness and
+  /// their radii, and features in contact do not pass through each other. It includes rounding, and
+  /// excludes features that the pair's filters exclude. Only pairs with
+  /// PairSettings::freeMotionReach count; a geometry without one has infinity. Valid until the next
+  /// detection or change of the geometry. Docs/Algorithms/FreeMotion.md has the proof.
+  ///
+  /// Errors   UnknownGeometry; NotAvailable before a detection with these elements.
+  std::span<const double> freeMotion(GeometryId) const;
   /// The octrees of all geometries, as of the last update. The reference is valid as long as this
   /// object; each update changes what it shows.
   const LooseOctree& octree() const;

@@ -200,6 +200,11 @@ struct PairSettings {
   /// most this, but only where they prove that nothing touches in the step. Other methods accept 0
   /// only.
   double allowedError = 0.0;
+  /// L, 0 to kLargestMeasure. Positive: detectCollision() also finds OctreeBasedCD::freeMotion()
+  /// for the pair. Features that are further apart than their distance of contact and this limit a
+  /// vertex to half of this. A larger value costs more. A distance field that is a geometry accepts
+  /// only 0.
+  double freeMotionReach = 0.0;
   ContinuousSettings continuous{};
   AutoSettings automatic{};
   LeafSettings proxy{};

@@ -138,7 +138,7 @@ TEST(SteadyFrame, AllocatesNothingWithLinesAndPoints) {
   const GeometryId tissue = detection.addTriangleMesh(sheet.positions, sheet.triangles),
                    suture = detection.addLineMesh(thread, segments, 0.01),
                    smoke = detection.addPointSet(thread, 0.02);
-  const PairSettings near{.method = Method::Proximity, .thickness = 0.02};
+  const PairSettings near{.method = Method::Proximity, .thickness = 0.02, .freeMotionReach = 0.1};
   PairSettings self = near;
   self.restDistance = 0.1;
   detection.addCollisionPair(suture, suture, self);

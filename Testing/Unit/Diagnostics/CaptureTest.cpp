@@ -226,10 +226,10 @@ TEST_F(Capture, ErrorsNameTheFault) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 11", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 11", "palpate-capture 12",
-                    "its version is 12; versions up to 11");
-  expectRefusedWith("palpate-capture 11", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 12", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 12", "palpate-capture 13",
+                    "its version is 13; versions up to 12");
+  expectRefusedWith("palpate-capture 12", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -284,6 +284,9 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0\n",
+             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2\n");  // freeMotionReach
+  EXPECT_EQ(asVersion(11).pairs[0].settings.freeMotionReach, 0.0);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2\n",
              " 1.0c6f7a0b5ed8dp-20 0\n");  // allowedError, widestNormalCone
   EXPECT_EQ(asVersion(10).pairs[0].settings.allowedError, 0.0);

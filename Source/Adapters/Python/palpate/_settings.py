@@ -107,6 +107,7 @@ class PairSettings:
     time_tolerance      fraction of the step by which a time of impact may be early
     earliest_time_only  Continuous only: report earliest_time_of_impact and no contacts
     allowed_error       L: what an answer by a proxy or a field may be off by
+    free_motion_reach   L: positive: detect_collision() also finds free_motion(), up to half of this
     widest_normal_cone  rad, in (0, 1.5], Proxy only
     """
 
@@ -118,6 +119,7 @@ class PairSettings:
     time_tolerance: float = 1e-6
     earliest_time_only: bool = False
     allowed_error: float = 0.0
+    free_motion_reach: float = 0.0
     widest_normal_cone: float = 0.25
 
     def __post_init__(self) -> None:

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <palpate/Settings.h>
+
+#include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/PairTable.h"
+#include "NarrowPhase/FreeMotion.h"
+#include "Shapes/Shape.h"
+#include "Octree/Traversal.h"
+#include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
+#include "Core/Threads.h"
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// Finds the free motions of all geometries (PairSettings::freeMotionReach), beside the work on
+/// contacts: in a search of its own, whose distance includes the reach. Its scratch remembers its
+/// peak.
+class FreeMotionSearch {
+ public:
+  /// Writes Geometry::nextFreeMotion, unless nothing changed since the last commit(). The octrees
+  /// must be up to date.
+  void find(const GeometryTable&, const PairTable&, Engine, const Threads&);
+  /// Makes what find() wrote the result.
+  void commit(const GeometryTable&) noexcept;
+
+ private:
+  /// A pair, and the part of m_nodePairs that belongs to it.
+  struct Work {
+    const PairRecord* record;
+    double searchDistance;
+    TreePair trees{};
+    std::size_t first = 0, count = 0, grain = 1;
+  };
+  struct Place {
+    std::size_t work, job;
+  };
+  struct Scratch : CountedObject {
+    TraversalStack stack;
+    PairSink sink;
+    Buffer<ElementPair> candidates;
+    Buffer<std::uint32_t> elements;
+    ShapePairScratch shapes;
+  };
+  struct Known {
+    CollisionPair pair;
+    PairRecord::State state;
+  };
+
+  bool isKnown(const PairTable&) const;
+  void start(const GeometryTable&, const PairTable&);
+  void startSearch(Work&, const Threads&);
+  void run(const Work&, std::size_t job, Scratch&) const;
+  static void runByBruteForce(const Work&, Scratch&);
+  static void withShape(const Work&, Engine, Scratch&);
+
+  std::vector<Known> m_known;  ///< for which the results hold
+  bool m_isNew = false;        ///< commit() has something to commit
+  std::vector<Work> m_works;
+  std::vector<Place> m_places;
+  std::vector<std::unique_ptr<Scratch>> m_scratch;
+  Buffer<NodePair> m_nodePairs;
+  TraversalStack m_stack;
+};
+
+}  // namespace palpate

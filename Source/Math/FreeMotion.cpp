@@ -1,0 +1,101 @@
+#include "Math/FreeMotion.h"
+
+#include "Math/Tolerances.h"
+#include "Core/Assert.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Bounds {
+  Vector3d lower = Vector3d::Constant(kInfinity), upper = Vector3d::Constant(-kInfinity);
+
+  void extend(const RoundPoints& points, double factor) {
+    for (int i = 0; i < points.count; ++i) {
+      const Vector3d radius = Vector3d::Constant(factor * points.radii[i]);
+      lower = lower.cwiseMin(points.positions[i] - radius);
+      upper = upper.cwiseMax(points.positions[i] + radius);
+    }
+  }
+};
+
+}  // namespace
+
+SharedGap gapAlong(const RoundPoints& p, const RoundPoints& q, const Vector3d& direction,
+                   bool withRadii) {
+  PALPATE_ASSERT(p.count > 0 && q.count > 0);
+  const double factor = withRadii ? 1.0 : 0.0;
+  SharedGap result{};
+  for (int i = 0; i < p.count; ++i)
+    result.beyondP[i] = direction.dot(p.positions[i] - q.positions[0]) - factor * p.radii[i];
+  for (int j = 0; j < q.count; ++j)
+    result.beyondQ[j] = direction.dot(q.positions[j] - q.positions[0]) + factor * q.radii[j];
+  // A direction of NaN makes all heights NaN, and so the gap.
+  const double lowest = *std::min_element(result.beyondP.begin(), result.beyondP.begin() + p.count),
+               highest =
+                   *std::max_element(result.beyondQ.begin(), result.beyondQ.begin() + q.count);
+  result.gap = lowest - highest;
+  for (int i = 0; i < p.count; ++i) result.beyondP[i] -= lowest;
+  for (int j = 0; j < q.count; ++j) result.beyondQ[j] = highest - result.beyondQ[j];
+  return result;
+}
+
+AxisGap gapAlongAxes(const RoundPoints& p, const RoundPoints& q) {
+  Bounds ofP, ofQ;
+  ofP.extend(p, 1.0);
+  ofQ.extend(q, 1.0);
+  const Vector3d above = ofP.lower - ofQ.upper, below = ofQ.lower - ofP.upper;
+  Eigen::Index axis = 0;
+  const double gap = above.cwiseMax(below).maxCoeff(&axis);
+  return {gap, (above[axis] >= below[axis] ? 1.0 : -1.0) * Vector3d::Unit(axis)};
+}
+
+GapSize gapSize(const RoundPoints& p, const RoundPoints& q, double thickness) {
+  Bounds bounds;
+  GapSize size{thickness, 0.0};
+  for (const RoundPoints* points : {&p, &q}) {
+    bounds.extend(*points, 0.0);
+    for (int i = 0; i < points->count; ++i) size.largest = std::max(size.largest, points->radii[i]);
+  }
+  size.largest = std::max(
+      {size.largest, bounds.lower.cwiseAbs().maxCoeff(), bounds.upper.cwiseAbs().maxCoeff()});
+  size.extent = (bounds.upper - bounds.lower).maxCoeff();
+  return size;
+}
+
+FreeMotionRange::FreeMotionRange(const PairSettings& settings, double radii)
+    : m_thickness(settings.thickness),
+      m_contactDistance(settings.thickness + radii),
+      m_reach(settings.freeMotionReach),
+      m_isEarly(m_contactDistance > 0.0 &&
+                (settings.method == Method::Continuous || settings.method == Method::Auto)),
+      m_early(settings.continuous.timeTolerance * m_reach) {}
+
+double FreeMotionRange::slack(const GapSize& size) const {
+  const double rounding = kFreeMotionError * size.largest;
+  if (!m_isEarly) return rounding;
+  return rounding + kFreeMotionApproach * (size.extent + m_contactDistance) + m_early;
+}
+
+double FreeMotionRange::freeGap(double gap, const GapSize& size) const {
+  const double free = gap - m_thickness - slack(size);
+  return free > 0.0 ? free : 0.0;  // also for NaN
+}
+
+double FreeMotionRange::gapOfContact(double gap, const GapSize& size) {
+  const double free = gap - kFreeMotionError * size.largest;
+  return free > 0.0 ? free : 0.0;
+}
+
+double FreeMotionRange::searchDistance(double largest) const {
+  return m_contactDistance + m_reach + 2.0 * slack({largest + m_contactDistance, 2.0 * largest});
+}
+
+}  // namespace palpate
