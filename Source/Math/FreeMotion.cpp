@@ -4,7 +4,6 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace palpate {
 
@@ -12,16 +11,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 struct Bounds {
-  Vector3d lower = Vector3d::Constant(kInfinity), upper = Vector3d::Constant(-kInfinity);
+  Vector3d lower, upper;
 
-  void extend(const RoundPoints& points, double factor) {
-    for (int i = 0; i < points.count; ++i) {
-      const Vector3d radius = Vector3d::Constant(factor * points.radii[i]);
-      lower = lower.cwiseMin(points.positions[i] - radius);
-      upper = upper.cwiseMax(points.positions[i] + radius);
+  explicit Bounds(const RoundPoints& points)
+      : lower(points.positions[0].array() - points.radii[0]),
+        upper(points.positions[0].array() + points.radii[0]) {
+    for (int i = 1; i < points.count; ++i) {
+      lower = lower.cwiseMin((points.positions[i].array() - points.radii[i]).matrix());
+      upper = upper.cwiseMax((points.positions[i].array() + points.radii[i]).matrix());
     }
   }
 };
@@ -47,27 +45,15 @@ SharedGap gapAlong(const RoundPoints& p, const RoundPoints& q, const Vector3d& d
   return result;
 }
 
-AxisGap gapAlongAxes(const RoundPoints& p, const RoundPoints& q) {
-  Bounds ofP, ofQ;
-  ofP.extend(p, 1.0);
-  ofQ.extend(q, 1.0);
-  const Vector3d above = ofP.lower - ofQ.upper, below = ofQ.lower - ofP.upper;
+BoxGap gapOfBoxes(const RoundPoints& p, const RoundPoints& q, double thickness) {
+  const Bounds ofP(p), ofQ(q);
+  const Vector3d above = ofP.lower - ofQ.upper, below = ofQ.lower - ofP.upper,
+                 lower = ofP.lower.cwiseMin(ofQ.lower), upper = ofP.upper.cwiseMax(ofQ.upper);
   Eigen::Index axis = 0;
   const double gap = above.cwiseMax(below).maxCoeff(&axis);
-  return {gap, (above[axis] >= below[axis] ? 1.0 : -1.0) * Vector3d::Unit(axis)};
-}
-
-GapSize gapSize(const RoundPoints& p, const RoundPoints& q, double thickness) {
-  Bounds bounds;
-  GapSize size{thickness, 0.0};
-  for (const RoundPoints* points : {&p, &q}) {
-    bounds.extend(*points, 0.0);
-    for (int i = 0; i < points->count; ++i) size.largest = std::max(size.largest, points->radii[i]);
-  }
-  size.largest = std::max(
-      {size.largest, bounds.lower.cwiseAbs().maxCoeff(), bounds.upper.cwiseAbs().maxCoeff()});
-  size.extent = (bounds.upper - bounds.lower).maxCoeff();
-  return size;
+  return {gap,
+          (above[axis] >= below[axis] ? 1.0 : -1.0) * Vector3d::Unit(axis),
+          {std::max(thickness, upper.cwiseMax(-lower).maxCoeff()), (upper - lower).maxCoeff()}};
 }
 
 FreeMotionRange::FreeMotionRange(const PairSettings& settings, double radii)

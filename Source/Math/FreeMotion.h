@@ -38,20 +38,21 @@ struct SharedGap {
 SharedGap gapAlong(const RoundPoints& p, const RoundPoints& q, const Eigen::Vector3d& direction,
                    bool withRadii = true);
 
-/// The widest gap along a coordinate axis, and its direction from q towards p.
-struct AxisGap {
-  double gap;
-  Eigen::Vector3d direction;
-};
-/// Law      fewer points never have a smaller gap, also in the last bit.
-AxisGap gapAlongAxes(const RoundPoints& p, const RoundPoints& q);
-
 /// What the rounding errors of a gap depend on. All in L.
 struct GapSize {
-  double largest;  ///< of the magnitudes of coordinates, radii and the thickness
-  double extent;   ///< the largest difference between two points in a coordinate
+  double largest;  ///< at least the magnitudes of coordinates, radii and the thickness
+  double extent;   ///< at least the largest difference between two points in a coordinate
 };
-GapSize gapSize(const RoundPoints& p, const RoundPoints& q, double thickness);
+
+/// The boxes of two sets of round points. The gap is the widest one along a coordinate axis, and
+/// the direction that from q towards p.
+struct BoxGap {
+  double gap;
+  Eigen::Vector3d direction;
+  GapSize size;
+};
+/// Law      fewer points never have a smaller gap or a larger size, also in the last bit.
+BoxGap gapOfBoxes(const RoundPoints& p, const RoundPoints& q, double thickness);
 
 /// How far apart the features of a pair are for its free motion (PairSettings::freeMotionReach).
 class FreeMotionRange {

@@ -126,18 +126,16 @@ class FreeMotionFinder {
   /// What the boxes of two features, or of two elements, prove.
   struct Limits {
     Limits(const FreeMotionFinder& finder, const Corners& p, const Corners& q)
-        : size(gapSize(p.points, q.points, finder.m_range.thickness())),
-          axis(gapAlongAxes(p.points, q.points)),
-          free(finder.m_range.freeGap(axis.gap, size)) {}
+        : box(gapOfBoxes(p.points, q.points, finder.m_range.thickness())),
+          free(finder.m_range.freeGap(box.gap, box.size)) {}
 
     /// Whether all vertices are known to be no freer than along the axis.
     bool lowersNone(const Corners& p, const Corners& q) const {
       return free > 0.0 && std::max(p.mostFree(), q.mostFree()) <= 0.5 * free;
     }
 
-    GapSize size;
-    AxisGap axis;
-    double free;  ///< L: along the axis
+    BoxGap box;
+    double free;  ///< L: along the axis of the widest gap
   };
 
   void measure(const ElementPair& candidate, int test) {
@@ -157,7 +155,7 @@ class FreeMotionFinder {
     const Corners p(vertices, swapped ? m_motions.b : m_motions.a, std::array{vertex}),
         q(others, swapped ? m_motions.a : m_motions.b, ids);
     bound(
-        p, q, shortestTo(p.points.positions[0], q.points.positions),
+        p, q, [&] { return shortestTo(p.points.positions[0], q.points.positions); },
         [&] { return rejectsVertex(m_pair, vertex, triangle, swapped); },
         [&]() -> Measured {
           const auto& x = q.points.positions;
@@ -173,7 +171,7 @@ class FreeMotionFinder {
     const Segment &ofA = m_pair.a.topology.edges[edgeA], &ofB = m_pair.b.topology.edges[edgeB];
     const Corners p(m_pair.a, m_motions.a, ofA), q(m_pair.b, m_motions.b, ofB);
     bound(
-        p, q, shortestBetween(p.points.positions, q.points.positions),
+        p, q, [&] { return shortestBetween(p.points.positions, q.points.positions); },
         [&] { return rejectsEdges(m_pair, edgeA, edgeB); },
         [&]() -> Measured {
           const auto &x = p.points.positions, &y = q.points.positions;
@@ -183,27 +181,28 @@ class FreeMotionFinder {
         });
   }
 
-  /// Lowers the free motions of two features. shortest: about the vector from q to p. isRejected():
-  /// by a filter. measured(): along the closest points.
-  template <class IsRejected, class Measure>
-  void bound(const Corners& p, const Corners& q, const Vector3d& shortest, IsRejected&& isRejected,
+  /// Lowers the free motions of two features. nearly(): about the shortest vector from q to p.
+  /// isRejected(): by a filter. measured(): along the closest points.
+  template <class Nearly, class IsRejected, class Measure>
+  void bound(const Corners& p, const Corners& q, Nearly&& nearly, IsRejected&& isRejected,
              Measure&& measured) {
     const Limits limits(*this, p, q);
     if (limits.lowersNone(p, q) || isRejected()) return;
+    const Vector3d shortest = nearly();
     const double length = shortest.norm();
     SharedGap shared = gapAlong(p.points, q.points, shortest / length);
-    double width = m_range.freeGap(shared.gap, limits.size);
+    double width = m_range.freeGap(shared.gap, limits.box.size);
     // Any direction is valid. This one will do if no other has a gap that is wider than rounding.
     if (!(width > 0.0 && length - shared.gap <= p.largestRadius() + q.largestRadius() +
-                                                    kFreeMotionError * limits.size.largest)) {
+                                                    kFreeMotionError * limits.box.size.largest)) {
       const Measured at = measured();
       const bool isContact = !(limits.free > 0.0) && m_range.isContact(at.distance - at.radii);
       shared = gapAlong(p.points, q.points, at.direction, !isContact);
-      if (!isContact && !(shared.gap > limits.axis.gap))
-        shared = gapAlong(p.points, q.points, limits.axis.direction);
+      if (!isContact && !(shared.gap > limits.box.gap))
+        shared = gapAlong(p.points, q.points, limits.box.direction);
       width = isContact  // it must not pass through the other feature
-                  ? m_range.gapOfContact(shared.gap, limits.size)
-                  : m_range.freeGap(shared.gap, limits.size);
+                  ? m_range.gapOfContact(shared.gap, limits.box.size)
+                  : m_range.freeGap(shared.gap, limits.box.size);
     }
     width = std::max(width, limits.free);
     const auto lowerBy = [&](double& motion, double value) {

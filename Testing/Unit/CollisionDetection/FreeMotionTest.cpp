@@ -271,7 +271,7 @@ TEST(FreeMotion, NothingNewComesNearInRandomScenes) {
   Random random(1);
   double sum = 0.0;
   constexpr int kStepsEach = 6;
-  for (int scene = 0; kStepsEach * scene < stepsOf(1800); ++scene) {
+  for (int scene = 0; kStepsEach * scene < stepsOf(900); ++scene) {
     SCOPED_TRACE("scene " + std::to_string(scene));
     const Scene made = randomScene(random);
     // Auto needs one radius where nothing has a thickness.
