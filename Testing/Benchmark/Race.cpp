@@ -138,16 +138,16 @@ void raceRows(Report& report, const Options& options) {
 int main(int count, char** arguments) {
   Options options;
   options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",     "stages",     "frame",    "far",    "rest",   "tool",
-                    "scale",    "steady",     "features", "lines",  "shapes", "inside",
-                    "rigid",    "fieldframe", "proxy",    "coarse", "bounds", "continuous",
-                    "validity", "resting",    "queries",  "fields", "simd"};
+  options.tables = {"race",     "stages",     "frame",      "far",     "rest",   "tool",
+                    "scale",    "steady",     "features",   "lines",   "shapes", "inside",
+                    "rigid",    "fieldframe", "proxy",      "coarse",  "bounds", "continuous",
+                    "validity", "resting",    "freemotion", "queries", "fields", "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, rest, tool, scale, "
                  "steady, features, lines, shapes, inside, rigid, fieldframe, proxy, coarse, "
-                 "bounds, continuous, validity, resting, queries, fields, simd")
+                 "bounds, continuous, validity, resting, freemotion, queries, fields, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option(
@@ -192,6 +192,7 @@ int main(int count, char** arguments) {
       {"continuous", continuousRows},
       {"validity", validityRows},
       {"resting", restingRows},
+      {"freemotion", freeMotionRows},
       {"queries", spatialRows},
       {"fields", fieldRows},
       {"simd", simdRows}};
