@@ -37,7 +37,7 @@ class ShapeMotionFinder {
         const std::optional<NearestToShape> inside =
             m_shape.nearestInTriangle(m_mesh.now[a], m_mesh.now[b], m_mesh.now[c]);
         if (inside) least = std::min(least, inside->distance);
-        boundAll(std::array{a, b, c}, least, false);
+        boundAll(std::array{a, b, c}, least, m_mesh.largestRadius, false);
       }
     }
   }
@@ -45,27 +45,29 @@ class ShapeMotionFinder {
  private:
   double boundVertex(std::uint32_t v) const {
     const double distance = m_shape.signedDistance(m_mesh.now[v]).distance;
-    boundAll(std::array{v}, distance, true);
+    boundAll(std::array{v}, distance, m_mesh.radius(v), true);
     return distance;
   }
   double boundEdge(std::uint32_t p, std::uint32_t q) const {
-    const double distance = m_shape.nearestOfEdge(m_mesh.now[p], m_mesh.now[q]).distance;
-    boundAll(std::array{p, q}, distance, false);
-    return distance;
+    const NearestToShape nearest = m_shape.nearestOfEdge(m_mesh.now[p], m_mesh.now[q]);
+    boundAll(std::array{p, q}, nearest.distance, m_mesh.radius({p, q, q}, nearest.weights), false);
+    return nearest.distance;
   }
 
-  /// passesThrough: whether a feature inside the shape could leave it on another side.
+  /// radius: at the nearest point. passesThrough: whether a feature inside the shape could leave it
+  /// on another side.
   template <class Vertices>
-  void boundAll(const Vertices& vertices, double distance, bool passesThrough) const {
-    double radius = 0.0, largest = m_shape.magnitude() + m_range.thickness();
+  void boundAll(const Vertices& vertices, double distance, double radius,
+                bool passesThrough) const {
+    double largestRadius = 0.0, largest = m_shape.magnitude() + m_range.thickness();
     for (const std::uint32_t v : vertices) {
-      radius = std::max(radius, m_mesh.radius(v));
+      largestRadius = std::max(largestRadius, m_mesh.radius(v));
       largest = std::max(largest, m_mesh.now[v].cwiseAbs().maxCoeff());
     }
-    largest += radius;
+    largest += largestRadius;
     const GapSize size{largest, 2.0 * largest};
     const double error = kShapeBoundError * 4.0 * largest;
-    double free = m_range.freeGap(distance - radius - error, size);
+    double free = m_range.freeGap(distance - largestRadius - error, size);
     if (m_range.isContact(distance - radius)) {
       if (distance < 0.0 && !passesThrough) return;
       free = FreeMotionRange::gapOfContact(std::abs(distance) - error, size);
