@@ -191,20 +191,21 @@ class FreeMotionFinder {
     const Vector3d shortest = nearly();
     const double length = shortest.norm();
     SharedGap shared = gapAlong(p.points, q.points, shortest / length);
-    double width = m_range.freeGap(shared.gap, limits.box.size);
+    bool isContact = false;
     // Any direction is valid. This one will do if no other has a gap that is wider than rounding.
-    if (!(width > 0.0 && length - shared.gap <= p.largestRadius() + q.largestRadius() +
-                                                    kFreeMotionError * limits.box.size.largest)) {
+    if (!(m_range.freeGap(shared.gap, limits.box.size) > 0.0 &&
+          length - shared.gap <=
+              p.largestRadius() + q.largestRadius() + kFreeMotionError * limits.box.size.largest)) {
       const Measured at = measured();
-      const bool isContact = !(limits.free > 0.0) && m_range.isContact(at.distance - at.radii);
+      isContact = !(limits.free > 0.0) && m_range.isContact(at.distance - at.radii);
       shared = gapAlong(p.points, q.points, at.direction, !isContact);
-      if (!isContact && !(shared.gap > limits.box.gap))
-        shared = gapAlong(p.points, q.points, limits.box.direction);
-      width = isContact  // it must not pass through the other feature
-                  ? m_range.gapOfContact(shared.gap, limits.box.size)
-                  : m_range.freeGap(shared.gap, limits.box.size);
     }
-    width = std::max(width, limits.free);
+    // The axis may have the wider gap where radii differ along a feature.
+    if (!isContact && !(shared.gap > limits.box.gap))
+      shared = gapAlong(p.points, q.points, limits.box.direction);
+    const double width = isContact  // it must not pass through the other feature
+                             ? m_range.gapOfContact(shared.gap, limits.box.size)
+                             : std::max(limits.free, m_range.freeGap(shared.gap, limits.box.size));
     const auto lowerBy = [&](double& motion, double value) {
       lower(motion, width > 0.0 ? value : 0.0);
     };
