@@ -327,7 +327,9 @@ void forEachFeaturePair(const TestGeometry& a, const TestGeometry& b, F&& f) {
                 {false, p[1], answer.weightA},
                 {!self, q[0], 1.0 - answer.weightB},
                 {!self, q[1], answer.weightB}},
-        answer.distance, a.radius(p[0]) + b.radius(q[0]));
+        answer.distance,
+        (1.0 - answer.weightA) * a.radius(p[0]) + answer.weightA * a.radius(p[1]) +
+            (1.0 - answer.weightB) * b.radius(q[0]) + answer.weightB * b.radius(q[1]));
     }
 }
 
@@ -369,6 +371,35 @@ TEST(FreeMotion, IsHalfOfTheGapByExactDistances) {
         EXPECT_LE(free[m][v], 0.5 * scene.reach);
       }
   }
+}
+
+/// The closest points cannot meet either where radii differ along a thread.
+TEST(FreeMotion, IsBelowTheGapOfTaperedThreads) {
+  Random random(5);
+  std::size_t near = 0;
+  for (int trial = 0; trial < 600 / kShareOfCases; ++trial) {
+    SCOPED_TRACE(trial);
+    Scene scene;
+    for (int i = 0; i < 2; ++i)
+      scene.meshes.push_back(tapered(random, thread(random, 6, 0.4, 0.0, false), 0.15));
+    scene.pairs = {{0, 1}};
+    scene.thickness = 0.01;
+    scene.reach = 0.4;
+    SceneRun run(scene, Method::Auto);
+    run.detect();
+    const auto free = run.freeMotions();
+    forEachFeaturePair(scene.meshes[0], scene.meshes[1],
+                       [&](const auto& weights, double distance, double radii) {
+                         if (distance - radii <= scene.thickness) return;
+                         double motion = 0.0;
+                         for (const auto& [ofB, v, weight] : weights)
+                           motion += weight * free[ofB][v];
+                         EXPECT_LT(motion, distance - radii - scene.thickness);
+                         near += motion > 0.5 * (distance - radii - scene.thickness);
+                       });
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(near, 100u);
 }
 
 TEST(FreeMotion, IsTheSameForAllEnginesAndThreads) {
