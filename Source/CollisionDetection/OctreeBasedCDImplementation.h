@@ -56,7 +56,7 @@ struct OctreeBasedCD::Implementation {
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
-  std::mutex fillingUnlimited;  ///< locked while freeMotion(), a const call, fills
+  std::mutex fillingUnlimited;       ///< locked while freeMotion(), a const call, fills
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
