@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -57,12 +58,14 @@ std::vector<Event> eventsOf(const fs::path& path) {
 }
 
 struct Balls {
-  Mesh first = sphere(40, 60, {0, 0, 0}, 1.0), second = sphere(40, 60, {1.99, 0, 0}, 1.0);
+  std::uint32_t rings = 40;  ///< enough for jobs of several threads
+  Mesh first = sphere(rings, 60, {0, 0, 0}, 1.0), second = sphere(rings, 60, {1.99, 0, 0}, 1.0);
   std::vector<std::vector<Eigen::Vector3d>> frames{3, second.positions};
   OctreeBasedCD collisions;
   GeometryId a, b;
 
-  explicit Balls(const Settings& settings) : collisions(settings) {
+  explicit Balls(const Settings& settings)
+      : rings(settings.engine == Engine::Octree ? 40 : 4), collisions(settings) {
     a = collisions.addTriangleMesh(first.positions, first.triangles);
     b = collisions.addTriangleMesh(second.positions, second.triangles);
     collisions.addCollisionPair(a, b, {.thickness = 0.05});
