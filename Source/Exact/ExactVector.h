@@ -3,8 +3,10 @@
 #include "Exact/Exact.h"
 #include "Core/Assert.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <type_traits>
 #include <utility>
 
 // Vectors of integers, either of fixed width or of any size.
@@ -38,13 +40,19 @@ Vector<Wide<T>> cross(const Vector<T>& a, const Vector<T>& b) {
           product(a[0], b[1]) - product(a[1], b[0])};
 }
 
+/// Whether volumeOf() may have this coordinate vector.
+template <class T>
+bool fitVolume(const Vector<T>& v) {
+  if constexpr (std::is_same_v<T, std::int64_t>)
+    return std::all_of(v.begin(), v.end(), [](T x) { return x >> 61 == 0 || x >> 61 == -1; });
+  return true;
+}
+
 /// (u x v) . w: six times the volume of the tetrahedron of the origin and three points. Coordinates
 /// of 64 bits must stay below 2^61.
 template <class T>
 auto volumeOf(const Vector<T>& u, const Vector<T>& v, const Vector<T>& w) {
-  if constexpr (std::is_same_v<T, std::int64_t>)
-    for (const Vector<T>* all : {&u, &v, &w})
-      for (const T x : *all) PALPATE_ASSERT(x >> 61 == 0 || x >> 61 == -1);
+  PALPATE_ASSERT(fitVolume(u) && fitVolume(v) && fitVolume(w));
   const Vector<Wide<T>> normal = cross(u, v);
   using Volume = decltype(product(normal[0], w[0]));  // not auto: sums of Integers are expressions
   return Volume(product(normal[0], w[0]) + product(normal[1], w[1]) + product(normal[2], w[2]));
