@@ -174,6 +174,8 @@ class PALPATE_EXPORT SpatialQueries {
   /// With InsideRule::Closed, points on the surface of a triangle mesh are not inside; points on
   /// the boundary of a tetrahedron are.
   /// Errors   those of findInsideVertices(); NonFinitePosition.
+  /// Cost     the first call prepares the body, and each copy of it in a Snapshot: a triangle mesh
+  ///          once for each topology, by InsideRule::Closed; otherwise after each change.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
   /// The distance from a body's surface, negative where contains() holds.
   /// Errors   those of contains(); NotClosed for a body without elements.
