@@ -7,6 +7,7 @@
 #include "Math/RayTriangle.h"
 #include "Math/RoundSegment.h"
 #include "Math/StableLength.h"
+#include "Math/Tolerances.h"
 #include "Exact/Compensated.h"
 
 #include <algorithm>
@@ -156,6 +157,32 @@ ElementDistance elementDistance(const Element& a, const Element& b) {
     moveToCrossing(a, b, found);
   }
   return found;
+}
+
+/// The first plane is across the direction between the corners. Each further one is across a
+/// shorter difference of the elements' points.
+/// Source   Gilbert, An iterative procedure for computing the minimum of a quadratic form (1966).
+bool areFurtherApart(const Element& a, const Element& b, double distance) {
+  constexpr int kMostPlanes = 5;
+  double size = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    size =
+        std::max({size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
+  const double needed = distance + kNearestError * size;
+  Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]), difference = Vector3d::Zero();
+  for (int plane = 0; plane < kMostPlanes; ++plane) {
+    const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
+    const double length = normal.norm();
+    if (length > kShortestDirection && normal.dot(nearest) > needed * length) return true;
+    const Vector3d change = nearest - difference;
+    const double square = change.squaredNorm();
+    if (plane == 0)
+      difference = nearest;
+    else if (square > 0)
+      difference += std::clamp(-difference.dot(change) / square, 0.0, 1.0) * change;
+    normal = difference;
+  }
+  return false;
 }
 
 }  // namespace palpate

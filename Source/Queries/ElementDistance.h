@@ -77,5 +77,8 @@ struct ElementDistance {
 /// ends; its point is the centre of the nearest ball. Whether the distance is 0 without radii is
 /// decided exactly. Exchanged elements have the same distance.
 ElementDistance elementDistance(const Element& a, const Element& b);
+/// Whether a plane between two elements without their radii shows that they are further apart than
+/// `distance`.
+bool areFurtherApart(const Element& a, const Element& b, double distance);
 
 }  // namespace palpate

@@ -3,9 +3,11 @@
 #include "Queries/ElementDistance.h"
 #include "Queries/NearestPair.h"
 #include "Queries/PairTraversal.h"
+#include "Queries/PointDistances.h"
 #include "Bodies/OctreeFrame.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ConvexMinimum.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
@@ -215,23 +217,43 @@ SegmentDistance distanceFromSegment(const Body& geometry, const Vector3d& p, con
   best.distance = maxDistance;
   std::uint32_t nearest = kNoElement;
   const Element segment(p, q);
+  const double radius = geometry.mesh.largestRadius;
+  const auto test = [&](std::uint32_t element) {
+    const Element other(geometry.mesh, geometry.mesh.topology.triangles[element]);
+    if (!bruteForce && areFurtherApart(segment, other, best.distance + radius))
+      return best.distance;
+    const ElementDistance found = elementDistance(segment, other);
+    if (found.distance < best.distance || (found.distance == best.distance && element < nearest)) {
+      best = found;
+      nearest = element;
+    }
+    return best.distance;
+  };
+  // Elements that are likely near: each nearest to the segment's point that is nearest to the one
+  // before.
+  constexpr int kRounds = 4;
+  Vector3d point = segment.point({0.5, 0.5, 0.0});
+  for (int round = 0; !bruteForce && maxDistance == kInfinity && round < kRounds; ++round) {
+    const auto near = PointDistances(geometry, point, false).nearest(kInfinity, 0);
+    if (!near || near->element == nearest) break;
+    test(near->element);
+    point = segment.point(best.weightsA);
+  }
+  // The height of the box over a plane in front of the segment: across the shortest way to the
+  // box's centre, or, after rounding, almost so.
+  const Vector3d along = q - p;
+  const double square = along.squaredNorm();
   descend(
-      geometry, bruteForce, maxDistance,
+      geometry, bruteForce, best.distance,
       [&](const Vector3d& centre, const Vector3d& half) {
-        return finiteVertexTriangleDistance(centre, p, q, q).distance - half.norm() -
-               geometry.mesh.largestRadius -
-               kNearestError * ((centre - p).cwiseAbs().sum() + (centre - q).cwiseAbs().sum());
+        const Vector3d fromP = centre - p, fromQ = centre - q;
+        const double t = fromP.dot(along) / square;
+        const Vector3d up =
+            stableUnit(t > 0.0 ? (t < 1.0 ? Vector3d(fromP - t * along) : fromQ) : fromP);
+        return std::min(up.dot(fromP), up.dot(fromQ)) - up.cwiseAbs().dot(half) - radius -
+               kNearestError * (fromP.cwiseAbs().sum() + fromQ.cwiseAbs().sum());
       },
-      [&](std::uint32_t element) {
-        const Element other(geometry.mesh, geometry.mesh.topology.triangles[element]);
-        const ElementDistance found = elementDistance(segment, other);
-        if (found.distance < best.distance ||
-            (found.distance == best.distance && element < nearest)) {
-          best = found;
-          nearest = element;
-        }
-        return best.distance;
-      });
+      test);
   if (nearest == kNoElement) return {0.0, noPoint(geometry.id)};
   return {best.weightsA[1] + best.weightsA[2],
           surfacePointOf(geometry, nearest, best.weightsB, best.distance)};

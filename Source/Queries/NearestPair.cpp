@@ -166,7 +166,7 @@ void NearestPair::test(std::uint32_t placeA, const Element& a, std::uint32_t pla
     m_elementB = elementB;
     return;
   }
-  if (isFurther(a, b)) return;
+  if (areFurtherApart(a, b, m_best.distance + m_radii)) return;
   ++m_tests;
   const ElementDistance found = elementDistance(a, b);
   if (!(found.distance < m_best.distance || (found.distance == m_best.distance && precedes())))
@@ -181,33 +181,6 @@ void NearestPair::test(std::uint32_t placeA, const Element& a, std::uint32_t pla
     m_direction /= length;
   else
     m_direction.setZero();
-}
-
-/// Whether a plane between the elements shows that they are further apart than the nearest ones.
-/// The first plane is across the direction of the nearest ones. Each further one is across a
-/// shorter difference of the elements' points.
-/// Source   Gilbert, An iterative procedure for computing the minimum of a quadratic form (1966).
-bool NearestPair::isFurther(const Element& a, const Element& b) const {
-  constexpr int kMostPlanes = 5;
-  double size = 0;
-  for (std::size_t i = 0; i < 3; ++i)
-    size =
-        std::max({size, (a[i] - a[0]).cwiseAbs().maxCoeff(), (b[i] - a[0]).cwiseAbs().maxCoeff()});
-  const double needed = m_best.distance + m_radii + kNearestError * size;
-  Vector3d normal = ((b[0] - a[0]) + (b[1] - a[1])) + (b[2] - a[2]), difference = Vector3d::Zero();
-  for (int plane = 0; plane < kMostPlanes; ++plane) {
-    const Vector3d nearest = b.furthest(-normal) - a.furthest(normal);
-    const double length = normal.norm();
-    if (length > kShortestDirection && normal.dot(nearest) > needed * length) return true;
-    const Vector3d change = nearest - difference;
-    const double square = change.squaredNorm();
-    if (plane == 0)
-      difference = nearest;
-    else if (square > 0)
-      difference += std::clamp(-difference.dot(change) / square, 0.0, 1.0) * change;
-    normal = difference;
-  }
-  return false;
 }
 
 }  // namespace palpate

@@ -55,7 +55,6 @@ class NearestPair {
            m_atB.holds(placeB, m_b, *m_atA.at);
   }
   void test(std::uint32_t placeA, const Element& a, std::uint32_t placeB, const Element& b);
-  bool isFurther(const Element& a, const Element& b) const;
 
   const Body &m_a, &m_b;
   const double m_radii;  ///< L: the largest ones of both

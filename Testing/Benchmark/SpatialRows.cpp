@@ -322,6 +322,52 @@ void batchRows(Report& report, const SpatialBody& body, const RowOptions& option
   }
 }
 
+/// The clearance of straight paths that pass a body, beside distance() of a line at their places.
+void pathRow(Report& report, const SpatialBody& body, const RowOptions& options) {
+  constexpr std::size_t kCases = 200;
+  const std::string scene = body.name + ": clearance of a path";
+  if (!isWanted(scene, options.scenes)) return;
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : body.frames[0]) box.extend(p);
+  testing::Random random(4);
+  std::vector<std::array<Vector3d, 2>> paths(kCases);
+  for (auto& path : paths)
+    for (Vector3d& p : path) {
+      p = box.center() + body.diagonal * testing::randomPoint(random, -1, 1);
+      p[0] = box.max()[0] + body.diagonal * testing::uniform(random, 0.02, 0.3);
+    }
+  OctreeBasedCD collisions;
+  const GeometryId mesh = collisions.addTriangleMesh(body.frames[0], body.triangles),
+                   line = collisions.addLineMesh(paths[0], std::vector<Segment>{{0, 1}}, 0.0);
+  collisions.update();
+  const GeometryId bodies[] = {mesh};
+  std::vector<PathInterval> inside;
+  std::vector<PathClearance> outside;
+  std::array<std::vector<double>, 2> taken;
+  std::array<double, 2> sums{};
+  for (int turn = 0; turn < options.measure.repetitions; ++turn) {
+    const SpatialQueries queries = collisions.queries();
+    taken[0].push_back(1000 / double(kCases) * millisecondsOf([&] {
+                         for (const auto& path : paths) {
+                           queries.path(path, 0.0, bodies, inside, outside);
+                           sums[0] += outside[0].distance;
+                         }
+                       }));
+    taken[1].push_back(1000 / double(kCases) * millisecondsOf([&] {
+                         for (const auto& path : paths) {
+                           collisions.setPositions(line, path);
+                           sums[1] += collisions.queries().distance(line, mesh).distance;
+                         }
+                       }));
+  }
+  report.heading("Spatial queries, " + scene +
+                 ": us of path(), of setPositions() and distance(), difference / diagonal");
+  report.line({"", number(median(taken[0])), number(median(taken[1])),
+               number((sums[0] - sums[1]) / body.diagonal)});
+  report.row("spatial", scene, 1, "Palpate", "us", median(taken[0]));
+  report.row("spatial", scene, 1, "Palpate, distance()", "us", median(taken[1]));
+}
+
 #ifdef PALPATE_BENCHMARK_BASELINES
 /// The least distance of two bodies of which both deform. placed: both are also turned by
 /// setTransform().
@@ -414,6 +460,7 @@ void spatialRows(Report& report, const RowOptions& options) {
       timeRows(report, body, engines, options);
       errorRows(report, body, engines, options);
     }
+  for (std::size_t size = 0; size < sizes; ++size) pathRow(report, makeBody(size, false), options);
 #ifdef PALPATE_BENCHMARK_BASELINES
   for (std::size_t size = 0; size < std::size(kDistanceTargets); ++size)
     for (const bool placed : {false, true})

@@ -297,6 +297,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          path and surface.
   /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, for a radius that is
   ///          not in [0, kLargestMeasure], or if the path's length is not finite.
+  /// Cost     for each body and segment of the path, that of a ray. A body without an interval also
+  ///          costs about as much as distance() to a line mesh, for each segment.
   void path(std::span<const Eigen::Vector3d> polyline, double radius,
             std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
             std::vector<PathClearance>& outside) const;
