@@ -5,6 +5,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/NormalCone.h"
+#include "Math/StableLength.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -19,15 +20,17 @@ namespace palpate {
 ///
 /// A triangle at a closest edge or vertex excludes the direction to the other closest point if it
 /// leads into the triangle: the triangle then comes nearer to the other feature. So does a segment
-/// at a vertex. An excluded impact of a vertex, or of a line's edge, is dropped if another impact
-/// that is not excluded, of the same vertex, or of the same edge or one of its ends,
+/// at a vertex. An excluded impact of a vertex is dropped if another impact of the same vertex
+/// stands for it. One of a line's edge is dropped if one of the same edge or of its ends does. On a
+/// ridge or a border of the mesh, it must be one of the vertex that is the closest point. Another
+/// impact stands for this one if it is not excluded, and
 /// (1) is earlier, or as early and nearer; one with a triangle's interior may be up to
 ///     timeTolerance later,
 /// (2) has a tangent plane that contains the other element at the step's end, and
 /// (3) holds the vertex or edge in front of that plane: at the step's end, no point of it is nearer
 ///     to the plane than its row, or that of another such impact with the plane, says.
-/// So the rows that stay keep the vertex or edge away from the element. Tissue that is bent, or
-/// that bends around a tool within the step, keeps all its contacts.
+/// So the row that stays keeps a vertex away from the element, and the rows that stay keep an edge
+/// away from it by the law of hasRidge(). A line's edge keeps its contacts with all ridges.
 ///
 /// Laws     (1) Of all impacts the first one stays, and of equally early ones the nearest, or one
 ///          with a triangle's interior that is at most timeTolerance later stands for it. (2) For a
@@ -76,7 +79,8 @@ class ExcludedImpacts {
   template <class AnyOf>
   bool isReplaced(const EdgeEdgeContact& c, AnyOf&& anyOf) const {
     return anyOf([&](const auto& s, TangentPlane plane) {
-      if (!isInTime(s, c) || !areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB))
+      if (!isInTime(s, c) || !areInPlane(plane, mesh(), linesAreSecond() ? c.edgeA : c.edgeB) ||
+          (!isOfClosestVertex(s, c) && isOnRidge(c)))
         return false;
       anyOf([&](const auto&, const TangentPlane& other) {
         if (other.gap < plane.gap && plane.isSameAs(other)) plane.gap = other.gap;
@@ -116,10 +120,29 @@ class ExcludedImpacts {
   const TriangleMesh& mesh() const { return linesAreSecond() ? m_pair.a : m_pair.b; }
   const TriangleMesh& lines() const { return linesAreSecond() ? m_pair.b : m_pair.a; }
 
-  bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
-                    const Vector3d& direction, double time) const {
-    const Segment closest{ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
-    return mesh.topology.hasFaces() && excludesDirection(mesh, closest, direction, time);
+  static Segment closestOf(const Segment& ends, EdgeFeature feature) {
+    return {ends[feature == EdgeFeature::End], ends[feature != EdgeFeature::Start]};
+  }
+  static bool isExcludedBy(const TriangleMesh& mesh, const Segment& ends, EdgeFeature feature,
+                           const Vector3d& direction, double time) {
+    return mesh.topology.hasFaces() &&
+           excludesDirection(mesh, closestOf(ends, feature), direction, time);
+  }
+  /// Whether an impact is one of the line's vertex that is the closest point of an edge's impact.
+  bool isOfClosestVertex(const VertexTriangleContact& s, const EdgeEdgeContact& c) const {
+    const Segment vertex =
+        linesAreSecond() ? closestOf(c.edgeB, c.featureB) : closestOf(c.edgeA, c.featureA);
+    return vertex == Segment{s.vertex, s.vertex};
+  }
+  static bool isOfClosestVertex(const EdgeEdgeContact&, const EdgeEdgeContact&) { return false; }
+  /// Whether the closest point on the mesh near lines is on a ridge or a border.
+  bool isOnRidge(const EdgeEdgeContact& c) const {
+    const Segment feature =
+        linesAreSecond() ? closestOf(c.edgeA, c.featureA) : closestOf(c.edgeB, c.featureB);
+    const Segment& edge = lineEdge(c);
+    return hasRidge(mesh(), feature, linesAreSecond() ? Vector3d(-c.normal) : c.normal,
+                    stableLength(lines().now[edge[1]] - lines().now[edge[0]]),
+                    m_pair.settings.thickness);
   }
   bool isInTime(const VertexTriangleContact& s, const auto& c) const {
     return s.feature == TriangleFeature::Face

@@ -282,6 +282,9 @@ constexpr double kNormalConeError = 0x1p-40;
 /// tissue bends by more around a tool, and then needs all its contacts: with 2^-4, tools sink twice
 /// as often into a sheet that rows push away.
 constexpr double kPlaneShare = 0x1p-7;
+/// Of the thickness: a straight body that rests on both sides of an edge may be nearer to the edge
+/// by this, and the edge is no ridge. 64 such edges under one body add up to kPlaneShare.
+constexpr double kRidgeShare = 0x1p-13;
 /// Sine of an angle, and a share of a shape's size: normals that differ by less, at points further
 /// apart, are of one flat or straight part of the shape. Any small angle and share will do.
 constexpr double kSamePartAngle = 0x1p-10;

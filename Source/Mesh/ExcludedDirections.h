@@ -32,4 +32,18 @@ inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
   });
 }
 
+/// Whether a mesh's edge, or an edge at its vertex {v, v}, is a ridge or a border at the step's
+/// end, as seen from a unit direction. Of an edge that is neither, two triangles lie on opposite
+/// sides, and neither bends away from the direction. length: of a straight body on that side.
+/// thickness: of the pair.
+///
+/// Law      let a straight body cross edges that are no ridges, and stay a gap of at most the
+///          thickness in front of the surface before the first and behind the last of them. The
+///          surface between is no higher than a straight line, up to kRidgeShare of the thickness
+///          for each edge, and the body stays in front of that line. So it keeps the gap over all
+///          of these edges.
+/// Cost     linear in the triangles around the vertex or edge.
+bool hasRidge(const TriangleMesh&, const Segment& feature, const Eigen::Vector3d& direction,
+              double length, double thickness);
+
 }  // namespace palpate

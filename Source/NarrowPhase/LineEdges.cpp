@@ -2,8 +2,10 @@
 
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/TouchNormal.h"
+#include "Mesh/ExcludedDirections.h"
 #include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
+#include "Math/StableLength.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -85,6 +87,7 @@ bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t 
   const MeshTopology& topology = mesh.topology;
   if (!topology.hasFaces()) return false;
   const std::uint32_t edge = swapped ? edgeB : edgeA;
+  const Segment& vertices = line.topology.edges[edge];
   const MeshFeature& feature = nearby.features[!swapped];
   const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
   const Segment ends = isVertex ? Segment{feature.id, feature.id} : topology.edges[feature.id];
@@ -97,16 +100,18 @@ bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t 
   };
   const auto around =
       isVertex ? topology.vertexTriangles[feature.id] : topology.edgeTriangles[feature.id];
-  return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+  const bool isExcluded = std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
     const Triangle& corners = topology.triangles[triangle];
     if (std::none_of(corners.begin(), corners.end(), leadsTo)) return false;
-    const Segment& vertices = line.topology.edges[edge];
     return std::any_of(vertices.begin(), vertices.end(),
                        [&](std::uint32_t v) {
                          return isOverFace(pair, v, triangle, swapped, nearby.distance);
                        }) ||
            isNearerToSide(pair, edge, triangle, swapped, nearby.distance);
   });
+  return isExcluded && !hasRidge(mesh, ends, towardsLine,
+                                 stableLength(line.now[vertices[1]] - line.now[vertices[0]]),
+                                 pair.settings.thickness);
 }
 
 std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,

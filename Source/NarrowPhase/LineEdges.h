@@ -43,9 +43,10 @@ void testLineEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, St
 /// direction to the line, as it leads into one of them. The line then comes nearer to that
 /// triangle. The contact is excluded if the line's edge has a contact there that is at least as
 /// near: one of its ends over the triangle, or a nearer one with another edge of the triangle.
-/// False for two line meshes. nearby: of these edges.
+/// False on ridges and borders, and for two line meshes. nearby: of these edges.
 ///
-/// Law      Of the contacts of a line's edge, the nearest one stays.
+/// Laws     (1) Of the contacts of a line's edge, the nearest one stays. (2) The rows of those that
+///          stay keep the edge away from the others: see hasRidge().
 bool isExcludedByFaces(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB,
                        const NearbyEdges& nearby);
 

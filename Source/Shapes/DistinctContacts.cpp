@@ -71,6 +71,15 @@ class DistinctContacts::Step {
     const Vector3d normal = first.stableNormalized();
     return FlatPart{normal, normal.dot(corner)};
   }
+  /// Whether the contact's point is on a ridge or a border of a mesh with faces. No part of a shape
+  /// is longer than twice its largest extent. A sphere has no straight parts: its row keeps it away
+  /// from the whole plane.
+  bool isOnRidge(const ShapeContact& c) const {
+    const auto feature = endsOfFeature(c);
+    const double length = 2.0 * (m_size - (m_shape.isCylinder() ? 0.0 : 2.0 * m_shape.radius()));
+    return feature && m_mesh.topology.hasFaces() &&
+           hasRidge(m_mesh, *feature, -c.normal, length, m_settings.thickness);
+  }
   double slackAt(const Vector3d& x) const {
     return kPlaneShare * m_settings.thickness + kNormalConeError * x.lpNorm<1>();
   }
@@ -221,7 +230,7 @@ std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape,
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const ShapeContact& c = contacts[i];
       if (m_states[i] != State::Excluded || !step.isInTime(*first, c) || !step.isIn(plane, c) ||
-          step.areOfOnePart(*first, c))
+          step.areOfOnePart(*first, c) || step.isOnRidge(c))
         continue;
       m_states[i] = State::Dropped;
       --excluded;

@@ -21,11 +21,13 @@ namespace palpate {
 /// triangle: the triangle then comes nearer to the shape than the vertex or edge. So does a segment
 /// at a vertex. A contact that is excluded is dropped if a contact that is not
 /// (1) is earlier, or as early and nearer; a triangle may be up to timeTolerance later,
-/// (2) has a tangent plane that contains the vertex or edge at the step's end, and
+/// (2) has a tangent plane that contains the vertex or edge at the step's end,
 /// (3) holds the shape in front of that plane: no point of the shape is nearer to the plane, at the
-///     step's end, than its row, or a row of another contact with the plane, says.
-/// So the rows that stay keep the shape away from the vertex or edge. Tissue that is bent, or that
-/// bends around a tool within the step, keeps all its contacts.
+///     step's end, than its row, or a row of another contact with the plane, says, and
+/// (4) the vertex or edge is on no ridge or border of a mesh with faces, unless the shape is a
+///     sphere.
+/// So the rows that stay keep the shape away from the vertex or edge, by the law of hasRidge().
+/// Ridges, also around a tool within the step, keep all their contacts.
 ///
 /// A contact stays if it has the normal of the one that stands for it, at another point of the
 /// shape. A body that lies on a floor needs contacts at all its corners.

@@ -2,12 +2,14 @@
 
 #include <palpate/CollisionData.h>
 
+#include "Common/RidgeTruth.h"
 #include "Common/ShapeTruth.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <tuple>
 #include <vector>
@@ -27,14 +29,30 @@ struct DistinctTruth {
     return std::find(element.begin(), element.end(), v) != element.end();
   }
 
+  /// The vertices of the corner, edge or face that holds the contact's point.
+  static std::set<std::uint32_t> holdersOf(const ShapeContact& c) {
+    std::set<std::uint32_t> holders;  // a point on the boundary counts as inside by rounding
+    for (int i = 0; i < 3; ++i)
+      if (c.weights[i] > 0x1p-49) holders.insert(c.vertices[i]);
+    return holders;
+  }
+  /// Whether the contact's point is on a ridge or a border of a mesh with faces. The straight parts
+  /// of a sphere and of a capsule are those of its axis.
+  bool isOnRidge(const ShapeContact& c) const {
+    const bool hasFaces = std::ranges::any_of(
+        elements, [](const Triangle& element) { return element[1] != element[2]; });
+    if (!hasFaces) return false;
+    double axis = sizeOf(atEnd);
+    if (const auto* sphere = std::get_if<Sphere>(&atEnd.geometry)) axis -= 2 * sphere->radius;
+    if (const auto* capsule = std::get_if<Capsule>(&atEnd.geometry)) axis -= 2 * capsule->radius;
+    return RidgeTruth{now, elements, 2 * axis, thickness}.isOnRidge(holdersOf(c), -c.normal);
+  }
   /// Whether the direction from a contact's vertex or edge to the shape leads into an element
   /// there.
   bool isExcluded(const ShapeContact& c) const {
-    std::vector<std::uint32_t> holders;  // a point on the boundary counts as inside by rounding
-    for (int i = 0; i < 3; ++i)
-      if (c.weights[i] > 0x1p-49) holders.push_back(c.vertices[i]);
+    const std::set<std::uint32_t> holders = holdersOf(c);
     if (holders.size() == 3) return false;
-    const std::uint32_t p = holders.front(), q = holders.back();
+    const std::uint32_t p = *holders.begin(), q = *holders.rbegin();
     for (const Triangle& element : elements) {
       if (!has(element, p) || !has(element, q)) continue;
       for (const std::uint32_t v : element) {
@@ -93,7 +111,7 @@ struct DistinctTruth {
         // At another part of a flat side of the shape, the same normal is no tilted one.
         const bool isAlike = (c.normal - s.normal).norm() <= 0x1p-10 &&
                              (endOnShape(c) - endOnShape(s)).norm() > 0.125 * sizeOf(atEnd);
-        if (!inTime || !isIn || isAlike) return false;
+        if (!inTime || !isIn || isAlike || isOnRidge(c)) return false;
         stays[i] = false;
         return true;
       });

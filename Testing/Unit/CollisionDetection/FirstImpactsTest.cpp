@@ -3,6 +3,7 @@
 #include "Common/ContactRows.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/RidgeTruth.h"
 #include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 
@@ -184,6 +185,14 @@ struct Sides {
   double gapOf(const Named& s, const Vector3d& up) const {
     return up.dot(s.points[ownIsSecond]) - own.radius() - heightOf(s, up);
   }
+  /// Whether the closest point on a mesh that an edge of a line meets is on a ridge or a border.
+  bool isOnRidge(const Named& c, const PairSettings& pair) const {
+    const VertexSet& edge = ofOwn(c.elements);
+    if (edge.size() == 1) return false;
+    const double length = (own.now[*edge.begin()] - own.now[*edge.rbegin()]).norm();
+    return RidgeTruth{other.now, other.geometry.triangles, length, pair.thickness}.isOnRidge(
+        ofOther(c.closest), upOf(c));
+  }
   /// Whether s, one of these proper impacts, keeps c away, together with others on its plane.
   bool standsFor(const Named& s, const Named& c, const std::vector<Named>& proper,
                  const PairSettings& pair) const {
@@ -191,6 +200,7 @@ struct Sides {
                               ? s.time <= c.time + pair.continuous.timeTolerance
                               : std::tie(s.time, s.distance) < std::tie(c.time, c.distance);
     if (!isInTime || !areOfOne(s, c)) return false;
+    if (ofOwn(s.elements) != ofOwn(c.closest) && isOnRidge(c, pair)) return false;
     const Vector3d up = upOf(s);
     const double height = heightOf(s, up), near = pair.thickness / 128 + 1e-12;
     double gap = gapOf(s, up);
