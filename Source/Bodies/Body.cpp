@@ -18,7 +18,7 @@ void makeBody(std::span<const Eigen::Vector3d> positions, std::span<const Triang
   out.mesh.now = Positions(std::vector(positions.begin(), positions.end()));
   out.mesh.before = out.mesh.now;
   out.mesh.topology.vertexCount = positions.size();
-  out.mesh.topology.triangles.assign(triangles.begin(), triangles.end());
+  out.mesh.topology.elements.assign(triangles.begin(), triangles.end());
   out.revisions.elements.topology = out.revisions.counter.next();
   const double spread = out.tree.sampleFrame(out.mesh, out.revisions.elements.topology);
   out.tree.update(out.mesh, out.revisions.elements.topology, frameScale(spread), {}, threads);

@@ -65,7 +65,7 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   computeFloats(mesh.now.body(), m_frame, m_floats, threads);
   if (m_treeSwept) computeFloats(mesh.before.body(), m_frame, m_floatsBefore, threads);
   boxMilliseconds += watch.lap();
-  if (mesh.topology.triangles.empty()) {
+  if (mesh.topology.elements.empty()) {
     m_octree.reset(0);
   } else {
     bool fits = false;
@@ -76,10 +76,9 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     }
     if (!fits) {
       if (!canRefit) {
-        m_octree.reset(mesh.topology.triangles.size());
-        startOrdered(mesh.topology.triangles.size());
-        std::copy(mesh.topology.triangles.begin(), mesh.topology.triangles.end(),
-                  m_ordered.begin());
+        m_octree.reset(mesh.topology.elements.size());
+        startOrdered(mesh.topology.elements.size());
+        std::copy(mesh.topology.elements.begin(), mesh.topology.elements.end(), m_ordered.begin());
       }
       rebuild(mesh, settings, threads);
       fitBoxes(mesh, settings, threads, true);
@@ -177,7 +176,7 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
                                   FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
                                   bool reordered) {
   PALPATE_ASSERT(groups.front() == 0 && groups.back() == m_ordered.size());
-  const CountedVector<Triangle>& triangles = mesh.topology.triangles;
+  const CountedVector<Triangle>& triangles = mesh.topology.elements;
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
       m_ordered[i] = triangles[m_octree.order()[i]];
@@ -188,7 +187,7 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
 
 /// Computes the boxes of the triangles in m_ordered, and returns the bounds of all.
 FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
-  PALPATE_ASSERT(m_ordered.size() == mesh.topology.triangles.size());
+  PALPATE_ASSERT(m_ordered.size() == mesh.topology.elements.size());
   const std::size_t size = m_ordered.size(),
                     count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
   m_boundsGroups.resize(count + 1);
@@ -233,7 +232,7 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
 
 const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
-  PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.triangles.size());
+  PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.elements.size());
   const MemoryScope memory(MemoryStage::Octrees);
   m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
   return m_stars.triangles();

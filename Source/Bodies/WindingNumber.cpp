@@ -120,7 +120,7 @@ SolidAngleShare WindingNumbers::clusterShare(const Cluster& cluster, const Vecto
 static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
   SolidAngleShare sum;
   const Positions& now = mesh.now;
-  for (const auto& [a, b, c] : mesh.topology.triangles)
+  for (const auto& [a, b, c] : mesh.topology.elements)
     sum.add(solidAngleShare(p, now[a], now[b], now[c]));
   return sum;
 }

@@ -23,8 +23,8 @@ bool mayBeBodies(const PairRecord& record) {
       record.a == record.b || record.plan.kind != PairKind::Meshes || record.anyDisabled() ||
       record.meshes().hasFilters())
     return false;
-  return !record.a->body.mesh.topology.triangles.empty() &&
-         !record.b->body.mesh.topology.triangles.empty() && hasClosedSurface(record.a->body) &&
+  return !record.a->body.mesh.topology.elements.empty() &&
+         !record.b->body.mesh.topology.elements.empty() && hasClosedSurface(record.a->body) &&
          hasClosedSurface(record.b->body);
 }
 
@@ -43,11 +43,11 @@ bool mayContain(const Body& outer, const Body& inner) {
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
   const auto cornersAt = [&](std::size_t i) {
-    return cornersOf(outer.mesh.topology.triangles[i], outer.mesh.before);
+    return cornersOf(outer.mesh.topology.elements[i], outer.mesh.before);
   };
   SignCounts counts;
-  const int number = windingNumber(outer.mesh.topology.triangles.size(), cornersAt,
-                                   inner.mesh.before[inner.mesh.topology.triangles[0][0]], counts);
+  const int number = windingNumber(outer.mesh.topology.elements.size(), cornersAt,
+                                   inner.mesh.before[inner.mesh.topology.elements[0][0]], counts);
   stack.exactDecisions += counts.undecided;
   return number != 0;
 }
@@ -55,7 +55,7 @@ bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
 /// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the
 /// step.
 bool isInside(const Body& inner, const Body& outer, Engine engine, PointQueryStack& stack) {
-  const std::uint32_t vertex = inner.mesh.topology.triangles[0][0];
+  const std::uint32_t vertex = inner.mesh.topology.elements[0][0];
   return mayContain(outer, inner) &&
          windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
          wasInside(inner, outer, stack);
@@ -97,7 +97,7 @@ Vector3d normalOfEdge(const TriangleMesh& mesh, const Segment& edge) {
   Vector3d sum = Vector3d::Zero();
   const std::uint32_t id = mesh.topology.edgeOf(edge);
   for (const std::uint32_t t : mesh.topology.edgeTriangles[id]) {
-    const auto [p, q, r] = cornersOf(mesh.topology.triangles[t], mesh.now);
+    const auto [p, q, r] = cornersOf(mesh.topology.elements[t], mesh.now);
     sum += windingNormal(p, q, r);
   }
   return sum;
@@ -197,7 +197,7 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
     if (own.triangleOf[v] == kNoElement) continue;
     const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, end);
     if (!exit) continue;
-    const Triangle& corners = pair.geometry(!ofA).mesh.topology.triangles[exit->element];
+    const Triangle& corners = pair.geometry(!ofA).mesh.topology.elements[exit->element];
     const auto [p, q, r] = cornersOf(corners, pair.vertices(!ofA).positions);
     const VertexTriangleDistance at =
         finiteVertexTriangleDistance(own.positions[v] + exit->distance * direction, p, q, r);

@@ -144,8 +144,8 @@ void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch) 
 
 void FreeMotionSearch::runByBruteForce(const Work& work, Scratch& scratch) {
   const MeshPair pair = meshesOf(*work.record);
-  const auto countA = static_cast<std::uint32_t>(pair.a.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
+  const auto countA = static_cast<std::uint32_t>(pair.a.topology.elements.size()),
+             countB = static_cast<std::uint32_t>(pair.b.topology.elements.size());
   for (std::uint32_t i = 0; i < countA; ++i) {
     scratch.candidates.clear();
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < countB; ++j)
@@ -165,7 +165,7 @@ void FreeMotionSearch::withShape(const Work& work, Engine engine, Scratch& scrat
   Geometry &mesh = a.body.shape ? b : a, &other = a.body.shape ? a : b;
   const Shape& shape = other.body.shape->now;
   if (engine == Engine::BruteForce) {
-    scratch.elements.resize(mesh.body.mesh.topology.triangles.size());
+    scratch.elements.resize(mesh.body.mesh.topology.elements.size());
     std::iota(scratch.elements.begin(), scratch.elements.end(), 0u);
   } else {
     findElementsNear(mesh.body, shape, shape, work.searchDistance, scratch.elements);

@@ -26,7 +26,7 @@ PlacedShape* shapeOf(Geometry& geometry) {
 /// Computed in the body's frame, so that it does not depend on the transform.
 double smallestHeight(const TriangleMesh& mesh) {
   double smallest = std::numeric_limits<double>::infinity();
-  for (const auto& [i, j, k] : mesh.topology.triangles) {
+  for (const auto& [i, j, k] : mesh.topology.elements) {
     const Eigen::Vector3d &a = mesh.rest[i], &b = mesh.rest[j], &c = mesh.rest[k];
     const double area = (b - a).cross(c - a).norm();
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
@@ -290,11 +290,11 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   checkShapeMayChange(geometry, "setDisabledElements()");
   MeshTopology& topology = geometry.body.mesh.topology;
   for (const std::uint32_t element : elements)
-    if (element >= topology.triangles.size())
+    if (element >= topology.elements.size())
       throw Error(ErrorCode::IndexOutOfRange,
                   nameOf(geometry) + ": element " + std::to_string(element) +
                       " is out of range; the geometry has " +
-                      std::to_string(topology.triangles.size()) + " elements",
+                      std::to_string(topology.elements.size()) + " elements",
                   id, element);
   topology.disable(elements);
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
@@ -317,7 +317,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   // Geometries are updated in parallel, the largest first, and large ones use several threads each.
   // The serial parts of one update thus run beside the work on other geometries.
   const auto size = [](const Geometry* geometry) {
-    return geometry->body.mesh.topology.triangles.size();
+    return geometry->body.mesh.topology.elements.size();
   };
   std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
     return size(l) != size(r) ? size(l) > size(r) : l->body.id < r->body.id;

@@ -54,7 +54,7 @@ void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
     const MeshTopology& topology = geometry->body.mesh.topology;
     (topology.hasFaces()                    ? next.triangles
      : topology.type == GeometryType::Lines ? next.segments
-                                            : next.points) += topology.triangles.size();
+                                            : next.points) += topology.elements.size();
     next.untestedVertices += topology.untestedVertices;
   }
   next.memory = budget->now();

@@ -40,8 +40,8 @@ void PairResults::sortFacts(const PairRecord& record) {
   const TriangleMesh &a = record.a->body.mesh, &b = record.b->body.mesh;
   sortUnique(m_facts.verticesA, a.now.size(), m_flags);
   sortUnique(m_facts.verticesB, b.now.size(), m_flags);
-  sortUnique(m_facts.degenerateA, a.topology.triangles.size(), m_flags);
-  sortUnique(m_facts.degenerateB, b.topology.triangles.size(), m_flags);
+  sortUnique(m_facts.degenerateA, a.topology.elements.size(), m_flags);
+  sortUnique(m_facts.degenerateB, b.topology.elements.size(), m_flags);
 }
 
 std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {

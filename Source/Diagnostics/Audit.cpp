@@ -117,8 +117,8 @@ class Coverage {
 /// sample. pierced: receives the contacts that depend on all triangles that intersect.
 void addListed(const MeshPair& meshes, const Coverage& coverage, const CollisionData& answer,
                ContactBuffers& contacts, ContactBuffers& pierced) {
-  const std::size_t countA = meshes.a.topology.triangles.size(),
-                    countB = meshes.b.topology.triangles.size();
+  const std::size_t countA = meshes.a.topology.elements.size(),
+                    countB = meshes.b.topology.elements.size();
   for (const ElementPair& pair : answer.intersectingTriangles())
     if (pair.a < countA && pair.b < countB && !coverage.coversTriangles(pair))
       addIntersection(meshes, pair, contacts);
@@ -150,7 +150,7 @@ class KnownVertices {
     const auto around = (ofB ? m_meshes.b : m_meshes.a).topology.vertexTriangles[vertex];
     const MeshTopology& others = (ofB ? m_meshes.a : m_meshes.b).topology;
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      for (std::uint32_t other = 0; other < others.triangles.size(); ++other)
+      for (std::uint32_t other = 0; other < others.elements.size(); ++other)
         if (others.isEnabled(other) &&
             intersect(ofB ? ElementPair{other, triangle} : ElementPair{triangle, other}))
           return true;

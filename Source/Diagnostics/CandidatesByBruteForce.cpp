@@ -9,7 +9,7 @@
 namespace palpate {
 
 static std::vector<Eigen::AlignedBox3d> boxesOf(const TriangleMesh& mesh, bool swept) {
-  std::vector<Eigen::AlignedBox3d> boxes(mesh.topology.triangles.size());
+  std::vector<Eigen::AlignedBox3d> boxes(mesh.topology.elements.size());
   for (std::uint32_t t = 0; t < boxes.size(); ++t) boxes[t] = elementBox(mesh, t, swept);
   return boxes;
 }
@@ -22,7 +22,7 @@ void findCandidatesByBruteForce(const MeshPair& meshes, Buffer<ElementPair>& out
       meshes.settings.method == Method::Continuous || meshes.settings.method == Method::Auto;
   const std::vector<Eigen::AlignedBox3d> boxesA = boxesOf(meshes.a, swept),
                                          boxesB = boxesOf(meshes.b, swept);
-  const CountedVector<Triangle>& triangles = meshes.a.topology.triangles;
+  const CountedVector<Triangle>& triangles = meshes.a.topology.elements;
   const auto adjacent = [&](std::uint32_t s, std::uint32_t t) {
     return std::any_of(triangles[s].begin(), triangles[s].end(), [&](std::uint32_t v) {
       return std::find(triangles[t].begin(), triangles[t].end(), v) != triangles[t].end();

@@ -32,7 +32,7 @@ class VertexAgainstMesh {
 
   void measure(const MeshPair& pair, const Vector3d& p, std::uint32_t vertex, ContactBuffers& out) {
     m_position = p;
-    const CountedVector<Triangle>& triangles = m_mesh.topology.triangles;
+    const CountedVector<Triangle>& triangles = m_mesh.topology.elements;
     m_answers.assign(triangles.size(), {});
     for (std::uint32_t t = 0; t < triangles.size(); ++t) {
       if (!m_mesh.topology.isEnabled(t) || pair.excludesVertex(vertex, t)) continue;
@@ -73,10 +73,10 @@ class VertexAgainstMesh {
     const MeshTopology& topology = m_mesh.topology;
     switch (feature.kind) {
       case MeshFeature::Kind::Vertex:
-        return containsVertex(topology.triangles[triangle], feature.id);
+        return containsVertex(topology.elements[triangle], feature.id);
       case MeshFeature::Kind::Edge:
-        return containsVertex(topology.triangles[triangle], topology.edges[feature.id][0]) &&
-               containsVertex(topology.triangles[triangle], topology.edges[feature.id][1]);
+        return containsVertex(topology.elements[triangle], topology.edges[feature.id][0]) &&
+               containsVertex(topology.elements[triangle], topology.edges[feature.id][1]);
       case MeshFeature::Kind::Face:
         return triangle == feature.id;
     }
@@ -87,7 +87,7 @@ class VertexAgainstMesh {
   /// closest point is on another of its features. With area it is nearer, because its closest point
   /// is unique. Without area, several features may hold that point.
   bool isNearer(std::uint32_t triangle, const MeshFeature& feature) const {
-    const Triangle& corners = m_mesh.topology.triangles[triangle];
+    const Triangle& corners = m_mesh.topology.elements[triangle];
     const Vector3d a = m_mesh.now[corners[0]], b = m_mesh.now[corners[1]],
                    c = m_mesh.now[corners[2]];
     if (hasArea(a, b, c)) return true;
@@ -117,13 +117,13 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
     const auto gap = [&](std::uint32_t t) {
       const VertexTriangleDistance& measured = *against.answer(t);
       return measured.distance -
-             pair.radii(v, triangles.topology.triangles[t], measured.weights, kSwapped);
+             pair.radii(v, triangles.topology.elements[t], measured.weights, kSwapped);
     };
     for (std::uint32_t t = 0; t < against.size(); ++t) {
       const VertexTriangleDistance* answer = against.answer(t);
       if (!answer) continue;
       const double least =
-          answer->distance - pair.largestRadii(v, triangles.topology.triangles[t], kSwapped);
+          answer->distance - pair.largestRadii(v, triangles.topology.elements[t], kSwapped);
       if (!(least <= pair.thicknessAtEnd())) continue;
       check.recordDistance(least);
       if (check.addImpactIfTouched(features, v, t, kSwapped, least)) continue;
@@ -145,7 +145,7 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
         if (pair.step.reportsImpacts) addImpact(pair, features, v, t, kSwapped, out);
         continue;
       }
-      const Triangle& corners = triangles.topology.triangles[t];
+      const Triangle& corners = triangles.topology.elements[t];
       check.recordTriangle(t, !kSwapped, triangles.now[corners[0]], triangles.now[corners[1]],
                            triangles.now[corners[2]]);
       VertexTriangleDistance separating = *answer;
@@ -260,7 +260,7 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
   for (const bool swapped : {false, true}) {
     const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
                                                                swapped ? pair.a : pair.b};
-    const CountedVector<Triangle>& triangles = features.second.topology.triangles;
+    const CountedVector<Triangle>& triangles = features.second.topology.elements;
     for (const std::uint32_t v : swapped ? lists.verticesOfB : lists.verticesOfA) {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         if (!features.second.topology.isEnabled(t) || pair.excludesVertex(v, t)) continue;
@@ -305,12 +305,12 @@ void append(const Buffer<Contact>& found, Buffer<Contact>& out) {
 /// Contacts of triangles that pierce each other depend on all triangles: for a sample they are left
 /// to the caller, with the crossings in `out`.
 void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactBuffers& out) {
-  const auto countB = static_cast<std::uint32_t>(pair.b.topology.triangles.size());
+  const auto countB = static_cast<std::uint32_t>(pair.b.topology.elements.size());
   for (const std::uint32_t a : lists.trianglesOfA)
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
       if (pair.b.topology.isEnabled(b)) addIntersection(pair, {a, b}, out);
   const MeshTopology& ofA = pair.a.topology;
-  if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.triangles.size()) return;
+  if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.elements.size()) return;
   ContactBuffers pierced;
   ContactBuffers* const found[] = {&out};
   PiercingContacts().find(pair, found, pierced);
@@ -330,7 +330,7 @@ void fill(std::vector<std::uint32_t>& list, std::size_t size) {
 
 FeatureLists everyElement(const MeshTopology& mesh) {
   FeatureLists every;
-  fill(every.trianglesOfA, mesh.triangles.size());
+  fill(every.trianglesOfA, mesh.elements.size());
   std::erase_if(every.trianglesOfA, [&](std::uint32_t t) { return !mesh.isEnabled(t); });
   return every;
 }

@@ -13,8 +13,8 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
                             ContactBuffers& intersections) {
   MeshPair meshes = record.meshes();
   findContactsByBruteForce(record, everyFeature(record), contacts);
-  const auto countA = static_cast<std::uint32_t>(meshes.a.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(meshes.b.topology.triangles.size());
+  const auto countA = static_cast<std::uint32_t>(meshes.a.topology.elements.size()),
+             countB = static_cast<std::uint32_t>(meshes.b.topology.elements.size());
   const auto forEachPair = [&](auto&& f) {
     for (std::uint32_t a = 0; a < countA; ++a)
       for (std::uint32_t b = meshes.self() ? a + 1 : 0; b < countB; ++b)

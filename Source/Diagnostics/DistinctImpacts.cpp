@@ -59,7 +59,7 @@ class ExcludedByBruteForce {
     const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
                                                                swapped ? m_meshes.a : m_meshes.b};
     const MeshTopology& others = (swapped ? m_meshes.a : m_meshes.b).topology;
-    for (std::uint32_t t = 0; t < others.triangles.size(); ++t)
+    for (std::uint32_t t = 0; t < others.elements.size(); ++t)
       if (others.isEnabled(t) && !m_meshes.excludesVertex(vertex, t))
         addImpact(m_meshes, features, vertex, t, swapped, m_ofVertices);
   }

@@ -32,7 +32,7 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   } else if (!geometry.body.shape)
     copy.before = mesh.before.all(), copy.now = mesh.now.all();
   copy.motion = {mesh.before.transform(), mesh.now.transform()};
-  if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.triangles);
+  if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.elements);
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
   if (geometry.body.solid) {
     copyTo<Tetrahedron>(copy.tetrahedra, geometry.body.solid->topology.tetrahedra);

@@ -56,8 +56,8 @@ BoundaryCurve::BoundaryCurve(const TriangleMesh& mesh) {
   };
   const std::vector<std::uint32_t> places = placesOf(mesh.now);
   std::vector<Passage> passages;
-  passages.reserve(3 * mesh.topology.triangles.size());
-  for (const Triangle& corners : mesh.topology.triangles)
+  passages.reserve(3 * mesh.topology.elements.size());
+  for (const Triangle& corners : mesh.topology.elements)
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t a = places[corners[i]], b = places[corners[(i + 1) % 3]];
       if (a != b) passages.push_back({{std::min(a, b), std::max(a, b)}, a < b ? 1 : -1});

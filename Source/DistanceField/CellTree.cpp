@@ -33,7 +33,7 @@ constexpr std::uint32_t sideOf(int level) { return 1u << (kMostLevels - level); 
 FieldDomain::FieldDomain(const TriangleMesh& mesh, const SurfaceSign& sign,
                          const DistanceFieldSettings& settings) {
   Eigen::AlignedBox3d box;
-  for (const Triangle& triangle : mesh.topology.triangles)
+  for (const Triangle& triangle : mesh.topology.elements)
     for (const std::uint32_t vertex : triangle) box.extend(mesh.now[vertex]);
   const double largest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
   // Room for the rounding of distances: values at the domain's border are beyond the band.

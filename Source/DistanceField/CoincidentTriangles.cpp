@@ -12,7 +12,7 @@ namespace palpate {
 std::vector<Triangle> withoutCopies(const Body& body) {
   PALPATE_ASSERT(body.tree.isValid() && body.tree.octree().isBuilt());
   const Octree& octree = body.tree.octree();
-  const std::span<const Triangle> triangles = body.mesh.topology.triangles;
+  const std::span<const Triangle> triangles = body.mesh.topology.elements;
   const auto coordinates = [&](std::uint32_t element) {
     std::array<double, 9> all;
     for (std::size_t i = 0; i < 9; ++i)

@@ -142,7 +142,7 @@ class FeaturesNearField {
   void findFace(std::uint32_t triangle, const std::array<double, 3>& values,
                 const std::array<double, 3>& least) {
     ++m_out.featurePairs;
-    const Triangle& corners = m_mesh.topology.triangles[triangle];
+    const Triangle& corners = m_mesh.topology.elements[triangle];
     const double boundary =
                      std::min({values[0], values[1], values[2], least[0], least[1], least[2]}),
                  target = targetBelow(boundary);
@@ -176,7 +176,7 @@ class FeaturesNearField {
   /// element. valueOf(vertex): L, of the field.
   template <class ValueOf>
   bool isAbove(std::uint32_t element, double target, ValueOf&& valueOf) const {
-    const Triangle& corners = m_mesh.topology.triangles[element];
+    const Triangle& corners = m_mesh.topology.elements[element];
     if (m_mesh.topology.hasFaces()) return isAbove(corners, target, valueOf);
     return isAbove(Segment{corners[0], corners[1]}, target, valueOf);
   }
@@ -339,7 +339,7 @@ bool FieldContacts::isFurther(const Body& geometry, double distance) {
     });
   };
   std::uint32_t& nearest = m_scratch.nearest;
-  if (nearest < topology.triangles.size() && !isAbove(nearest)) return false;
+  if (nearest < topology.elements.size() && !isAbove(nearest)) return false;
   bool isFurther = true;
   forEachElementNear(geometry, m_field, target + m_mesh.largestRadius, [&](std::uint32_t element) {
     isFurther = isAbove(element);
@@ -354,7 +354,7 @@ bool FieldContacts::isFurtherByBruteForce(double distance) const {
   if (!(target + m_mesh.largestRadius < reachOf(m_field.field()))) return false;
   ShapeContactBuffers none;
   const FeaturesNearField features(m_mesh, m_field, m_contacts, m_thickness, false, none);
-  const auto size = static_cast<std::uint32_t>(m_mesh.topology.triangles.size());
+  const auto size = static_cast<std::uint32_t>(m_mesh.topology.elements.size());
   for (std::uint32_t element = 0; element < size; ++element)
     if (m_mesh.topology.isEnabled(element) &&
         !features.isAbove(element, target, [&](std::uint32_t v) { return features.valueAt(v); }))
@@ -377,7 +377,7 @@ void FieldContacts::start(const Body& geometry) {
   if (scratch.least.size() < topology.edges.size()) scratch.least.resize(topology.edges.size());
   scratch.vertices.clear();
   for (const std::uint32_t element : scratch.elements) {
-    for (const std::uint32_t v : topology.triangles[element]) {
+    for (const std::uint32_t v : topology.elements[element]) {
       if (scratch.stamps[v] == scratch.stamp) continue;
       scratch.stamps[v] = scratch.stamp;
       scratch.vertices.push_back(v);
@@ -409,7 +409,7 @@ void FieldContacts::findEdges(std::size_t begin, std::size_t end, ShapeContactBu
   for (std::size_t n = begin; n < end; ++n) {
     const std::uint32_t element = m_scratch.elements[n];
     for (int i = 0; i < 3; ++i) {
-      const std::uint32_t v = topology.triangles[element][i],
+      const std::uint32_t v = topology.elements[element][i],
                           edge = topology.triangleEdges[element][i];
       if (topology.ownsCorner(element, i)) features.findVertex(v, values[v]);
       if (!topology.ownsEdge(element, i)) continue;
@@ -429,7 +429,7 @@ void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBu
     std::array<double, 3> values, least;
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t edge = topology.triangleEdges[element][i];
-      values[i] = m_scratch.values[topology.triangles[element][i]];
+      values[i] = m_scratch.values[topology.elements[element][i]];
       least[i] = edge == kNoEdge ? kNone : m_scratch.least[edge];
     }
     features.findFace(element, values, least);
@@ -445,11 +445,11 @@ void FieldContacts::findByBruteForce(const TriangleMesh& mesh, const PlacedField
   for (const std::uint32_t element : elements) {
     if (!topology.isEnabled(element)) continue;
     std::array<double, 3> values, least;
-    for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.triangles[element][i]);
+    for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.elements[element][i]);
     for (int i = 0; i < 3; ++i) {
       least[i] = kNone;
       if (topology.ownsCorner(element, i))
-        features.findVertex(topology.triangles[element][i], values[i]);
+        features.findVertex(topology.elements[element][i], values[i]);
       if (topology.triangleEdges[element][i] == kNoEdge) continue;
       const Segment& edge = topology.edges[topology.triangleEdges[element][i]];
       least[i] = features.findEdge(edge, {features.valueAt(edge[0]), features.valueAt(edge[1])},

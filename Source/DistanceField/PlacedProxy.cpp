@@ -264,7 +264,7 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
   const MeshTopology& topology = m_body->topology;
   const auto positions = m_body->now.body();
   const auto sideOf = [&](std::uint32_t t, std::uint32_t corner, bool byAngle) {
-    const Triangle& corners = topology.triangles[t];
+    const Triangle& corners = topology.elements[t];
     int i = 0;
     while (i < 2 && corners[i] != corner) ++i;
     PALPATE_ASSERT(corners[i] == corner);
@@ -275,7 +275,7 @@ bool PlacedProxy::isInFront(std::uint32_t triangle, TriangleFeature feature,
     const double side = normal.dot(difference) / area;
     return byAngle ? std::atan2(area, u.dot(v)) * side : side;
   };
-  const Triangle& corners = topology.triangles[triangle];
+  const Triangle& corners = topology.elements[triangle];
   const int kind = static_cast<int>(feature);
   double side = 0;
   if (feature == TriangleFeature::Face) {
@@ -305,7 +305,7 @@ PlacedProxy::Nearest PlacedProxy::nearestAmong(const SurfaceProxy::Leaf& leaf,
   nearest.distance = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = 0;
   const auto test = [&](std::uint32_t t) {
-    const auto& [a, b, c] = m_body->topology.triangles[t];
+    const auto& [a, b, c] = m_body->topology.elements[t];
     const VertexTriangleDistance found =
         finiteVertexTriangleDistance(p, positions[a], positions[b], positions[c]);
     if (found.distance < nearest.distance || (found.distance == nearest.distance && t < triangle))

@@ -333,7 +333,7 @@ std::size_t raiseError(const ProxyItems& items, const ProxyWindow& window, doubl
 }
 
 bool hasClosedStars(const MeshTopology& topology, std::uint32_t triangle) {
-  const Triangle& corners = topology.triangles[triangle];
+  const Triangle& corners = topology.elements[triangle];
   return std::all_of(corners.begin(), corners.end(),
                      [&](std::uint32_t v) { return topology.hasClosedStar[v] != 0; });
 }
@@ -341,10 +341,10 @@ bool hasClosedStars(const MeshTopology& topology, std::uint32_t triangle) {
 ProxyItems itemsOf(const MeshTopology& topology, std::span<const Vector3d> positions,
                    double rounding) {
   ProxyItems all;
-  all.reserve(topology.triangles.size());
-  for (std::uint32_t t = 0; t < topology.triangles.size(); ++t) {
+  all.reserve(topology.elements.size());
+  for (std::uint32_t t = 0; t < topology.elements.size(); ++t) {
     if (!topology.isEnabled(t)) continue;
-    const Triangle& corners = topology.triangles[t];
+    const Triangle& corners = topology.elements[t];
     const Vector3d &a = positions[corners[0]], &b = positions[corners[1]],
                    &c = positions[corners[2]];
     const Vector3d centre = (a + b + c) / 3.0;

@@ -28,7 +28,7 @@ ProxyPlanes::ProxyPlanes(const MeshTopology& topology, std::span<const Vector3d>
       m_allowedError(allowedError),
       m_cosine(std::cos(normalCone)),
       m_rounding(rounding) {
-  for (const auto& [i, j, k] : m_topology.triangles)
+  for (const auto& [i, j, k] : m_topology.elements)
     m_normals.push_back((m_positions[j] - m_positions[i]).cross(m_positions[k] - m_positions[i]));
 }
 
@@ -41,7 +41,7 @@ struct ProxyPlanes::Shadow {
 ProxyPlanes::Shadow ProxyPlanes::shadowOf(std::uint32_t triangle, const ProxyWindow& window) const {
   Shadow shadow;
   for (int i = 0; i < 3; ++i) {
-    const Vector3d p = m_positions[m_topology.triangles[triangle][i]] - window.cube.centre;
+    const Vector3d p = m_positions[m_topology.elements[triangle][i]] - window.cube.centre;
     shadow.corners[i] = {window.u.dot(p), window.v.dot(p), window.normal.dot(p)};
   }
   const auto& [a, b, c] = shadow.corners;

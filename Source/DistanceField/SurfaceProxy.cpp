@@ -104,9 +104,9 @@ ProxyGrid gridOf(const TriangleMesh& body, double reach) {
   double lengths = 0;
   std::size_t count = 0;
   const auto positions = body.now.body();
-  for (std::uint32_t t = 0; t < body.topology.triangles.size(); ++t) {
+  for (std::uint32_t t = 0; t < body.topology.elements.size(); ++t) {
     if (!body.topology.isEnabled(t)) continue;
-    const Triangle& corners = body.topology.triangles[t];
+    const Triangle& corners = body.topology.elements[t];
     for (int i = 0; i < 3; ++i) {
       const Vector3d &p = positions[corners[i]], &q = positions[corners[(i + 1) % 3]];
       lower = lower.cwiseMin(p);
@@ -153,7 +153,7 @@ class Division {
         m_planes(m_topology, m_positions, settings.allowedError, settings.normalCone, m_rounding),
         m_all(itemsOf(m_topology, m_positions, m_rounding)),
         m_work(settings.mostWork, "comparisons of triangles with cells"),
-        m_listed(settings.mostListedOf(m_topology.triangles.size()), kInLists) {}
+        m_listed(settings.mostListedOf(m_topology.elements.size()), kInLists) {}
 
   const ProxyItems& all() const { return m_all; }
   std::uint64_t mostListed() const { return m_listed.most(); }
@@ -245,7 +245,7 @@ class Division {
       double& distance = scratch.distances[i];
       distance = (items.centre(i) - centre).norm() - items.radius[i];
       if (distance > most) continue;
-      const auto& [a, b, c] = m_topology.triangles[items.triangleAt(i)];
+      const auto& [a, b, c] = m_topology.elements[items.triangleAt(i)];
       const VertexTriangleDistance found =
           finiteVertexTriangleDistance(centre, m_positions[a], m_positions[b], m_positions[c]);
       distance = found.distance;
@@ -291,7 +291,7 @@ class Division {
   }
 
   SurfaceProxy::Listed listed(std::uint32_t triangle) const {
-    const auto& [i, j, k] = m_topology.triangles[triangle];
+    const auto& [i, j, k] = m_topology.elements[triangle];
     const Vector3d &a = m_positions[i], &b = m_positions[j], &c = m_positions[k];
     const Vector3d middle = (a + b + c) / 3.0;
     const Eigen::Vector3f rounded(roundedToFloat(middle[0]), roundedToFloat(middle[1]),

@@ -37,7 +37,7 @@ bool hasRidge(const TriangleMesh& mesh, const Segment& feature, const Vector3d& 
   const auto around = mesh.topology.vertexTriangles[p];
   if (p == q)
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      const Triangle& corners = mesh.topology.triangles[triangle];
+      const Triangle& corners = mesh.topology.elements[triangle];
       return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
         return corner != p && hasRidge(mesh, {p, corner}, direction, length, thickness);
       });
@@ -45,7 +45,7 @@ bool hasRidge(const TriangleMesh& mesh, const Segment& feature, const Vector3d& 
   const Vector3d along = (mesh.now[q] - mesh.now[p]).stableNormalized();
   const auto forEachWing = [&](auto&& f) {
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-      const Triangle& corners = mesh.topology.triangles[triangle];
+      const Triangle& corners = mesh.topology.elements[triangle];
       if (std::find(corners.begin(), corners.end(), q) == corners.end()) return false;
       return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
         if (corner == p || corner == q) return false;

@@ -26,7 +26,7 @@ inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
   };
   const auto around = mesh.topology.vertexTriangles[p];
   return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-    const Triangle& corners = mesh.topology.triangles[triangle];
+    const Triangle& corners = mesh.topology.elements[triangle];
     return std::find(corners.begin(), corners.end(), q) != corners.end() &&
            std::any_of(corners.begin(), corners.end(), leadsTo);
   });

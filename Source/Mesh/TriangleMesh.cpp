@@ -8,12 +8,12 @@
 
 namespace palpate {
 
-MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newTriangles)
+MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newElements)
     : vertexCount(newVertexCount),
-      triangles(newTriangles.begin(), newTriangles.end()),
-      triangleEdges(newTriangles.size()),
+      elements(newElements.begin(), newElements.end()),
+      triangleEdges(newElements.size()),
       isUsed(newVertexCount, false) {
-  PALPATE_ASSERT(std::all_of(newTriangles.begin(), newTriangles.end(), [&](const Triangle& t) {
+  PALPATE_ASSERT(std::all_of(newElements.begin(), newElements.end(), [&](const Triangle& t) {
     return std::max({t[0], t[1], t[2]}) < newVertexCount;
   }));
   struct Side {
@@ -21,11 +21,11 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
     std::uint32_t triangle, side;
   };
   CountedVector<Side> sides;
-  sides.reserve(3 * triangles.size());
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+  sides.reserve(3 * elements.size());
+  for (std::uint32_t t = 0; t < elements.size(); ++t) {
     for (std::uint32_t i = 0; i < 3; ++i) {
-      isUsed[triangles[t][i]] = true;
-      const std::uint32_t p = triangles[t][i], q = triangles[t][(i + 1) % 3];
+      isUsed[elements[t][i]] = true;
+      const std::uint32_t p = elements[t][i], q = elements[t][(i + 1) % 3];
       triangleEdges[t][i] = kNoEdge;
       if (p != q) sides.push_back({{std::min(p, q), std::max(p, q)}, t, i});
     }
@@ -43,9 +43,9 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
 }
 
 void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
-  CountedVector<bool> newIsDisabled(newDisabled.empty() ? 0 : triangles.size(), false);
+  CountedVector<bool> newIsDisabled(newDisabled.empty() ? 0 : elements.size(), false);
   for (const std::uint32_t triangle : newDisabled) {
-    PALPATE_ASSERT(triangle < triangles.size());
+    PALPATE_ASSERT(triangle < elements.size());
     newIsDisabled[triangle] = true;
   }
   CountedVector<std::uint32_t> sorted;
@@ -62,7 +62,7 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   // A vertex or edge that a triangle contains twice counts once.
   const auto listsOf = [&](std::size_t count, const auto& heldBy) {
     return listsByKey(count, [&](auto&& incidence) {
-      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      for (std::uint32_t t = 0; t < elements.size(); ++t) {
         if (!newIsDisabled.empty() && newIsDisabled[t]) continue;
         const auto& [a, b, c] = heldBy[t];
         if (a != kNoEdge) incidence(a, t);
@@ -71,10 +71,10 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
       }
     });
   };
-  IndexLists atVertices = listsOf(vertexCount, triangles);
+  IndexLists atVertices = listsOf(vertexCount, elements);
   IndexLists atEdges = listsOf(edges.size(), triangleEdges);
 
-  CountedVector<std::uint8_t> owners(triangles.size(), 0);
+  CountedVector<std::uint8_t> owners(elements.size(), 0);
   const auto assignOwner = [&](std::uint32_t item, std::uint32_t owner, const auto& held,
                                auto&& bitOf) {
     const auto place = std::find(held.begin(), held.end(), item) - held.begin();
@@ -87,13 +87,13 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
     if (incident.empty())
       ++untested;
     else
-      assignOwner(v, incident.front(), triangles[incident.front()], cornerBit);
+      assignOwner(v, incident.front(), elements[incident.front()], cornerBit);
   }
   CountedVector<std::uint8_t> closedStars(vertexCount, 1);
   const auto isForward = [&](std::uint32_t e, std::uint32_t triangle) {
     const auto side = std::find(triangleEdges[triangle].begin(), triangleEdges[triangle].end(), e);
     PALPATE_ASSERT(side != triangleEdges[triangle].end());
-    return triangles[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
+    return elements[triangle][side - triangleEdges[triangle].begin()] == edges[e][0];
   };
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
     const auto incident = atEdges[e];

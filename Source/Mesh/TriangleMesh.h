@@ -40,7 +40,7 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   return lists;
 }
 
-/// The connectivity of a mesh, which follows from its triangles alone and is computed once.
+/// The connectivity of a mesh, which follows from its elements alone and is computed once.
 ///
 /// Each vertex and each edge is owned by the lowest enabled triangle that contains it. Exactly one
 /// of all the triangle pairs that contain a feature pair therefore tests it. (Curtis et al., Fast
@@ -48,28 +48,28 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
 struct MeshTopology {
   MeshTopology() = default;
   /// Indices must be below vertexCount.
-  MeshTopology(std::size_t vertexCount, std::span<const Triangle> triangles);
+  MeshTopology(std::size_t vertexCount, std::span<const Triangle> elements);
 
   GeometryType type = GeometryType::Triangles;
   std::size_t vertexCount = 0;
-  CountedVector<Triangle> triangles;
-  CountedVector<Segment> edges;  ///< unique, lower vertex first, sorted
+  CountedVector<Triangle> elements;  ///< triangle {p, q, r}, segment {p, q, q}, point {p, p, p}
+  CountedVector<Segment> edges;      ///< unique, lower vertex first, sorted
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge if both are the same vertex.
   CountedVector<std::array<std::uint32_t, 3>> triangleEdges;
   CountedVector<std::uint8_t> owned;  ///< per triangle: its cornerBit()s and edgeBit()s
-  IndexLists vertexTriangles;         ///< enabled triangles only: ascending ids, each once
+  IndexLists vertexTriangles;         ///< enabled elements only: ascending ids, each once
   IndexLists edgeTriangles;           ///< the same; an empty list: the edge is disabled
   std::size_t untestedVertices = 0;   ///< number of vertices in no enabled triangle
   CountedVector<bool> isUsed;         ///< per vertex: in a triangle, enabled or not
   /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
   CountedVector<std::uint8_t> hasClosedStar;
   bool hasOnlyClosedStars = true;           ///< the enabled triangles are a closed surface
-  CountedVector<std::uint32_t> disabled{};  ///< disabled triangles, ascending
+  CountedVector<std::uint32_t> disabled{};  ///< disabled elements, ascending
   CountedVector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
 
-  /// Disables these triangles and enables all others. Changes nothing if it throws.
+  /// Disables these elements and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.
-  void disable(std::span<const std::uint32_t> triangles);
+  void disable(std::span<const std::uint32_t> elements);
   bool isEnabled(std::uint32_t triangle) const {
     return isDisabled.empty() || !isDisabled[triangle];
   }

@@ -107,7 +107,7 @@ bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views
   std::uint32_t common = ~0u;  // bits that all views have
   std::array<std::size_t, 3> crossings{};
   for (const std::uint32_t t : star) {
-    const Triangle& corners = topology.triangles[t];
+    const Triangle& corners = topology.elements[t];
     const int corner = (corners[1] == vertex) + 2 * (corners[2] == vertex);
     common &= views[t];
     for (int k = 0; k < 3; ++k) crossings[k] += (views[t] & ViewBit::comesUp(corner, k)) != 0;
@@ -122,7 +122,7 @@ bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views
 
 void UnfoldedStars::find(const MeshTopology& topology, std::span<const Triangle> ordered,
                          const FloatPoint* before, const FloatPoint* now, const Threads& threads) {
-  const CountedVector<Triangle>& triangles = topology.triangles;
+  const CountedVector<Triangle>& triangles = topology.elements;
   m_views.resize(triangles.size());
   threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     HWY_DYNAMIC_DISPATCH(viewsKernel)

@@ -20,7 +20,7 @@ struct DisplacementBounds {
 
   DisplacementBounds() = default;
   DisplacementBounds(const TriangleMesh& mesh, std::uint32_t triangle) {
-    const auto& [a, b, c] = mesh.topology.triangles[triangle];
+    const auto& [a, b, c] = mesh.topology.elements[triangle];
     const auto moved = [&](std::uint32_t v) -> Eigen::Array3d {
       return mesh.now[v] - mesh.before[v];
     };

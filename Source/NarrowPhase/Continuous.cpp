@@ -149,7 +149,7 @@ class ContactFinder {
       const MeshTopology& topology = features.second.topology;
       const auto closest = closestAt(finiteVertexTriangleDistance, query, time, p);
       VertexTriangleContact contact =
-          contactOf(firstId, secondId, topology.triangles[secondId], closest);
+          contactOf(firstId, secondId, topology.elements[secondId], closest);
       closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
       closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
       complete(contact);

@@ -27,7 +27,7 @@ struct Features {
 
   std::array<std::uint32_t, 4> vertices(std::uint32_t firstId, std::uint32_t secondId) const {
     if constexpr (kind == ImpactQuery::Kind::VertexTriangle) {
-      const auto& [a, b, c] = second.topology.triangles[secondId];
+      const auto& [a, b, c] = second.topology.elements[secondId];
       return {firstId, a, b, c};
     } else {
       const Segment &p = first.topology.edges[firstId], &q = second.topology.edges[secondId];

@@ -10,7 +10,7 @@ namespace palpate {
 
 Eigen::AlignedBox3d elementBox(const TriangleMesh& mesh, std::uint32_t element, bool swept) {
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t corner : mesh.topology.triangles[element]) {
+  for (const std::uint32_t corner : mesh.topology.elements[element]) {
     box.extend(mesh.now[corner]);
     if (swept) box.extend(mesh.before[corner]);
   }

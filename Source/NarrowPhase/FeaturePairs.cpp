@@ -148,7 +148,7 @@ HWY_ATTR HWY_INLINE void setBounds(const Side& side, const Triangle& corners, Fe
 
 template <Sweep sweep>
 HWY_ATTR HWY_NOINLINE void makeRow(const Side& side, std::uint32_t triangle, FeatureRow& row) {
-  const Triangle& corners = side.topology.triangles[triangle];
+  const Triangle& corners = side.topology.elements[triangle];
   const auto& edges = side.topology.triangleEdges[triangle];
   const std::uint8_t owned = side.topology.owned[triangle];
   const std::uint32_t ids[kFeatures] = {corners[0], corners[1], corners[2], edges[2],
@@ -394,8 +394,8 @@ HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b
   std::size_t kept = 0;
   for (const ElementPair& pair : pairs) {
     pairs[kept] = pair;
-    kept += overlap(shifted(triangleBounds(floats.a, a.triangles[pair.a]), shift),
-                    triangleBounds(floats.b, b.triangles[pair.b]));
+    kept += overlap(shifted(triangleBounds(floats.a, a.elements[pair.a]), shift),
+                    triangleBounds(floats.b, b.elements[pair.b]));
   }
   pairs.resize(kept);
 }

@@ -61,12 +61,12 @@ class Surface {
   }
   /// A unit vector; zero for a triangle without area, which has no sides.
   Vector3d normalOf(std::uint32_t triangle) const {
-    const auto& [i, j, k] = m_mesh.topology.triangles[triangle];
+    const auto& [i, j, k] = m_mesh.topology.elements[triangle];
     const Vector3d a = at(i);
     return (at(j) - a).stableNormalized().cross((at(k) - a).stableNormalized()).stableNormalized();
   }
   double angleAt(std::uint32_t triangle, std::uint32_t vertex) const {
-    Triangle corners = m_mesh.topology.triangles[triangle];
+    Triangle corners = m_mesh.topology.elements[triangle];
     PALPATE_ASSERT(std::find(corners.begin(), corners.end(), vertex) != corners.end());
     while (corners[0] != vertex) corners = {corners[1], corners[2], corners[0]};
     const Vector3d p = at(vertex);
@@ -90,7 +90,7 @@ class Surface {
   /// For the two triangles with area at an edge.
   bool isSecondBelowFirst(std::uint32_t edge, const std::array<std::uint32_t, 2>& triangles) const {
     const Segment& ends = m_mesh.topology.edges[edge];
-    const Triangle& corners = m_mesh.topology.triangles[triangles[1]];
+    const Triangle& corners = m_mesh.topology.elements[triangles[1]];
     const auto across = std::find_if(corners.begin(), corners.end(), [&](auto corner) {
       return corner != ends[0] && corner != ends[1];
     });
@@ -107,8 +107,7 @@ class Surface {
 bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle,
                    bool swapped) {
   const TriangleMesh& mesh = swapped ? pair.a : pair.b;
-  if (!pair.keepsApart &&
-      areNearAtRest(pair, std::array{vertex}, mesh.topology.triangles[triangle]))
+  if (!pair.keepsApart && areNearAtRest(pair, std::array{vertex}, mesh.topology.elements[triangle]))
     return true;
   if (!pair.predicate) return false;
   using Kind = ContactFeatures::Kind;

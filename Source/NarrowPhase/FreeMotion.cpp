@@ -108,8 +108,8 @@ class FreeMotionFinder {
       return;
     const std::uint32_t tests = m_tests.of(candidate);
     if (tests == 0) return;
-    const Corners s(m_pair.a, m_motions.a, m_pair.a.topology.triangles[candidate.a]),
-        t(m_pair.b, m_motions.b, m_pair.b.topology.triangles[candidate.b]);
+    const Corners s(m_pair.a, m_motions.a, m_pair.a.topology.elements[candidate.a]),
+        t(m_pair.b, m_motions.b, m_pair.b.topology.elements[candidate.b]);
     const Limits limits(*this, s, t);
     if (limits.lowersNone(s, t)) return;
     m_most = std::max({m_most, s.mostFree(), t.mostFree()});
@@ -141,8 +141,8 @@ class FreeMotionFinder {
   void measure(const ElementPair& candidate, int test) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
     const std::uint8_t ofA = kFeatureOfA[test], ofB = kFeatureOfB[test];
-    if (ofB == kTriangle) return vertexTriangle(a.triangles[candidate.a][ofA], candidate.b, false);
-    if (ofA == kTriangle) return vertexTriangle(b.triangles[candidate.b][ofB], candidate.a, true);
+    if (ofB == kTriangle) return vertexTriangle(a.elements[candidate.a][ofA], candidate.b, false);
+    if (ofA == kTriangle) return vertexTriangle(b.elements[candidate.b][ofB], candidate.a, true);
     edges(a.triangleEdges[candidate.a][edgeNumber(ofA)],
           b.triangleEdges[candidate.b][edgeNumber(ofB)]);
   }
@@ -151,7 +151,7 @@ class FreeMotionFinder {
     const TriangleMesh &vertices = swapped ? m_pair.b : m_pair.a,
                        &others = swapped ? m_pair.a : m_pair.b;
     if (m_pair.excludesVertex(vertex, triangle)) return;
-    const Triangle& ids = others.topology.triangles[triangle];
+    const Triangle& ids = others.topology.elements[triangle];
     const Corners p(vertices, swapped ? m_motions.b : m_motions.a, std::array{vertex}),
         q(others, swapped ? m_motions.a : m_motions.b, ids);
     bound(

@@ -29,7 +29,7 @@ struct MeshTriangle {
   MeshTriangle(const TriangleMesh& ofMesh, std::uint32_t triangle, const Positions& at)
       : mesh(ofMesh),
         id(triangle),
-        vertices(mesh.topology.triangles[id]),
+        vertices(mesh.topology.elements[id]),
         positions(cornersOf(vertices, at)) {}
 
   /// kNoEdge between two corners that are one vertex.
@@ -187,7 +187,7 @@ void findOne(const MeshPair& pair, const ElementPair& candidate, TriangleInterse
 void keepPossible(const MeshPair& pair, bool atStart, std::span<const ElementPair> candidates,
                   Buffer<PossibleIntersection>& possible) {
   const auto placed = [&](const TriangleMesh& mesh) {
-    return PlacedTriangles{mesh.topology.triangles, atStart ? mesh.before : mesh.now};
+    return PlacedTriangles{mesh.topology.elements, atStart ? mesh.before : mesh.now};
   };
   keepPossiblyIntersecting(placed(pair.a), placed(pair.b), pair.self(), candidates, possible);
 }

@@ -56,7 +56,7 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
 bool isOverFace(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle, bool swapped,
                 double distance) {
   const TriangleMesh &line = swapped ? pair.b : pair.a, &mesh = swapped ? pair.a : pair.b;
-  const Triangle& corners = mesh.topology.triangles[triangle];
+  const Triangle& corners = mesh.topology.elements[triangle];
   const VertexTriangleDistance measured = finiteVertexTriangleDistance(
       line.now[vertex], mesh.now[corners[0]], mesh.now[corners[1]], mesh.now[corners[2]]);
   return measured.feature == TriangleFeature::Face &&
@@ -101,7 +101,7 @@ bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t 
   const auto around =
       isVertex ? topology.vertexTriangles[feature.id] : topology.edgeTriangles[feature.id];
   const bool isExcluded = std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-    const Triangle& corners = topology.triangles[triangle];
+    const Triangle& corners = topology.elements[triangle];
     if (std::none_of(corners.begin(), corners.end(), leadsTo)) return false;
     return std::any_of(vertices.begin(), vertices.end(),
                        [&](std::uint32_t v) {

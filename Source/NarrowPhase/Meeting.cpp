@@ -32,8 +32,8 @@ class Piercer {
       : m_topology((second ? pair.b : pair.a).topology),
         m_otherTopology((second ? pair.a : pair.b).topology),
         m_at(positionsOf(second ? pair.b : pair.a, atStart)),
-        m_corners(m_topology.triangles[second ? ids.b : ids.a]),
-        m_otherCorners(m_otherTopology.triangles[second ? ids.a : ids.b]),
+        m_corners(m_topology.elements[second ? ids.b : ids.a]),
+        m_otherCorners(m_otherTopology.elements[second ? ids.a : ids.b]),
         m_triangle(second ? ids.b : ids.a),
         m_cornersOn(second ? found.cornersOfBOnA : found.cornersOfAOnB),
         m_edgesThrough(second ? found.edgesOfBThroughA : found.edgesOfAThroughB),
@@ -99,7 +99,7 @@ class Piercer {
     return orient3d(m_other[0], m_other[1], m_other[2], m_at[vertex], m_counts);
   }
   void addTo(Sides& sides, std::uint32_t triangle) const {
-    for (const std::uint32_t v : m_topology.triangles[triangle]) sides.add(sideOf(v));
+    for (const std::uint32_t v : m_topology.elements[triangle]) sides.add(sideOf(v));
   }
   /// Whether a corner lies on the other triangle and on none of its edges.
   bool isInInterior(int corner) const {

@@ -90,8 +90,8 @@ struct MeshPair {
   /// tested as the vertex.
   bool excludesVertex(std::uint32_t vertex, std::uint32_t triangle) const {
     if (!self()) return false;
-    PALPATE_ASSERT(triangle < a.topology.triangles.size());
-    const auto& [i, j, k] = a.topology.triangles[triangle];
+    PALPATE_ASSERT(triangle < a.topology.elements.size());
+    const auto& [i, j, k] = a.topology.elements[triangle];
     return vertex == i || vertex == j || vertex == k ||
            (a.topology.type == GeometryType::Points && triangle < vertex);
   }

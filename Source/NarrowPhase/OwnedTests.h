@@ -22,14 +22,14 @@ class OwnedTests {
     const std::uint32_t tests =
         kOwnedByA[a.owned[candidate.a]] & kOwnedByB[b.owned[candidate.b]] & m_allowed;
     if (!m_pair.self()) return tests;
-    return tests & ~kSharingTests[sameCorners(a.triangles[candidate.a], b.triangles[candidate.b])];
+    return tests & ~kSharingTests[sameCorners(a.elements[candidate.a], b.elements[candidate.b])];
   }
 
   void add(const ElementPair& candidate, std::uint32_t tests) {
     m_tests[m_size] = tests;
     m_candidates[m_size] = candidate;
-    const Triangle &s = m_pair.a.topology.triangles[candidate.a],
-                   &t = m_pair.b.topology.triangles[candidate.b];
+    const Triangle &s = m_pair.a.topology.elements[candidate.a],
+                   &t = m_pair.b.topology.elements[candidate.b];
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d p = m_pair.a.now[s[i]], q = m_pair.b.now[t[i]];
       for (int k = 0; k < 3; ++k) {

@@ -24,7 +24,7 @@ struct PlacedMesh {
   PlacedMesh(const TriangleMesh& mesh, bool atStart)
       : topology(mesh.topology), at(atStart ? mesh.before : mesh.now) {}
   Corners corners(std::uint32_t triangle) const {
-    return cornersOf(topology.triangles[triangle], at);
+    return cornersOf(topology.elements[triangle], at);
   }
 };
 
@@ -138,7 +138,7 @@ class NearestInFront {
   VertexTriangleContact contact() const {
     VertexTriangleDistance answer = m_nearest;
     if (answer.distance > 0.0) turnToFront(corners(), answer);
-    return contactOf(m_vertex, m_triangle, m_mesh.topology.triangles[m_triangle], answer);
+    return contactOf(m_vertex, m_triangle, m_mesh.topology.elements[m_triangle], answer);
   }
 
  private:
@@ -263,7 +263,7 @@ bool PiercingContacts::isBehind(bool ofB, std::uint32_t vertex) const {
 bool PiercingContacts::hasEndBehind(const MeshPair& pair, const PiercedPair& pierced) const {
   const auto isEndBehind = [&](bool ofB, const TriangleMesh& mesh, std::uint32_t triangle,
                                unsigned edges) {
-    const Triangle& corners = mesh.topology.triangles[triangle];
+    const Triangle& corners = mesh.topology.elements[triangle];
     for (int i = 0; i < 3; ++i)
       if (edges >> i & 1 && (isBehind(ofB, corners[i]) || isBehind(ofB, corners[(i + 1) % 3])))
         return true;

@@ -44,7 +44,7 @@ class VertexTriangleFinder {
         m_exactDecisions(out.exactDecisions) {}
 
   void test(std::uint32_t vertex, std::uint32_t triangle) {
-    const Triangle& corners = m_topology.triangles[triangle];
+    const Triangle& corners = m_topology.elements[triangle];
     const Vector3d p = m_vertices[vertex];
     VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
@@ -83,8 +83,7 @@ class VertexTriangleFinder {
     const Vector3d p = m_vertices[vertex];
     return std::none_of(
         incidentTriangles.begin(), incidentTriangles.end(), [&](std::uint32_t other) {
-          if (other == triangle ||
-              (m_self && containsVertex(m_topology.triangles[other], vertex)) ||
+          if (other == triangle || (m_self && containsVertex(m_topology.elements[other], vertex)) ||
               rejectsVertex(m_pair, vertex, other, m_swapped))
             return false;
           const bool isNearer = isVertex ? isNearerThanVertex(p, feature.id, other)
@@ -98,7 +97,7 @@ class VertexTriangleFinder {
   /// one that is within the thickness, so only differing radii can make this false.
   bool isNearEnough(std::uint32_t vertex, std::uint32_t triangle) const {
     if (m_features.second.radii.empty()) return true;
-    const Triangle& corners = m_topology.triangles[triangle];
+    const Triangle& corners = m_topology.elements[triangle];
     const VertexTriangleDistance measured =
         finiteVertexTriangleDistance(m_vertices[vertex], m_positions[corners[0]],
                                      m_positions[corners[1]], m_positions[corners[2]]);
@@ -107,14 +106,14 @@ class VertexTriangleFinder {
   }
 
   MeshFeature closestFeatureOf(const Vector3d& p, std::uint32_t triangle) const {
-    const auto& [a, b, c] = m_topology.triangles[triangle];
+    const auto& [a, b, c] = m_topology.elements[triangle];
     return featureOf(m_topology, triangle,
                      closestTriangleFeature(p, m_positions[a], m_positions[b], m_positions[c]));
   }
 
   /// Whether a triangle at a vertex comes nearer to p than the vertex.
   bool isNearerThanVertex(const Vector3d& p, std::uint32_t vertex, std::uint32_t triangle) const {
-    const Triangle& corners = m_topology.triangles[triangle];
+    const Triangle& corners = m_topology.elements[triangle];
     return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t other) {
       return other != vertex && comesNearer(p, m_positions[vertex], m_positions[other]);
     });
@@ -126,7 +125,7 @@ class VertexTriangleFinder {
     const auto& sides = m_topology.triangleEdges[triangle];
     const auto side = std::find(sides.begin(), sides.end(), edge) - sides.begin();
     PALPATE_ASSERT(side < 3);
-    const Triangle& corners = m_topology.triangles[triangle];
+    const Triangle& corners = m_topology.elements[triangle];
     return liesInwards(p, m_positions[corners[side]], m_positions[corners[(side + 1) % 3]],
                        m_positions[corners[(side + 2) % 3]]);
   }
@@ -241,8 +240,8 @@ class ProximityFinder {
 
   bool isAlone(const ElementPair& candidate) const {
     if (!m_sharedVertex.isUsed()) return false;
-    const Triangle &s = m_pair.a.topology.triangles[candidate.a],
-                   &t = m_pair.b.topology.triangles[candidate.b];
+    const Triangle &s = m_pair.a.topology.elements[candidate.a],
+                   &t = m_pair.b.topology.elements[candidate.b];
     return m_sharedVertex.isAlone(s, t, sameCorners(s, t));
   }
 
@@ -254,8 +253,8 @@ class ProximityFinder {
   void measure(const ElementPair& candidate, int test) {
     const MeshTopology &a = m_pair.a.topology, &b = m_pair.b.topology;
     const std::uint8_t ofA = kFeatureOfA[test], ofB = kFeatureOfB[test];
-    if (ofB == kTriangle) return m_verticesOfA.test(a.triangles[candidate.a][ofA], candidate.b);
-    if (ofA == kTriangle) return m_verticesOfB.test(b.triangles[candidate.b][ofB], candidate.a);
+    if (ofB == kTriangle) return m_verticesOfA.test(a.elements[candidate.a][ofA], candidate.b);
+    if (ofA == kTriangle) return m_verticesOfB.test(b.elements[candidate.b][ofB], candidate.a);
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);

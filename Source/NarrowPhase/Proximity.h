@@ -19,7 +19,7 @@ void findProximity(const MeshPair&, std::span<const ElementPair> candidates, Con
 inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangle,
                              TriangleFeature feature) {
   const int i = static_cast<int>(feature);
-  if (i < 3) return {MeshFeature::Kind::Vertex, topology.triangles[triangle][i]};
+  if (i < 3) return {MeshFeature::Kind::Vertex, topology.elements[triangle][i]};
   if (i < 6) return {MeshFeature::Kind::Edge, topology.triangleEdges[triangle][i - 3]};
   return {MeshFeature::Kind::Face, triangle};
 }

@@ -54,7 +54,7 @@ class SharedVertex {
     constexpr std::size_t kSample = 16, kMany = 64;
     const std::size_t stride = pairs.size() / kSample + 1;
     for (std::size_t i = 0; i < pairs.size(); i += stride)
-      for (const std::uint32_t vertex : topology.triangles[pairs[i].a])
+      for (const std::uint32_t vertex : topology.elements[pairs[i].a])
         if (topology.vertexTriangles[vertex].size() > kMany) return true;
     return false;
   }

@@ -70,7 +70,7 @@ class Star {
       return;
     }
     if (m_feature.kind == MeshFeature::Kind::Face) {
-      const Triangle& corners = m_mesh.topology.triangles[m_feature.id];
+      const Triangle& corners = m_mesh.topology.elements[m_feature.id];
       for (int i = 0; i < 3; ++i) {
         const Vector3d along = between(corners[i], corners[(i + 1) % 3]);
         if (passes(along) || passes(-along)) return;
@@ -107,7 +107,7 @@ class Star {
   void anyTriangle(std::size_t most, F&& f) const {
     const MeshTopology& topology = m_mesh.topology;
     if (m_feature.kind == MeshFeature::Kind::Face) {
-      f(topology.triangles[m_feature.id]);
+      f(topology.elements[m_feature.id]);
       return;
     }
     const IndexLists& lists = m_feature.kind == MeshFeature::Kind::Vertex ? topology.vertexTriangles
@@ -115,7 +115,7 @@ class Star {
     const auto around = lists[m_feature.id];
     const std::size_t stride = around.size() > most ? around.size() / most + 1 : 1;
     for (std::size_t i = 0; i < around.size(); i += stride)
-      if (f(topology.triangles[around[i]])) return;
+      if (f(topology.elements[around[i]])) return;
   }
   const Positions& end() const { return m_time == 1.0 ? m_mesh.now : m_mesh.before; }
   /// The vector between two vertices, times a power of two if it is tiny: interpolated denormals

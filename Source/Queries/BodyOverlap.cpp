@@ -98,14 +98,14 @@ bool isConvex(const BodyPair& pair, bool ofA) {
   if (number != 1 && number != -1) return false;
   // Whether no point is in front of a triangle's outer side.
   const auto isBehind = [&](std::uint32_t triangle, const Vector3d& p) {
-    const auto [a, b, c] = cornersOf(topology.triangles[triangle], positions);
+    const auto [a, b, c] = cornersOf(topology.elements[triangle], positions);
     return number * windingNormal(a, b, c).dot(p - a) <= most;
   };
   for (std::uint32_t e = 0; e < topology.edges.size(); ++e) {
     const auto both = topology.edgeTriangles[e];
     if (both.size() != 2 || !isBehind(both[0], centre) || !isBehind(both[1], centre)) return false;
     for (std::size_t side = 0; side < 2; ++side)
-      for (const std::uint32_t v : topology.triangles[both[1 - side]])
+      for (const std::uint32_t v : topology.elements[both[1 - side]])
         if (!isBehind(both[side], positions[v])) return false;
   }
   return true;

@@ -29,7 +29,7 @@ void BodyVertices::assign(const Body& geometry) {
     return v;
   };
   box.setEmpty();
-  const auto& triangles = geometry.mesh.topology.triangles;
+  const auto& triangles = geometry.mesh.topology.elements;
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
     for (const std::uint32_t v : triangles[t]) {
       if (triangleOf[v] == kNoElement) triangleOf[v] = t, box.extend(positions[v]);
@@ -81,12 +81,12 @@ Vector3d BodyPair::moved(std::uint32_t vertex, const Vector3d& shift) const {
 }
 
 Corners BodyPair::cornersOfA(std::uint32_t element, const Vector3d& shift) const {
-  const Triangle& t = m_a.mesh.topology.triangles[element];
+  const Triangle& t = m_a.mesh.topology.elements[element];
   return {moved(t[0], shift), moved(t[1], shift), moved(t[2], shift)};
 }
 
 Corners BodyPair::cornersOfB(std::uint32_t element) const {
-  return cornersOf(m_b.mesh.topology.triangles[element], m_scratch.b.positions);
+  return cornersOf(m_b.mesh.topology.elements[element], m_scratch.b.positions);
 }
 
 void BodyPair::forEachIntersecting(
@@ -105,8 +105,8 @@ void BodyPair::forEachIntersecting(
     both.a = cornersOfA(elementA, shift);
   };
   if (m_engine == Engine::BruteForce) {
-    const std::size_t sizeA = m_a.mesh.topology.triangles.size(),
-                      sizeB = m_b.mesh.topology.triangles.size();
+    const std::size_t sizeA = m_a.mesh.topology.elements.size(),
+                      sizeB = m_b.mesh.topology.elements.size();
     for (std::uint32_t i = 0; i < sizeA; ++i) {
       setA(i);
       for (std::uint32_t j = 0; j < sizeB; ++j)
@@ -154,7 +154,7 @@ bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   const auto cornersAt = [&](std::size_t i) {
     return cornersOfA(static_cast<std::uint32_t>(i), shift);
   };
-  const int number = windingNumber(m_a.mesh.topology.triangles.size(), cornersAt, p, counts);
+  const int number = windingNumber(m_a.mesh.topology.elements.size(), cornersAt, p, counts);
   m_scratch.stack.exactDecisions += counts.undecided;
   return number != 0;
 }

@@ -148,7 +148,7 @@ class Search {
     at.depth = start + hit->t;
     const std::uint32_t own = m_pair.vertices(vertex.ofA).triangleOf[vertex.vertex];
     Vector3d corner = Vector3d::Zero();
-    const Triangle& corners = m_pair.geometry(vertex.ofA).mesh.topology.triangles[own];
+    const Triangle& corners = m_pair.geometry(vertex.ofA).mesh.topology.elements[own];
     for (int i = 0; i < 3; ++i)
       if (corners[static_cast<std::size_t>(i)] == vertex.vertex) corner = Vector3d::Unit(i);
     const Vector3d normal = normalOf(!vertex.ofA, hit->element);
@@ -303,7 +303,7 @@ class Search {
   SurfacePoint pointOf(bool ofA) const {
     const std::uint32_t element = ofA ? m_best.last.elementA : m_best.last.elementB;
     const Body& geometry = m_pair.geometry(ofA);
-    const Triangle& vertices = geometry.mesh.topology.triangles[element];
+    const Triangle& vertices = geometry.mesh.topology.elements[element];
     Vector3d weights = (ofA ? m_best.last.weightsA : m_best.last.weightsB).cwiseMax(0.0);
     weights /= weights.sum();
     Vector3d position = Vector3d::Zero();
@@ -339,7 +339,7 @@ Penetration penetrationOf(const Body& a, const Body& b, Engine engine, Penetrati
     return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
   };
   const Penetration apart{false, Vector3d::Zero(), 0.0, none(a), none(b), true};
-  if (a.mesh.topology.triangles.empty() || b.mesh.topology.triangles.empty()) return apart;
+  if (a.mesh.topology.elements.empty() || b.mesh.topology.elements.empty()) return apart;
   const BodyPair pair(a, b, engine, scratch.pair, effort.moved);
   if (!overlap(pair, scratch.intersecting)) return apart;
   return Search(pair, scratch, effort).run();

@@ -96,7 +96,7 @@ class BodyQuery {
     if (number == 0 || outer.holds(p, *near, number, numberAt)) return result;
     const auto way = outer.nearest(p, number, numberAt);
     if (!way) return result;
-    const Triangle& corners = m_geometry.mesh.topology.triangles[way->element];
+    const Triangle& corners = m_geometry.mesh.topology.elements[way->element];
     const Positions& now = m_geometry.mesh.now;
     const double depth = stableLength(way->point - p);
     return {vertex,
@@ -201,7 +201,7 @@ bool hasClosedSurface(const Body& body) {
   PreparedData& prepared = *body.prepared;
   if (!prepared.closedVersion.isCurrent(body.revisions.elements.topology)) {
     prepared.closedVersion.invalidate();
-    prepared.isClosed = findMeshDefects(topology.triangles).closed();
+    prepared.isClosed = findMeshDefects(topology.elements).closed();
     prepared.closedVersion.commit(body.revisions.elements.topology);
   }
   return prepared.isClosed;
@@ -230,7 +230,7 @@ void checkInside(const Body& body, InsideRule rule) {
     return;
   }
   if (isClosed(body)) return;
-  const MeshDefects defects = findMeshDefects(topology.triangles);
+  const MeshDefects defects = findMeshDefects(topology.elements);
   const auto describe = [](const std::vector<Segment>& edges, const char* what) {
     if (edges.empty()) return std::string();
     return "; " + std::to_string(edges.size()) + " edges " + what + ", the first is (" +

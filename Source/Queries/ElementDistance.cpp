@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 
 SurfacePoint surfacePointOf(const Body& geometry, std::uint32_t element, const Vector3d& weights,
                             double distance) {
-  const Triangle& vertices = geometry.mesh.topology.triangles[element];
+  const Triangle& vertices = geometry.mesh.topology.elements[element];
   Vector3d position = Vector3d::Zero();
   for (int i = 0; i < 3; ++i)
     position += weights[i] * geometry.mesh.now[vertices[static_cast<std::size_t>(i)]];

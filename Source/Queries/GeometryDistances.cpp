@@ -46,7 +46,7 @@ template <class Bound, class Test>
 void descend(const Body& geometry, bool bruteForce, double best, Bound&& bound, Test&& test) {
   const Octree& octree = geometry.tree.octree();
   if (bruteForce) {
-    for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) test(i);
+    for (std::uint32_t i = 0; i < geometry.mesh.topology.elements.size(); ++i) test(i);
     return;
   }
   octree.requireBuilt();
@@ -140,7 +140,7 @@ GeometryDistance distanceBetween(const Body& geometry, GeometryId id, const Shap
                                  kShapeBoundError * shape.magnitude());
       },
       [&](std::uint32_t element) {
-        const Element corners(geometry.mesh, geometry.mesh.topology.triangles[element]);
+        const Element corners(geometry.mesh, geometry.mesh.topology.elements[element]);
         const auto take = [&](const NearestToShape& found, const Vector3d& weights) {
           const double distance = std::max(0.0, found.distance - corners.radius(weights));
           if (!(distance < nearest.distance || (distance == nearest.distance && element < best)))
@@ -219,7 +219,7 @@ SegmentDistance distanceFromSegment(const Body& geometry, const Vector3d& p, con
   const Element segment(p, q);
   const double radius = geometry.mesh.largestRadius;
   const auto test = [&](std::uint32_t element) {
-    const Element other(geometry.mesh, geometry.mesh.topology.triangles[element]);
+    const Element other(geometry.mesh, geometry.mesh.topology.elements[element]);
     if (!bruteForce && areFurtherApart(segment, other, best.distance + radius))
       return best.distance;
     const ElementDistance found = elementDistance(segment, other);

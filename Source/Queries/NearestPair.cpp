@@ -140,7 +140,7 @@ void NearestPair::findVertices() {
     std::optional<Vector3d> at;
     if (isVertex)
       at = geometry.mesh
-               .now[geometry.mesh.topology.triangles[element][static_cast<std::size_t>(corner)]];
+               .now[geometry.mesh.topology.elements[element][static_cast<std::size_t>(corner)]];
     return std::exchange(side.at, at) != at;
   };
   const bool a = set(m_atA, m_a, m_elementA, m_best.weightsA),

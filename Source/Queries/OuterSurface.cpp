@@ -86,7 +86,7 @@ OuterSurface::OuterSurface(const Body& geometry, bool bruteForce)
     : m_geometry(geometry), m_bruteForce(bruteForce) {}
 
 Corners OuterSurface::cornersOf(std::uint32_t element) const {
-  return palpate::cornersOf(m_geometry.mesh.topology.triangles[element], m_geometry.mesh.now);
+  return palpate::cornersOf(m_geometry.mesh.topology.elements[element], m_geometry.mesh.now);
 }
 
 /// L: how far beside the surface winding numbers are asked for.
@@ -153,8 +153,8 @@ void OuterSurface::findCreases() const {
   m_parts = {};  // an earlier call may have found no memory
   SignCounts counts;
   const auto test = [&](std::uint32_t i, std::uint32_t j) {
-    const Triangle &a = m_geometry.mesh.topology.triangles[i],
-                   &b = m_geometry.mesh.topology.triangles[j];
+    const Triangle &a = m_geometry.mesh.topology.elements[i],
+                   &b = m_geometry.mesh.topology.elements[j];
     if (std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end()) return;
     const Corners ofA = cornersOf(i), ofB = cornersOf(j);
     const TriangleIntersection found = intersectTriangles(ofA, ofB, counts);
@@ -209,7 +209,7 @@ CountedVector<std::uint32_t> OuterSurface::outerTriangles(
     const WindingNumber& windingNumber) const {
   const MeshTopology& topology = m_geometry.mesh.topology;
   enum class Kind : std::uint8_t { Unknown, Mixed, Outer, Inner };
-  std::vector<Kind> kinds(topology.triangles.size(), Kind::Unknown);
+  std::vector<Kind> kinds(topology.elements.size(), Kind::Unknown);
   for (const std::uint32_t element : m_parts.mixed) kinds[element] = Kind::Mixed;
   CountedVector<std::uint32_t> outer, open;
   for (const std::uint32_t first : m_geometry.tree.octree().order()) {
@@ -245,7 +245,7 @@ void OuterSurface::find(const WindingNumber& windingNumber) const {
   m_parts.outer = std::make_unique<Body>(m_geometry.id);
   std::vector<Triangle> triangles;
   for (const std::uint32_t element : m_parts.elementOf)
-    triangles.push_back(m_geometry.mesh.topology.triangles[element]);
+    triangles.push_back(m_geometry.mesh.topology.elements[element]);
   makeBody(m_geometry.mesh.now.all(), triangles, Threads(1), *m_parts.outer);
 }
 

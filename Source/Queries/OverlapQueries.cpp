@@ -57,7 +57,7 @@ void SpatialQueries::contacts(GeometryId id, const AnalyticalGeometry& shape, co
   if (!geometry.tree.ordered().empty()) {
     const PlacedShape& tool = placeAtRest(shape, pose, scratch->shapes);
     if (source->engine() == Engine::BruteForce)
-      for (std::uint32_t i = 0; i < geometry.mesh.topology.triangles.size(); ++i) near.push_back(i);
+      for (std::uint32_t i = 0; i < geometry.mesh.topology.elements.size(); ++i) near.push_back(i);
     else
       findElementsNear(geometry, tool.now, tool.now, thickness + geometry.mesh.largestRadius, near);
     const PairSettings settings{Method::Proximity, thickness};

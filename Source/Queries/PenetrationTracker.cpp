@@ -129,7 +129,7 @@ class PenetrationTracker::Implementation::Search {
                            const VertexState* earlier) {
     if (!earlier) return {nearest, nearest, DirectionChange::Entered};
     const Corners corners =
-        cornersOf(m_body.mesh.topology.triangles[earlier->triangle], m_body.mesh.now);
+        cornersOf(m_body.mesh.topology.elements[earlier->triangle], m_body.mesh.now);
     const Eigen::Matrix3d rotation = rotationOf(earlier->triangleAt, corners);
     const Eigen::Vector3d direction = (rotation * earlier->direction).normalized();
     const Eigen::Vector3d moved =

@@ -102,8 +102,8 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Pose& placem
   all.found.clear();
   const MeshPair pair{a.mesh, b.mesh, {Method::Proximity, thickness}};
   RigidMesh::Implementation::Job job{pair, all};
-  const auto countA = static_cast<std::uint32_t>(a.mesh.topology.triangles.size()),
-             countB = static_cast<std::uint32_t>(b.mesh.topology.triangles.size());
+  const auto countA = static_cast<std::uint32_t>(a.mesh.topology.elements.size()),
+             countB = static_cast<std::uint32_t>(b.mesh.topology.elements.size());
   if (source->engine() == Engine::BruteForce)
     all.findByBruteForce(countA, countB, job);
   else if (countA > 0 && countB > 0)

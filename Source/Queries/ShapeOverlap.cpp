@@ -251,7 +251,7 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
   };
   const auto test = [&](std::uint32_t element) {
     build();
-    if (meets(mesh, mesh.topology.triangles[element], *shape)) out.push_back(element);
+    if (meets(mesh, mesh.topology.elements[element], *shape)) out.push_back(element);
   };
   std::optional<Convex> convex;
   if (const auto* sphere = std::get_if<Sphere>(&analytical)) {
@@ -282,7 +282,7 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
         shape->corners().front() == shape->corners().back())  // a point
       return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
     if (bruteForce) {
-      for (std::uint32_t i = 0; i < mesh.topology.triangles.size(); ++i) test(i);
+      for (std::uint32_t i = 0; i < mesh.topology.elements.size(); ++i) test(i);
       return;
     }
     findElementsNear(geometry, *shape, *shape, mesh.largestRadius, near);

@@ -56,7 +56,7 @@ Penetration ofShapes(const Body& a, const Body& b, ShapePairScratch& scratch) {
 SurfacePoint vertexOf(const Body& mesh, const BodyVertices& vertices, std::uint32_t vertex,
                       double depth) {
   const std::uint32_t element = vertices.triangleOf[vertex];
-  const Triangle& corners = mesh.mesh.topology.triangles[element];
+  const Triangle& corners = mesh.mesh.topology.elements[element];
   Vector3d weights = Vector3d::Zero();
   for (int i = 0; i < 3; ++i)
     if (corners[static_cast<std::size_t>(i)] == vertex) weights = Vector3d::Unit(i);
@@ -159,7 +159,7 @@ Penetration shapePenetration(const Body& a, const Body& b, Engine engine,
   PALPATE_ASSERT(!(a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane()));
   if (a.shape && b.shape) return ofShapes(a, b, pairScratch);
   if (a.shape) return exchanged(shapePenetration(b, a, engine, settings, scratch, pairScratch));
-  if (a.mesh.topology.triangles.empty()) return apart(a.id, b.id);
+  if (a.mesh.topology.elements.empty()) return apart(a.id, b.id);
   if (b.shape->now.isPlane()) return ofPlane(a, b, scratch.pair.a);
   const auto around = meshAround(b.id, b.shape->now, a.tree.frame().scale, settings);
   return around ? ofMesh(a, b, *around, engine, scratch) : apart(a.id, b.id);

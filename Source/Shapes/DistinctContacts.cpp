@@ -57,7 +57,7 @@ class DistinctContacts::Step {
     Vector3d corner = Vector3d::Zero(), first = corner;  // of the first triangle
     std::size_t count = 0;
     for (const std::uint32_t triangle : m_mesh.topology.vertexTriangles[(*feature)[0]]) {
-      const Triangle& corners = m_mesh.topology.triangles[triangle];
+      const Triangle& corners = m_mesh.topology.elements[triangle];
       if (std::find(corners.begin(), corners.end(), (*feature)[1]) == corners.end()) continue;
       const Vector3d a = m_mesh.now[corners[0]],
                      across = (m_mesh.now[corners[1]] - a).cross(m_mesh.now[corners[2]] - a);

@@ -262,7 +262,7 @@ class ShapeContactFinder {
 
   void test(std::uint32_t element) {
     const MeshTopology& topology = m_mesh.topology;
-    const Triangle& corners = topology.triangles[element];
+    const Triangle& corners = topology.elements[element];
     if (!topology.isEnabled(element)) return;
     for (int i = 0; i < 3; ++i)
       m_ends[i] = {corners[i], m_shape.signedDistance(m_positions[corners[i]])};

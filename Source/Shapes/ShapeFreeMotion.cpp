@@ -28,7 +28,7 @@ class ShapeMotionFinder {
   /// An element, its edges and its vertices. As a whole it is bounded by its least distance, also
   /// where that is a vertex's: another vertex may move its interior.
   void bound(std::uint32_t element) const {
-    const auto& [a, b, c] = m_mesh.topology.triangles[element];
+    const auto& [a, b, c] = m_mesh.topology.elements[element];
     double least = boundVertex(a);
     if (a != b) {
       least = std::min({least, boundVertex(b), boundEdge(a, b)});

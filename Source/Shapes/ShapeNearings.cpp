@@ -95,7 +95,7 @@ class ElementNearings {
       : m_mesh(mesh), m_shape(shape), m_tolerance(tolerance), m_out(out) {}
 
   void test(std::uint32_t element) {
-    const Triangle& corners = m_mesh.topology.triangles[element];
+    const Triangle& corners = m_mesh.topology.elements[element];
     double radius = 0;
     for (int i = 0; i < 3; ++i) {
       m_ends[0][i] = m_mesh.before[corners[i]];

@@ -41,7 +41,7 @@ std::vector<std::uint32_t> componentsOf(std::size_t vertices, std::span<const Tr
 
 Shells shellsOf(const Body& body, const SimplifyCertificate& certificate) {
   const auto positions = body.mesh.now.body();
-  const std::span<const Triangle> triangles = body.mesh.topology.triangles;
+  const std::span<const Triangle> triangles = body.mesh.topology.elements;
   Shells shells{componentsOf(positions.size(), triangles),
                 std::vector<std::int8_t>(positions.size(), 0),
                 std::vector<Vector3d>(positions.size(), Vector3d::Zero())};

@@ -60,7 +60,7 @@ struct Source {
   SimplifyCertificate certificate;
   Shells shells;
 
-  std::span<const Triangle> triangles() const { return body.mesh.topology.triangles; }
+  std::span<const Triangle> triangles() const { return body.mesh.topology.elements; }
   std::span<const Vector3d> positions() const { return body.mesh.now.body(); }
 };
 
@@ -403,7 +403,7 @@ std::optional<Failure> refineFailed(const Source& source, const Collapsed& colla
 std::optional<ElementPair> findCrossing(const Body& body) {
   std::optional<ElementPair> first;
   const auto corners = [&](std::uint32_t t) {
-    return cornersOf(body.mesh.topology.triangles[t], body.mesh.now.body());
+    return cornersOf(body.mesh.topology.elements[t], body.mesh.now.body());
   };
   auto test = [&](std::span<const ElementPair> pairs) {
     SignCounts counts;
@@ -449,7 +449,7 @@ std::optional<ElementPair> findCrossing(const Body& body) {
 SimplifiedMesh simplifyInRounds(CollapseEdges collapseEdges, const Body& body,
                                 const SimplifySettings& settings, double largest,
                                 const Threads& threads) {
-  PALPATE_ASSERT(body.tree.isValid() && !body.mesh.topology.triangles.empty());
+  PALPATE_ASSERT(body.tree.isValid() && !body.mesh.topology.elements.empty());
   Source source{body, settings.maxDistance, {body, settings.maxDistance, largest}, {}};
   source.shells = shellsOf(body, source.certificate);
   Loops loops(settings, threads);

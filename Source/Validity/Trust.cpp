@@ -61,7 +61,7 @@ bool isUnwelded(const TriangleMesh& mesh) {
   if (!topology.hasFaces()) return false;
   for (std::uint32_t v = 0; v < topology.vertexCount; ++v)
     if (topology.vertexTriangles[v].size() > 1) return false;
-  const Welded welded = weld(mesh.now.all(), topology.triangles);
+  const Welded welded = weld(mesh.now.all(), topology.elements);
   std::vector<std::uint32_t> holders(welded.positions.size(), kNoElement);
   for (std::uint32_t t = 0; t < welded.triangles.size(); ++t) {
     if (!topology.isEnabled(t)) continue;

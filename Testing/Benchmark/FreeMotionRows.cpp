@@ -2,7 +2,7 @@
 // free it proves.
 #include "Rows.h"
 
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include <Scenes.h>

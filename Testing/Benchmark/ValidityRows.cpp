@@ -130,7 +130,7 @@ class ValidityCost {
     const double all = fastest([&] {
       for (const auto& pair : m_scene.pairs) {
         const TriangleMesh &a = m_meshes[pair.first], &b = m_meshes[pair.second];
-        keepPossiblyIntersecting({a.topology.triangles, a.before}, {b.topology.triangles, b.before},
+        keepPossiblyIntersecting({a.topology.elements, a.before}, {b.topology.elements, b.before},
                                  &a == &b, candidatesOf(pair), m_possible);
       }
     });

@@ -53,9 +53,9 @@ class Searched {
   const palpate::Positions& at(bool isEnd) const {
     return isEnd ? geometry.mesh.now : geometry.mesh.before;
   }
-  std::size_t elementCount() const { return geometry.mesh.topology.triangles.size(); }
+  std::size_t elementCount() const { return geometry.mesh.topology.elements.size(); }
   const Triangle& corners(std::uint32_t element) const {
-    return geometry.mesh.topology.triangles[element];
+    return geometry.mesh.topology.elements[element];
   }
 
   Body geometry{GeometryId{0}};

@@ -1,5 +1,5 @@
 // PairSettings::freeMotionReach and OctreeBasedCD::freeMotion().
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 

@@ -77,7 +77,7 @@ TEST(AffineClaim, HoldsOnlyIfNoSampleDisprovesIt) {
       const Vector3d middle = randomPoint(random, -1, 1);
       const double size = uniform(random, 0.02, 0.5);
       for (int k = 0; k < 3; ++k) positions.push_back(middle + size * randomPoint(random, -1, 1));
-      geometry.mesh.topology.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+      geometry.mesh.topology.elements.push_back({3 * t, 3 * t + 1, 3 * t + 2});
     }
     geometry.mesh.topology.vertexCount = positions.size();
     geometry.mesh.now = Positions(positions);

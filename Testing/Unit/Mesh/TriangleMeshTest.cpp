@@ -26,7 +26,7 @@ Segment edgeOf(const Triangle& t, int i) {
 void expectTopology(std::size_t vertexCount, std::span<const Triangle> triangles) {
   const MeshTopology mesh(vertexCount, triangles);
   ASSERT_EQ(mesh.vertexCount, vertexCount);
-  ASSERT_TRUE(std::ranges::equal(mesh.triangles, triangles));
+  ASSERT_TRUE(std::ranges::equal(mesh.elements, triangles));
 
   std::map<std::uint32_t, std::set<std::uint32_t>> trianglesOfVertex;
   std::map<Segment, std::set<std::uint32_t>> trianglesOfEdge;
@@ -103,7 +103,7 @@ TEST(TriangleMesh, OneTriangleOwnsAllItsFeatures) {
   const MeshTopology mesh(3, Triangles{{2, 0, 1}});
   EXPECT_EQ(mesh.owned, CountedVector<std::uint8_t>{63});
   EXPECT_EQ(mesh.edges, (CountedVector<Segment>{{0, 1}, {0, 2}, {1, 2}}));
-  expectTopology(3, mesh.triangles);
+  expectTopology(3, mesh.elements);
 }
 
 TEST(TriangleMesh, TwoTrianglesOfEitherWindingShareAnEdge) {
@@ -112,7 +112,7 @@ TEST(TriangleMesh, TwoTrianglesOfEitherWindingShareAnEdge) {
     EXPECT_EQ(mesh.edges.size(), 5u);
     const auto shared = std::find(mesh.edges.begin(), mesh.edges.end(), Segment{1, 2});
     EXPECT_EQ(listed(mesh.edgeTriangles, shared - mesh.edges.begin()), (Ids{0, 1}));
-    expectTopology(4, mesh.triangles);
+    expectTopology(4, mesh.elements);
   }
 }
 
@@ -141,7 +141,7 @@ TEST(TriangleMesh, RepeatedIndices) {
 TEST(TriangleMesh, DuplicateTriangleOwnsNothing) {
   const MeshTopology mesh(3, Triangles{{0, 1, 2}, {0, 1, 2}, {2, 1, 0}, {1, 2, 0}});
   EXPECT_EQ(mesh.owned, (CountedVector<std::uint8_t>{63, 0, 0, 0}));
-  expectTopology(3, mesh.triangles);
+  expectTopology(3, mesh.elements);
 }
 
 TEST(TriangleMesh, RandomSoups) {

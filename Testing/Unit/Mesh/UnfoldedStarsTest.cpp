@@ -45,10 +45,10 @@ std::vector<ElementPair> answered(const Step& step) {
     useSimdPath(path);
     for (const int threads : {1, 3}) {
       UnfoldedStars stars;
-      stars.find(step.topology, step.topology.triangles, before.data(), now.data(),
+      stars.find(step.topology, step.topology.elements, before.data(), now.data(),
                  Threads(threads));
       const std::vector<Triangle> found(stars.triangles(),
-                                        stars.triangles() + step.topology.triangles.size());
+                                        stars.triangles() + step.topology.elements.size());
       if (first.empty()) first = found;
       EXPECT_EQ(found, first) << path;
     }
@@ -63,7 +63,7 @@ std::vector<ElementPair> answered(const Step& step) {
 
 /// Whether features of the two triangles with no vertex in common touch in the step.
 bool touch(const Step& step, const ElementPair& pair) {
-  const Triangle &a = step.topology.triangles[pair.a], &b = step.topology.triangles[pair.b];
+  const Triangle &a = step.topology.elements[pair.a], &b = step.topology.elements[pair.b];
   const Positions &p = step.before, &q = step.now;
   const auto corners = [&](const Triangle& s, const Triangle& t) {
     return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) {
@@ -87,7 +87,7 @@ double expectRight(const Step& step) {
   for (const ElementPair& pair : pairs)
     EXPECT_FALSE(touch(step, pair)) << pair.a << " and " << pair.b;
   double neighbours = 0;
-  const auto& triangles = step.topology.triangles;
+  const auto& triangles = step.topology.elements;
   for (std::uint32_t a = 0; a < triangles.size(); ++a)
     for (std::uint32_t b = a + 1; b < triangles.size(); ++b)
       neighbours += share(triangles[a], triangles[b]);

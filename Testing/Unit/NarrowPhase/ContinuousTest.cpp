@@ -43,8 +43,8 @@ TriangleMesh movingSoup(testing::Random& random, std::size_t triangles, double s
 
 std::vector<ElementPair> everyPair(const TriangleMesh& a, const TriangleMesh& b) {
   std::vector<ElementPair> pairs;
-  for (std::uint32_t i = 0; i < a.topology.triangles.size(); ++i)
-    for (std::uint32_t j = &a == &b ? i + 1 : 0; j < b.topology.triangles.size(); ++j)
+  for (std::uint32_t i = 0; i < a.topology.elements.size(); ++i)
+    for (std::uint32_t j = &a == &b ? i + 1 : 0; j < b.topology.elements.size(); ++j)
       pairs.push_back({i, j});
   return pairs;
 }

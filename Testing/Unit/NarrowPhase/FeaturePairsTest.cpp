@@ -183,17 +183,17 @@ TEST(FeaturePairs, AreEachTestedOnce) {
     for (const MeshTopology* second : {&a, &b}) {
       const bool self = second == &a;
       std::vector<ElementPair> candidates;
-      for (std::uint32_t i = 0; i < a.triangles.size(); ++i)
-        for (std::uint32_t j = self ? i + 1 : 0; j < second->triangles.size(); ++j)
+      for (std::uint32_t i = 0; i < a.elements.size(); ++i)
+        for (std::uint32_t j = self ? i + 1 : 0; j < second->elements.size(); ++j)
           candidates.push_back({i, j});
       std::shuffle(candidates.begin(), candidates.end(), random);
 
       std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
       for (std::uint32_t v = 0; v < a.vertexCount; ++v)
-        for (std::uint32_t t = 0; t < second->triangles.size(); ++t)
-          if (a.vertexTriangles[v].size() > 0 && !(self && holds(a.triangles[t], v)))
+        for (std::uint32_t t = 0; t < second->elements.size(); ++t)
+          if (a.vertexTriangles[v].size() > 0 && !(self && holds(a.elements[t], v)))
             vertexTriangle.push_back({v, t});
-      for (std::uint32_t t = 0; t < a.triangles.size() && !self; ++t)
+      for (std::uint32_t t = 0; t < a.elements.size() && !self; ++t)
         for (std::uint32_t v = 0; v < b.vertexCount; ++v)
           if (b.vertexTriangles[v].size() > 0) triangleVertex.push_back({t, v});
       for (std::uint32_t p = 0; p < a.edges.size(); ++p)
@@ -251,14 +251,14 @@ TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
     for (const Segment& edge : topology.edges) edges.push_back(testing::sweptBox(mesh, edge));
     for (std::uint32_t v = 0; v < vertexCount; ++v)
       corners.push_back(testing::sweptBox(mesh, std::array{v}));
-    for (const Triangle& triangle : topology.triangles)
+    for (const Triangle& triangle : topology.elements)
       corners.push_back(testing::sweptBox(mesh, triangle));
     std::vector<Ids> vertexTriangle, edgeEdge;
     testing::forEachOverlap(edges, [&](std::uint32_t p, std::uint32_t q) {
       if (!meet(topology.edges[p], topology.edges[q])) edgeEdge.push_back({p, q});
     });
     testing::forEachOverlap(corners, [&](std::uint32_t v, std::uint32_t t) {
-      if (v < vertexCount && t >= vertexCount && !holds(topology.triangles[t - vertexCount], v))
+      if (v < vertexCount && t >= vertexCount && !holds(topology.elements[t - vertexCount], v))
         vertexTriangle.push_back({v, t - vertexCount});
     });
     EXPECT_EQ(vertexTriangle.size(), vertexTriangles);
@@ -305,8 +305,8 @@ TEST(FeaturePairs, IncludePairsWithinTheThickness) {
                            nullptr,          nullptr,
                            shift.shiftLower, shift.shiftUpper};
     std::vector<ElementPair> candidates;
-    for (std::uint32_t i = 0; i < first.triangles.size(); ++i)
-      for (std::uint32_t j = self ? i + 1 : 0; j < b.triangles.size(); ++j)
+    for (std::uint32_t i = 0; i < first.elements.size(); ++i)
+      for (std::uint32_t j = self ? i + 1 : 0; j < b.elements.size(); ++j)
         candidates.push_back({i, j});
     FeaturePairs pairs;
     findFeaturePairs(first, b, &floats, candidates, pairs);
@@ -322,13 +322,13 @@ TEST(FeaturePairs, IncludePairsWithinTheThickness) {
     };
     std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
     for (std::uint32_t v = 0; v < first.vertexCount; ++v)
-      for (std::uint32_t t = 0; t < b.triangles.size(); ++t)
-        if (!(self && holds(b.triangles[t], v)) &&
-            near(boxOf(sheet.positions, std::array{v}), boxOf(positionsB, b.triangles[t])))
+      for (std::uint32_t t = 0; t < b.elements.size(); ++t)
+        if (!(self && holds(b.elements[t], v)) &&
+            near(boxOf(sheet.positions, std::array{v}), boxOf(positionsB, b.elements[t])))
           vertexTriangle.push_back({v, t});
-    for (std::uint32_t t = 0; t < first.triangles.size() && !self; ++t)
+    for (std::uint32_t t = 0; t < first.elements.size() && !self; ++t)
       for (std::uint32_t v = 0; v < b.vertexCount; ++v)
-        if (near(boxOf(sheet.positions, first.triangles[t]), boxOf(positionsB, std::array{v})))
+        if (near(boxOf(sheet.positions, first.elements[t]), boxOf(positionsB, std::array{v})))
           triangleVertex.push_back({t, v});
     for (std::uint32_t p = 0; p < first.edges.size(); ++p)
       for (std::uint32_t q = self ? p + 1 : 0; q < b.edges.size(); ++q)

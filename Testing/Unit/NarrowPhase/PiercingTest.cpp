@@ -58,7 +58,7 @@ TriangleMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
 TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector3d& shift) {
   Vertices positions;
   for (std::size_t v = 0; v < mesh.now.size(); ++v) positions.push_back(by * mesh.now[v] + shift);
-  std::vector<Triangle> triangles(mesh.topology.triangles.begin(), mesh.topology.triangles.end());
+  std::vector<Triangle> triangles(mesh.topology.elements.begin(), mesh.topology.elements.end());
   return piercingMesh(positions, triangles);
 }
 
@@ -182,7 +182,7 @@ TEST(Piercing, TheDepthIsThatOfTheNearestTriangleAround) {
     for (std::size_t v = 0; v < flat.now.size(); ++v) positions.push_back(flat.now[v]);
     for (std::size_t v = 0; v < positions.size(); ++v)
       positions[v].z() = 0.05 * (static_cast<double>((v * 7 + seed * 13) % 11) / 5 - 1);
-    std::vector<Triangle> triangles(flat.topology.triangles.begin(), flat.topology.triangles.end());
+    std::vector<Triangle> triangles(flat.topology.elements.begin(), flat.topology.elements.end());
     const TriangleMesh b = piercingMesh(positions, triangles);
     const Vector3d tip(1.5 + seed % 10 * 0.1, 1.5 + seed / 10 % 10 * 0.1, -0.15);
     const TriangleMesh a = pyramid(tip, 1, 0.4 + 0.01 * (seed % 30));

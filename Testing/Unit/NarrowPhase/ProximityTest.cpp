@@ -30,7 +30,7 @@ TriangleMesh meshOf(const SceneMesh& mesh) {
 
 Eigen::AlignedBox3d boxOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t v : mesh.topology.triangles[triangle]) box.extend(mesh.now[v]);
+  for (const std::uint32_t v : mesh.topology.elements[triangle]) box.extend(mesh.now[v]);
   return box;
 }
 
@@ -39,7 +39,7 @@ Eigen::AlignedBox3d boxOf(const TriangleMesh& mesh, std::uint32_t triangle) {
 std::vector<ElementPair> candidatesOf(const MeshPair& pair) {
   std::vector<ElementPair> candidates;
   const auto count = [](const TriangleMesh& mesh) {
-    return static_cast<std::uint32_t>(mesh.topology.triangles.size());
+    return static_cast<std::uint32_t>(mesh.topology.elements.size());
   };
   for (std::uint32_t s = 0; s < count(pair.a); ++s) {
     Eigen::AlignedBox3d box = boxOf(pair.a, s);
@@ -336,15 +336,15 @@ TEST(Proximity, ExcludesAVertexWithTheElementsAroundIt) {
   const TriangleMesh triangles = meshOf(scenes::sheet(2)), other = triangles;
   const MeshPair self{triangles, triangles, {}}, two{triangles, other, {}};
   for (std::uint32_t v = 0; v < triangles.topology.vertexCount; ++v)
-    for (std::uint32_t t = 0; t < triangles.topology.triangles.size(); ++t) {
-      const Triangle& corners = triangles.topology.triangles[t];
+    for (std::uint32_t t = 0; t < triangles.topology.elements.size(); ++t) {
+      const Triangle& corners = triangles.topology.elements[t];
       EXPECT_EQ(self.excludesVertex(v, t),
                 std::find(corners.begin(), corners.end(), v) != corners.end());
       EXPECT_FALSE(two.excludesVertex(v, t));
     }
   TriangleMesh points = triangles;
   points.topology.type = GeometryType::Points;
-  for (std::uint32_t t = 0; t < 4; ++t) points.topology.triangles[t] = {t, t, t};
+  for (std::uint32_t t = 0; t < 4; ++t) points.topology.elements[t] = {t, t, t};
   const MeshPair ofPoints{points, points, {}};
   for (std::uint32_t v = 0; v < 4; ++v)
     for (std::uint32_t t = 0; t < 4; ++t) EXPECT_EQ(ofPoints.excludesVertex(v, t), t <= v);

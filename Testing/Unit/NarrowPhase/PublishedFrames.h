@@ -103,8 +103,7 @@ void forEachOverlap(const std::vector<Eigen::AlignedBox3d>& boxes, F&& f) {
 /// Every pair of triangles of a mesh, a < b, whose boxes over the step overlap.
 inline std::vector<ElementPair> sweptCandidates(const TriangleMesh& mesh) {
   std::vector<Eigen::AlignedBox3d> boxes;
-  for (const Triangle& triangle : mesh.topology.triangles)
-    boxes.push_back(sweptBox(mesh, triangle));
+  for (const Triangle& triangle : mesh.topology.elements) boxes.push_back(sweptBox(mesh, triangle));
   std::vector<ElementPair> pairs;
   forEachOverlap(boxes, [&](std::uint32_t a, std::uint32_t b) { pairs.push_back({a, b}); });
   std::sort(pairs.begin(), pairs.end());

@@ -190,7 +190,7 @@ TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
         ASSERT_EQ(tree.frame(), wanted.tree.frame());
         ASSERT_EQ(tree.ordered().size(), wanted.tree.ordered().size());
         for (std::size_t t = 0; t < octree.size(); ++t)
-          ASSERT_EQ(tree.ordered()[t], geometry.mesh.topology.triangles[octree.order()[t]]);
+          ASSERT_EQ(tree.ordered()[t], geometry.mesh.topology.elements[octree.order()[t]]);
         const FloatBox root = octree.blocks()[0].box(0),
                        wantedRoot = wanted.tree.octree().blocks()[0].box(0);
         ASSERT_EQ(root.lower, wantedRoot.lower);

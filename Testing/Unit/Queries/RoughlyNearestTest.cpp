@@ -23,7 +23,7 @@ TEST(PointDistances, ARoughlyNearestTriangleIsWithinItsTolerance) {
     geometry.mesh.now = Positions(mesh.positions);
     geometry.mesh.before = geometry.mesh.now;
     geometry.mesh.topology.vertexCount = mesh.positions.size();
-    geometry.mesh.topology.triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
+    geometry.mesh.topology.elements.assign(mesh.triangles.begin(), mesh.triangles.end());
     geometry.revisions.elements.topology = geometry.revisions.counter.next();
     const Threads threads(1);
     const double spread =
