@@ -1,5 +1,5 @@
 #include <palpate/ConstraintRows.h>
-#include <palpate/Distance.h>
+#include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/RandomMeshes.h"
