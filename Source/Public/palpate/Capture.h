@@ -20,14 +20,12 @@
 
 namespace palpate {
 
-/// A contact in which a frame's CollisionData and brute force differ. This is a fault of the
-/// library. Method::Auto may mix the answers of several methods; for it the audit reports only
-/// missing contacts. Where a step begins in intersection it does not miss those of vertices of
-/// triangles that intersect, nor any of bodies of which Auto left out contacts on an inner side.
+/// A contact in which a frame and brute force differ: a fault of the library. Of Auto only missing
+/// ones are reported, but where a step begins in intersection, none of vertices of triangles that
+/// intersect and of bodies with contacts left out on an inner side.
 struct AuditFailure {
   enum class Fault {
-    /// Expected, not found. In List::Earliest: a contact is earlier than earliestTimeOfImpact().
-    FalseNegative,
+    FalseNegative,  ///< not found; Earliest: too late
     FalsePositive,  ///< found, not expected, or found twice
     Different       ///< found with other values than expected
   };
@@ -55,69 +53,56 @@ struct AuditFailure {
 PALPATE_EXPORT const char* toString(AuditFailure::Fault) noexcept;  ///< its name, or "unknown"
 PALPATE_EXPORT const char* toString(AuditFailure::List) noexcept;   ///< its name, or "unknown"
 
-/// Everything on which the answers of one frame depend, except predicates. Get it from
-/// OctreeBasedCD::problem(). <palpate/Capture.h> writes and reads it, and makes an OctreeBasedCD
-/// from it.
+/// All on which a frame depends except predicates, from OctreeBasedCD::problem().
 struct CollisionProblem {
   /// A geometry of any type.
   struct Geometry {
     GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
-    /// L, in the world, also if setTransform() placed the geometry; of a mesh with a distance field
-    /// or leaves in the body's frame.
+    /// L, in the world, also if placed; of a mesh with a field or leaves in the body's frame.
     std::vector<Eigen::Vector3d> before, now;
     std::vector<Triangle> triangles;  ///< segment {p, q} is {p, q, q}; empty for points
     GeometryType type = GeometryType::Triangles;
     std::vector<double> radii{};  ///< L: none, one for all vertices, or one per vertex
-    /// L: the positions that determine PairSettings::restDistance and the winding of the surface of
-    /// tetrahedra. Empty: `now`.
+    /// L: the positions of restDistance and of the winding of tetrahedra's surface. Empty: `now`.
     std::vector<Eigen::Vector3d> rest{};
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};           ///< disabled elements
     std::optional<AnalyticalGeometry> analytical{};  ///< a shape; `motion` places it
     RigidMotion motion{};                            ///< of setTransform()
     std::vector<Tetrahedron> tetrahedra{};  ///< `triangles` is their surface; empty: no tetrahedra
-    /// The field of an added distance field, or of a mesh that has one; `motion` places it.
-    std::shared_ptr<const DistanceField> field{};
-    std::optional<SurfaceProxySettings> proxy{};  ///< of the leaves that are attached to a mesh
-    std::string name{};                           ///< OctreeBasedCD::setName(); not in a file
+    std::shared_ptr<const DistanceField> field{};  ///< placed by `motion`
+    std::optional<SurfaceProxySettings> proxy{};   ///< of the leaves that are attached to a mesh
+    std::string name{};                            ///< OctreeBasedCD::setName(); not in a file
   };
   /// A collision pair.
   struct Pair {
     std::uint32_t a, b;  ///< indices in `geometries`
     PairSettings settings;
-    Method method;  ///< the method that answered; no answer depends on it
-    /// Whether the pair has a predicate. A problem does not contain it, so that a replay may find
-    /// more contacts.
-    bool predicate = false;
+    Method method;           ///< the method that answered; no answer depends on it
+    bool predicate = false;  ///< of which there is no copy: a replay may find more
   };
   Settings settings;  ///< without an executor
   std::vector<Geometry> geometries;
   std::vector<Pair> pairs;  ///< in the order in which they were added
 };
 
-// A capture is a text file with a CollisionProblem. It replays a frame exactly: every double keeps
-// its bits.
+// A capture is a text file of a CollisionProblem that keeps every double's bits.
 
-/// Writes OctreeBasedCD::problem() to a file. Call it after a frame and before positions change:
-/// the capture then replays that frame.
-/// Errors   File if it cannot be written; an existing file is then unchanged. NonFinitePosition for
-///          a body that is placed beyond kLargestMeasure: captures hold positions in the world.
+/// Writes OctreeBasedCD::problem(): after a frame and before positions change, that frame.
+/// Errors   File, and an existing file is then unchanged; NonFinitePosition beyond kLargestMeasure.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const std::filesystem::path&);
 
-/// The same for the pair of an audit's failure alone. Call it before positions change, too.
+/// The same for one pair.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const AuditFailure&,
                             const std::filesystem::path&);
 
 /// Writes a problem to a file, with the errors of capture() and setUp().
 PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem::path&);
 
-/// Reads a capture.
-/// Errors   File, with the file's name and the reason: the file is missing, is no capture, has an
-///          unknown version, is truncated, or has content that an OctreeBasedCD refuses.
+/// Throws File, with name and reason, also for content that an OctreeBasedCD refuses.
 PALPATE_EXPORT CollisionProblem readCapture(const std::filesystem::path&);
 
-/// Makes an OctreeBasedCD from a problem, ready for detectCollision(). Geometry i has the id
-/// GeometryId{i}. Its octrees are built anew; contacts do not depend on their history.
+/// Ready for detectCollision(), with new octrees; geometry i has the id GeometryId{i}.
 /// Errors   those of the functions of OctreeBasedCD that add geometries and pairs.
 PALPATE_EXPORT OctreeBasedCD setUp(const CollisionProblem&);
 

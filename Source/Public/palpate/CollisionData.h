@@ -21,8 +21,7 @@ namespace palpate {
 //
 // Error    32 ulp of the largest coordinate difference of the vertices, and the rounding of
 //          positions at that time. Continuous adds timeTolerance times the relative motion.
-// Time     contacts at the step's end, by Proximity and Intersection, also in Auto, have the time
-//          1.
+// Time     contacts by Proximity and Intersection, also in Auto, are at the step's end: time 1.
 // Sign     a distance is negative where (1) radii overlap, (2) a shape overlaps, (3) by
 //          Intersection a vertex is behind the triangle; the normal is the winding normal in the
 //          interior, else on its side along the line through the closest points, (4) by
@@ -39,8 +38,8 @@ namespace palpate {
 //          the other surface, and impacts that leave it, have the side on which they leave; with
 //          Contacts::Distinct such vertices have contacts of Intersection only.
 // Bodies   where a step of Auto begins with two closed bodies deep in each other, all contacts have
-//          one direction along which they part; distance is along it to where the vertex leaves,
-//          negative until then.
+//          one direction along which they part. The distance is along it, negative until the vertex
+//          leaves.
 
 /// A segment {p, q} has the vertices {p, q, q}, a point p has {p, p, p}.
 struct VertexTriangleContact {
@@ -50,8 +49,7 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;  ///< unit, to the vertex; from it where it is behind the surface
   double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above.
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end.
-  /// Holds the closest point: what vertices with weights other than 0 span. Segments: EdgeAB,
-  /// CornerA, CornerB.
+  /// Spanned by the vertices with weights other than 0. Of a segment: EdgeAB or a corner.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -93,7 +91,7 @@ struct ShapeContact {
 
 /// At timeOfImpact: of Continuous, the first time near enough. Apart, the points are closest;
 /// overlapping, the normal is the direction of the shortest translation that separates.
-/// Error    pointA - pointB equals distance * normal; within 2e-3 of both sizes if a cylinder
+/// Error    pointA - pointB equals distance * normal, within 2e-3 of the sizes if a cylinder
 ///          overlaps.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second shape
@@ -122,8 +120,8 @@ PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 /// The contacts of one pair of geometries in the last frame. No function throws palpate::Error.
 /// Order    vertexTriangle by (vertex, triangle), triangleVertex by (triangle, vertex), edgeEdge by
 ///          (edgeA, edgeB), intersectingTriangles by (a, b), shape by (element, id, vertices).
-/// Valid    the object of OctreeBasedCD::collisionData() and its spans: until its next call that is
-///          not const.
+/// Valid    with its spans until the next call on the OctreeBasedCD that is not const; a copy
+///          stays.
 class PALPATE_EXPORT CollisionData {
  public:
   /// Of an answer by another engine, in the order above.
@@ -151,8 +149,7 @@ class PALPATE_EXPORT CollisionData {
 
   /// Vertices of the first geometry with triangles, segments or points of the second.
   std::span<const VertexTriangleContact> vertexTriangle() const;
-  /// Triangles, segments or points of the first with vertices of the second; empty for
-  /// self-collision.
+  /// Elements of the first geometry with vertices of the second; empty for self-collision.
   std::span<const VertexTriangleContact> triangleVertex() const;
   std::span<const EdgeEdgeContact> edgeEdge() const;  ///< of both geometries
   /// Those that intersect at the step's end, from Intersection, also in Auto. Each has a contact of
@@ -162,8 +159,7 @@ class PALPATE_EXPORT CollisionData {
   /// Elements with a shape, or a body by DistanceField or Proxy; no other list then has contacts. A
   /// particle that touches several triangles may have several, if Auto answers by Proxy.
   std::span<const ShapeContact> shape() const;
-  /// One contact if two shapes are at most the thickness apart; by Continuous, at some time of the
-  /// step.
+  /// One contact if two shapes are at most the thickness apart, by Continuous at any time.
   std::span<const ShapeShapeContact> shapeShape() const;
   /// The least timeOfImpact, also with earliestTimeOnly, or infinity. Linear in the contacts.
   double earliestTimeOfImpact() const;

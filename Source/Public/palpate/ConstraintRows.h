@@ -15,8 +15,8 @@
 namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
-/// Units    L. A solver keeps the gap at least h (Docs/HowTo/Solvers.md); h - gap(now) is the depth
-///          now.
+/// Units    L. A solver keeps the gap at least h (Docs/HowTo/Solvers.md). The depth is h -
+///          gap(now).
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
 ///          and the element's radius; p is the point of the shape's surface as law (1) moves it.
 /// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
@@ -27,11 +27,9 @@ namespace palpate {
 ///          (3) a step along this row alone, by inverse masses, to a gap g > 0 gives the signed
 ///          distance g, up to (g + radii) (4 s / e)^2: s is the longest displacement of a vertex; e
 ///          the triangle's least height, or the shorter edge times the sine of the edges' angle. A
-///          vertex behind a triangle, nearest to an edge or corner, gets a distance above 0 and at
-///          most g.
+///          vertex behind a triangle, next to an edge or corner, gets a distance in (0, g].
 struct ConstraintRow {
-  /// Numbers of the solver. If one occurs twice, only its first weight is not 0, unless a triangle
-  /// names it twice.
+  /// The solver's numbers. One may occur again with weight 0, or if a triangle names it twice.
   std::array<std::uint32_t, 4> vertices;
   std::array<double, 4> weights;  ///< 0: this vertex does not count
   Eigen::Vector3d normal;         ///< unit
@@ -40,8 +38,7 @@ struct ConstraintRow {
   PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;  ///< L
 };
 
-/// One geometry's vertices among a solver's, over the detected step. Empty for a shape or a field's
-/// body.
+/// One geometry's vertices in the detected step. Leave it empty for a shape or a field's body.
 struct SolverVertices {
   std::uint32_t first = 0;                       ///< the solver's number of vertex 0
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
@@ -116,15 +113,14 @@ using Tangents = std::array<Eigen::Vector3d, 2>;
 ///          most 2 e / |normal + z|.
 ///          (2) tangents are unit and perpendicular within 4 ulp, also next to -z.
 /// Source   Frisvad, Building an Orthonormal Basis from a 3D Unit Vector Without Normalization
-///          (2012). Difference: below the equator 1 + z comes from x and y, which is exact to
-///          rounding near -z.
+///          (2012). Difference: below the equator 1 + z comes from x and y, for accuracy near -z.
 PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal);
 
 /// The previous tangents after the shortest rotation from the previous normal to the unit normal.
 /// Laws     (1) |t - previous t| <= |normal - previous normal|, within 2^-40, for every normal.
 ///          (2) tangents are unit and perpendicular within 4 ulp, over any number of frames.
-///          (3) if a normal returns by another path, its tangents differ by the solid angle between
-///          the paths.
+///          (3) if a normal returns by another path, its tangents turn by the solid angle between
+///          both.
 /// Errors   none. tangentsOf(normal) if the previous tangents are zero or NaN. For opposite normals
 ///          the first tangent stays and the second turns.
 PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal, const Tangents& previous);

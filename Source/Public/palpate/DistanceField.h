@@ -18,12 +18,10 @@ struct DistanceFieldSettings {
   /// L, positive: what value() may be off by in the band. At most the band counts.
   double errorBound = 0.0;
   /// L, positive: up to which distance errorBound holds. Both are at least 2^-18 of the longest
-  /// side of the mesh's box with the band, and 2^-36 of its largest coordinate. The side is in
-  /// [2^-400, 2^400].
+  /// side of the box with the band, itself in [2^-400, 2^400], and 2^-36 of its largest coordinate.
   double band = 0.0;
   /// Bytes of the field and the build, without the queries' copy of the mesh; 0: no limit. A build
-  /// that needs more throws MemoryLimit before it allocates them; a field is about a quarter of its
-  /// build.
+  /// that needs more throws MemoryLimit before it allocates. A field needs a quarter of its build.
   std::size_t memoryLimit = std::size_t{1} << 31;
   /// In [0, 1024]; 0: one per core. The field does not depend on it.
   int threads = 0;
@@ -32,8 +30,7 @@ struct DistanceFieldSettings {
 };
 
 /// The signed distance from a triangle mesh, interpolated trilinearly in an octree with a proven
-/// error (Docs/DistanceFields.md). A field never changes. Copies share memory. Const functions are
-/// thread-safe.
+/// error (Docs/DistanceFields.md). A field never changes. Copies share memory. Any thread may read.
 class PALPATE_EXPORT DistanceField {
  public:
   /// Keeps no reference to the mesh. Inside a closed, consistently oriented mesh the winding number
@@ -50,8 +47,7 @@ class PALPATE_EXPORT DistanceField {
   std::size_t bytes() const;  ///< of memory that the field holds
   std::size_t cells() const;  ///< with corner values
 
-  /// Interpolated, negative inside. Continuous up to rounding, and to 2^-20 of the band between
-  /// cells.
+  /// Interpolated, negative inside. Continuous up to rounding, between cells to 2^-20 of the band.
   ///
   /// Let d be the exact signed distance.
   ///   |d| <= band   the value is within errorBound() of d.
@@ -62,13 +58,13 @@ class PALPATE_EXPORT DistanceField {
   /// Units    L. Throws NonFinitePosition.
   /// Cost     some tens of nanoseconds; allocates nothing.
   double value(const Eigen::Vector3d&) const;
-  /// Whether the sign of value() is reliable. In an open mesh: where every patch that closes it,
-  /// with a winding number below 5/8 in magnitude there, gives the same sign. Throws
-  /// NonFinitePosition.
+  /// Whether the sign of value() is reliable. Of an open mesh: every patch that closes it and has a
+  /// winding number below 5/8 in magnitude there gives this sign.
+  /// Errors   NonFinitePosition.
   bool signIsReliable(const Eigen::Vector3d&) const;
-  /// Of value(). It jumps at cells' faces, where the larger coordinates count, and at the band's
-  /// end. 0 where the value is the band; unit outside the domain, elsewhere roughly. Throws
-  /// NonFinitePosition.
+  /// Of value(). It jumps at the faces of cells, where the cell with the larger coordinates counts,
+  /// and at the band's end. It is 0 where the value is the band, and unit outside the domain.
+  /// Errors   NonFinitePosition.
   Eigen::Vector3d gradient(const Eigen::Vector3d&) const;
   /// value() of many points, with the same bits, on the calling thread.
   /// Errors   NonFinitePosition, with the point, such as "point 3"; InvalidSettings for another

@@ -10,36 +10,32 @@
 
 namespace palpate {
 
-/// The reason for an Error. Each function documents the codes that it throws. Docs/Errors.md has
-/// the cause and the remedy of each code.
+/// Docs/Errors.md has the cause and the remedy of each code.
 enum class ErrorCode {
   NonFinitePosition,   ///< A position is NaN, infinite or beyond kLargestMeasure.
   WrongPositionCount,  ///< The number of positions differs from the number of vertices.
-  /// An index names a vertex or element that does not exist. Or a segment or tetrahedron names one
-  /// vertex twice.
-  IndexOutOfRange,
-  UnknownGeometry,    ///< The geometry was never added, or was removed.
-  UnknownPair,        ///< The pair was never added, was removed, or was added in the other order.
-  DuplicatePair,      ///< The pair was added before, in this order or in the other.
-  InvalidSettings,    ///< A setting or argument is outside its range.
-  NotClosed,          ///< The geometry has no inside: see findMeshDefects().
-  UnsupportedMethod,  ///< The method or function does not exist for these geometries.
-  TooLarge,           ///< There are more vertices, elements, geometries or pairs than ids can name.
-  NotAvailable,       ///< The answer was not computed or not kept, or a resource is missing.
-  File,               ///< A file cannot be read or written, or has the wrong content.
-  InvalidRadius,      ///< A radius is not in [0, kLargestMeasure], or not one per vertex.
-  InvalidShape,       ///< A shape has an invalid measure, direction or number of points.
-  InvalidTransform,   ///< No rotation, or a translation that is beyond kLargestMeasure.
-  SharedFace,         ///< A face belongs to more than two tetrahedra.
-  InvalidCall,        ///< The object was moved from, is outdated, or is at work on another call.
-  ImpactRemains,      ///< Features touch within a step, and StepGuard cannot shorten their steps.
-  MemoryLimit,        ///< The answer needs more memory than the limit that you set.
-  Cancelled,          ///< A progress callback returned false.
+  IndexOutOfRange,     ///< no such vertex or element, or one vertex twice in an element
+  UnknownGeometry,     ///< The geometry was never added, or was removed.
+  UnknownPair,         ///< The pair was never added, was removed, or was added in the other order.
+  DuplicatePair,       ///< The pair was added before, in this order or in the other.
+  InvalidSettings,     ///< A setting or argument is outside its range.
+  NotClosed,           ///< The geometry has no inside: see findMeshDefects().
+  UnsupportedMethod,   ///< The method or function does not exist for these geometries.
+  TooLarge,          ///< There are more vertices, elements, geometries or pairs than ids can name.
+  NotAvailable,      ///< The answer was not computed or not kept, or a resource is missing.
+  File,              ///< A file cannot be read or written, or has the wrong content.
+  InvalidRadius,     ///< A radius is not in [0, kLargestMeasure], or not one per vertex.
+  InvalidShape,      ///< A shape has an invalid measure, direction or number of points.
+  InvalidTransform,  ///< No rotation, or a translation that is beyond kLargestMeasure.
+  SharedFace,        ///< A face belongs to more than two tetrahedra.
+  InvalidCall,       ///< The object was moved from, is outdated, or is at work on another call.
+  ImpactRemains,     ///< Features touch within a step, and StepGuard cannot shorten their steps.
+  MemoryLimit,       ///< The answer needs more memory than the limit that you set.
+  Cancelled,         ///< A progress callback returned false.
 };
 PALPATE_EXPORT const char* toString(ErrorCode) noexcept;  ///< its name, or "unknown"
 
-/// The exception that the library throws for an invalid call. what() is a sentence that names the
-/// geometry, the element and the value at fault. The call leaves the object unchanged.
+/// Invalid calls throw it and change nothing. what() names geometry, element and value at fault.
 class PALPATE_EXPORT Error : public std::runtime_error {
  public:
   /// sentence: the text of what().
@@ -47,11 +43,9 @@ class PALPATE_EXPORT Error : public std::runtime_error {
         std::optional<std::size_t> element = {});
 
   ErrorCode code() const noexcept { return m_code; }
-  /// The geometry at fault, if there is one. A function that adds a geometry names the id that the
-  /// geometry would have had.
+  /// At fault, if any; of a function that adds a geometry, the id that it would have had.
   std::optional<GeometryId> geometry() const noexcept { return m_geometry; }
-  /// The index of the vertex, element, tetrahedron or hull point at fault, if there is one. The
-  /// sentence says which of these it is.
+  /// Of the vertex, element, tetrahedron or hull point at fault, if any; the sentence says which.
   std::optional<std::size_t> element() const noexcept { return m_element; }
 
  private:

@@ -8,30 +8,24 @@
 
 namespace palpate {
 
-/// Runs the library's work on threads. Several OctreeBasedCD objects and the program itself may
-/// share one executor: see Settings::executor. Derive from it to use your own threads.
-/// Needs    run() must accept calls from any thread, from several threads at once, and from inside
-///          a task. In each case the calling thread or a free thread must make progress. Calling
-///          threads should run tasks, too.
-/// Laws     (1) results do not depend on the executor. Tasks may run in any order and on any
-///          thread, also all on the calling thread.
-/// Errors   An exception that run() throws reaches the caller of the library after all tasks that
-///          had begun have ended. If run() returns before it has run every task, the library throws
-///          InvalidSettings. A task that runs later than that does nothing; it must run before the
-///          OctreeBasedCD is destroyed, or never.
+/// Runs the library's work on threads of yours. Objects and the program may share an executor.
+/// Needs    run() accepts calls from any thread, from several at once, and from inside a task; in
+///          each case the calling thread or a free one makes progress.
+/// Laws     (1) results do not depend on the executor: tasks may run in any order, on any thread.
+/// Errors   an exception of run() reaches the caller after all tasks that began have ended. If
+///          run() returns before all tasks ran, the library throws InvalidSettings. A later task
+///          does nothing, and must not run after the OctreeBasedCD is destroyed.
 class PALPATE_EXPORT Executor {
  public:
   using Task = void (*)(void* context, std::size_t index) noexcept;
 
   virtual ~Executor();
 
-  /// The number of tasks that can run at the same time, including one on the calling thread. It is
-  /// at least 1 and never changes during the life of the executor.
+  /// Tasks that can run at once, with one on the calling thread: at least 1, constant.
   virtual int concurrency() const noexcept = 0;
 
-  /// Calls task(context, index) once for each index in [0, count), and returns when all calls have
-  /// ended. Everything that the caller wrote before is visible to every task. Everything that the
-  /// tasks wrote is visible to the caller afterwards.
+  /// Calls task(context, index) once for each index in [0, count) and returns when all have ended.
+  /// Tasks see what the caller wrote before; the caller sees what they wrote.
   virtual void run(std::size_t count, Task task, void* context) = 0;
 
  protected:
@@ -40,18 +34,15 @@ class PALPATE_EXPORT Executor {
   Executor& operator=(const Executor&) = default;
 };
 
-/// Makes the library's own thread pool (oneTBB where the library is built with it).
+/// The library's own pool, by oneTBB if built with it.
 ///
-/// threads: how many threads run tasks at once, including the caller of run(), in [1, 1024]; 0: one
-/// per core. If the system refuses to start so many, concurrency() returns the smaller number. A
-/// thread that waits for the end of its own loop may run a task of another loop meanwhile. In the
-/// child of a fork() the pool has no threads, and run() calls all tasks on the calling thread.
-/// Errors   InvalidSettings if `threads` is out of range. In the child of a fork() that a task
-///          called, run() throws NotAvailable if other threads had begun tasks of its loop.
+/// threads: that run tasks at once, with the caller of run(), in [1, 1024]; 0: one per core.
+/// concurrency() may be smaller. In the child of a fork() the calling thread runs all tasks.
+/// Errors   InvalidSettings for `threads`. In the child of a fork() in a task, run() throws
+///          NotAvailable if other threads had begun its tasks.
 PALPATE_EXPORT std::shared_ptr<Executor> makeThreadPool(int threads = 0);
 
-/// The instruction set that the library uses in this process: "AVX-512", "AVX2", "SSE4" or
-/// "Scalar". The library selects it at run time. Results do not depend on it.
+/// The instruction set in use: "AVX-512", "AVX2", "SSE4" or "Scalar". Results do not depend on it.
 PALPATE_EXPORT std::string simdPath();
 
 }  // namespace palpate

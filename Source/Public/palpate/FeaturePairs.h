@@ -9,8 +9,7 @@
 
 namespace palpate {
 
-/// What holds a point: corner i has the value i, the edge from it to corner i + 1 mod 3 the value 3
-/// + i.
+/// What holds a point. Corner i has the value i, the edge from it to the next corner 3 + i.
 enum class TriangleFeature : std::uint8_t {
   CornerA,
   CornerB,
@@ -41,13 +40,11 @@ struct VertexTriangleDistance {
 /// Returns  all within 8 ulp of the largest coordinate difference of the positions, the normal
 ///          within that divided by the distance; the feature exactly. At distance 0 the normal is
 ///          the winding normal, or without area the axis of least extent, x before y before z.
-/// Laws     (1) permuting corners, mirroring an axis and scaling by powers of two, where they are
-///          exact, give the same bits. Weights may differ by 2^-53 if corners are mirror images of
-///          each other.
-///          (2) if an edge or corner holds the point, every triangle that shares it gives the same
+/// Laws     (1) permuting corners, mirroring an axis and scaling by powers of two, where exact,
+///          give the same bits. If corners are mirror images, weights may differ by 2^-53.
+///          (2) if an edge or corner holds the point, each triangle that shares it gives the same
 ///          bits.
-/// Errors   none. A triangle without area counts as its longest edge or corner. NaN or infinity
-///          gives NaN.
+/// Errors   none. A triangle without area is its longest edge or corner. NaN or infinity gives NaN.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated
 ///          Newton step in the feature's own coordinates. See Docs/Accuracy.md.
@@ -75,8 +72,7 @@ struct EdgeEdgeDistance {
 ///          edges side by side have their closest points in the middle of the shared stretch.
 /// Laws     (1) swapping an edge's ends turns its weight w into 1 - w, and reverses the normal at
 ///          distance 0 of edges that are not parallel; all else has the same bits.
-///          (2) swapping edges swaps the weights and reverses difference and normal, unless their
-///          ends are equal.
+///          (2) swapping different edges swaps the weights and reverses difference and normal.
 /// Errors   none. NaN or infinity in gives NaN out.
 /// Floating point  as for vertexTriangleDistance().
 PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
@@ -85,8 +81,7 @@ PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
                                                  const Eigen::Vector3d& q1);
 
 /// Whether two triangles have a common point, also by touching, decided exactly for finite doubles.
-/// A triangle without area is the segment or point that it covers. Without meaning for NaN or
-/// infinity.
+/// A triangle without area is the segment or point that it covers. NaN has no meaning.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Cost     bounded: least where floating point decides, most where only exact sums do.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
@@ -97,8 +92,7 @@ PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::V
 struct TimeOfImpactSettings {
   /// L, finite: an impact is a distance of at most this; if not positive, a touch, decided exactly.
   double minimumDistance = 0.0;
-  /// Fraction of the step, in [2^-50, 1], else the nearer end: how much too early the result may
-  /// be.
+  /// Fraction of the step, in [2^-50, 1], else the nearer end: how early the result may be.
   double timeTolerance = 1e-6;
 };
 
@@ -114,16 +108,14 @@ struct TimeOfImpactSettings {
 ///          not change whether there is an impact.
 /// Errors   none.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
-/// Cost     bounded: most where floating point cannot decide; d > 0: at most 1 / timeTolerance
-///          steps.
+/// Cost     bounded, most where floating point cannot decide; for d > 0 by 1 / timeTolerance steps.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,
     const Eigen::Vector3d& cBefore, const Eigen::Vector3d& vNow, const Eigen::Vector3d& aNow,
     const Eigen::Vector3d& bNow, const Eigen::Vector3d& cNow, const TimeOfImpactSettings& = {});
 
 /// The same for edges p0 p1 and q0 q1 with their ends, also parallel or without length.
-/// Laws     (2) swapping the edges, or the ends of either, does not change whether there is an
-///          impact.
+/// Laws     (2) swapping edges, or ends of an edge, does not change whether there is an impact.
 PALPATE_EXPORT std::optional<double> edgeEdgeTimeOfImpact(
     const Eigen::Vector3d& p0Before, const Eigen::Vector3d& p1Before,
     const Eigen::Vector3d& q0Before, const Eigen::Vector3d& q1Before, const Eigen::Vector3d& p0Now,

@@ -4,7 +4,7 @@
 
 namespace palpate {
 
-/// Bytes that an OctreeBasedCD holds, by what they are for. Settings::memoryLimit limits `total`.
+/// Bytes of an OctreeBasedCD. Settings::memoryLimit limits `total`.
 struct MemoryUse {
   std::size_t geometries = 0;  ///< topologies, positions, pairs
   std::size_t octrees = 0;     ///< with the floats from which their boxes come, and leaves of Proxy
@@ -16,11 +16,9 @@ struct MemoryUse {
   std::size_t total = 0;
 };
 
-/// Times and counts of one frame, over all geometries and pairs. A frame is one detectCollision()
-/// with the updates before it.
+/// Of one detectCollision() with the updates before it, over all geometries and pairs.
 struct FrameStatistics {
-  /// Wall-clock milliseconds of the frame. Where threads work on two stages at once, the time is
-  /// divided in proportion to their work.
+  /// Wall-clock milliseconds. Stages at the same time are divided in proportion to their work.
   struct Stages {
     double boxes = 0;        ///< from positions to float boxes
     double octree = 0;       ///< keys, sort, nodes, fitted boxes
@@ -33,34 +31,22 @@ struct FrameStatistics {
 
   std::size_t geometries = 0;
   std::size_t triangles = 0, segments = 0, points = 0;  ///< elements of all geometries
-  /// vertices that belong to no enabled element, so that no pair tests them
-  std::size_t untestedVertices = 0;
+  std::size_t untestedVertices = 0;                     ///< of no enabled element
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
-  /// Element pairs that the narrow phase received. Fewer than those of forEachCandidate() for two
-  /// placed bodies: their boxes are compared in the frame of one body.
+  /// For the narrow phase; of two placed bodies fewer than those of forEachCandidate().
   std::size_t candidatePairs = 0;
-  /// vertex-triangle and edge-edge pairs that the candidates own. Intersection decides each
-  /// triangle pair as a whole and counts none.
-  std::size_t featurePairs = 0;
+  std::size_t featurePairs = 0;           ///< owned by candidates; Intersection counts none
   std::size_t contacts = 0;               ///< of all lists of contacts
   std::size_t intersectingTriangles = 0;  ///< entries of CollisionData::intersectingTriangles()
-  /// decisions that floating point left open and exact arithmetic made
-  std::size_t exactDecisions = 0;
-  /// triangle pairs that were tested for Validity::startedApart only: the candidates of initial
-  /// intersection checks, and the triangles around contacts
-  std::size_t validityPairs = 0;
-  MemoryUse memory;  ///< at the frame's end
-  /// The most of each since the object was made, or since releaseMemory(). They may be of different
-  /// times: their sum may exceed `total`.
-  MemoryUse peakMemory;
+  std::size_t exactDecisions = 0;         ///< where floating point left them open
+  std::size_t validityPairs = 0;          ///< tested for Validity::startedApart only
+  MemoryUse memory;                       ///< at the frame's end
+  MemoryUse peakMemory;                   ///< since the start or releaseMemory(), each at its time
 };
 
-/// Time and counts of one pair in the last detectCollision(). All but `contacts` are 0 for a pair
-/// whose answer still holds, because nothing changed.
+/// Of the last detection. All but `contacts` are 0 for a pair whose answer still holds.
 struct PairStatistics {
-  /// Of all threads together: the search for candidates, the narrow phase and the order. Not the
-  /// octrees, which pairs share.
-  double milliseconds = 0;
+  double milliseconds = 0;  ///< of all threads together, without octrees
   std::size_t candidatePairs = 0, featurePairs = 0, exactDecisions = 0;  ///< as FrameStatistics
   std::size_t contacts = 0;                                              ///< in all lists
 };

@@ -25,12 +25,10 @@ struct OctreeStatistics {
   std::size_t bytes = 0;  ///< memory of boxes, keys, nodes and scratch
 };
 
-/// A view of the octrees of the last update, for diagnostics and display. Each geometry with
-/// elements has one; analytical shapes have none.
-/// Units    L. If setTransform() placed the geometry, boxes are in the body's frame.
-/// Valid    as long as the OctreeBasedCD to which it belongs. Each update changes what it shows. If
-///          an exception ended an update, the geometries concerned have no nodes until the next
-///          one.
+/// A view of the octrees of all geometries with elements, for diagnostics and display.
+/// Units    L, in the body's frame if setTransform() placed the geometry.
+/// Valid    as long as its OctreeBasedCD. Updates change it; after one that an exception ended, the
+///          geometries concerned have no nodes.
 /// Threads  as const functions of OctreeBasedCD, but not while queries() updates octrees.
 /// Source   Docs/Algorithms/LooseOctree.md.
 class PALPATE_EXPORT LooseOctree {
@@ -47,20 +45,15 @@ class PALPATE_EXPORT LooseOctree {
     std::span<const std::uint32_t> elements;  ///< in this node itself; valid until the next update
   };
 
-  /// The nodes of one geometry that have elements in their subtree. A parent comes before its
-  /// children. Empty for a geometry without nodes, or an unknown one.
-  /// Cost     linear in the nodes.
+  /// With elements in their subtrees, parents before children; empty for unknown ids. Linear.
   std::vector<Node> nodes(GeometryId) const;
   std::vector<GeometryId> geometries() const;  ///< those with nodes, ascending
   Update lastUpdate(GeometryId) const;         ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
-  /// Checks every invariant of the trees. Each element is in exactly one node and within the fitted
-  /// boxes above it. Fitted boxes are tight. Links agree in both directions. Free and used blocks
-  /// add up to those allocated. After a rebuild, each element is in the cell of its centre and
-  /// inside that cell's loose bounds, up to 2^-22 of the root's edge.
-  /// Returns  one sentence for each violation.
-  /// Cost     linear in the elements.
+  /// One sentence for each violated invariant: each element in one node and in tight fitted boxes,
+  /// links both ways, counts of blocks; after a rebuild, elements in their centre's cell and its
+  /// loose bounds up to 2^-22 of the root's edge. Linear in the elements.
   std::vector<std::string> validate() const;
 
   struct State;  ///< not part of the interface

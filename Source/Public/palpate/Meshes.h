@@ -12,19 +12,16 @@
 
 namespace palpate {
 
-/// The sorted edges, lower vertex first, because of which a mesh is not closed and consistently
-/// oriented.
+/// Sorted edges, lower vertex first, because of which a mesh is not closed and oriented.
 struct MeshDefects {
   std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
   std::vector<Segment> flipped;  ///< edges that both triangles traverse in the same direction
   std::vector<Segment> shared;   ///< edges of three triangles or more
   /// Whether two triangles or more share no vertex at all, as in an STL file: weld() joins them.
   bool unwelded = false;
-  /// By positions: whether a closed mesh is wound inward, with a volume below 0 by more than
-  /// rounding.
+  /// By positions: a closed mesh is wound inward, its volume negative by more than rounding.
   bool insideOut = false;
-  /// By positions, unless unwelded: triangles of parts not connected by vertices that intersect or
-  /// touch.
+  /// By positions, unless unwelded: triangles that meet, of parts not connected by vertices.
   std::vector<ElementPair> overlapping;
 
   /// whether no edge is at fault
@@ -34,14 +31,13 @@ struct MeshDefects {
 /// By vertex indices. A triangle that names a vertex twice has no edges. No errors.
 PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
 /// By positions, too. Throws as OctreeBasedCD::addTriangleMesh() for geometry 0.
-/// Cost     grows with the pairs of triangles whose boxes overlap: 1 s for 20,000 around one
-///          vertex.
+/// Cost     grows with the overlapping boxes of triangles: 1 s for 20,000 around one vertex.
 PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 
 /// Which points are inside a body.
 enum class InsideRule {
-  /// Where the winding number is not 0, decided exactly. The mesh must be tetrahedral or closed and
-  /// consistently oriented.
+  /// Where the winding number is not 0, decided exactly. The mesh is tetrahedral, or closed with a
+  /// consistent orientation.
   Closed,
   /// Where the generalised winding number of any triangles is at least 1/2 in magnitude, up to a
   /// surface that spans a hole. Closed bodies: as Closed.
@@ -52,8 +48,7 @@ PALPATE_EXPORT const char* toString(InsideRule) noexcept;  ///< its name, or "un
 /// Values out of range throw InvalidSettings.
 struct InsideSettings {
   InsideRule rule = InsideRule::Closed;
-  /// In [0, 1/2). WindingNumber: what is this near to 1/2 is found with InsideVertex::decided
-  /// false.
+  /// In [0, 1/2). WindingNumber: this near to 1/2, InsideVertex::decided is false.
   double margin = 0.0;
 };
 
@@ -69,8 +64,7 @@ struct InsideVertex {
   friend bool operator==(const InsideVertex&, const InsideVertex&) = default;
 };
 
-/// The faces of exactly one tetrahedron, with which a tetrahedral mesh collides. triangles[i] is of
-/// tetrahedra[i].
+/// The faces of one tetrahedron only, which collide. triangles[i] belongs to tetrahedra[i].
 /// Order    by tetrahedron, then by the corner that the face lacks.
 /// Winding  outward at rest, decided exactly, for any order of corners; deformation does not change
 ///          it. Tetrahedra without volume are wound as the nearest ones with volume over faces, or

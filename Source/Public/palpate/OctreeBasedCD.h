@@ -47,10 +47,8 @@ struct CollisionPair {
 ///          frame leaves the last answers readable. After a move, or from a predicate or callback
 ///          of this object, every function but assignment and destruction throws InvalidCall.
 ///          MemoryLimit: see Settings.
-/// Valid    returned spans and references: until the next call that is not const, unless said
-///          otherwise.
-/// Threads  const functions are safe together while no other function runs. Objects share only
-///          executors.
+/// Valid    returned spans and references: until the next call that is not const, if not said.
+/// Threads  const functions may run at once while no other function does. Objects share executors.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 class PALPATE_EXPORT OctreeBasedCD {
  public:
@@ -67,12 +65,11 @@ class PALPATE_EXPORT OctreeBasedCD {
                              std::span<const Triangle> triangles);
   /// Pairs and methods treat its surface() as a triangle mesh with the same vertex ids.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex, or one twice in a tetrahedron;
-  ///          SharedFace for more than two tetrahedra at a face; TooLarge: 2^28 vertices, 2^26
-  ///          tetrahedra.
+  ///          SharedFace for more than two tetrahedra at a face; TooLarge: 2^28 vertices or 2^26
+  ///          cells.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron> tetrahedra);
-  /// Radii: L, in [0, kLargestMeasure], one for all or one per vertex, linear along segments,
-  /// constant.
+  /// Radii: L, in [0, kLargestMeasure], constant, one or one per vertex, linear along segments.
   /// Lists    edgeEdge() has segments as edges. In vertexTriangle() and triangleVertex() segment
   ///          {p, q} is the triangle {p, q, q}. The thickness and the radii where the centre lines
   ///          come closest limit the distance.
@@ -84,20 +81,18 @@ class PALPATE_EXPORT OctreeBasedCD {
                          std::span<const Segment> segments, std::span<const double> radii);
   /// Point i is vertex i. Radii are as in addLineMesh().
   /// Lists    in vertexTriangle() and triangleVertex() point p is the triangle {p, p, p}. Of two
-  ///          point sets the first one has the vertices; of one with itself, the lower point is the
-  ///          vertex.
+  ///          point sets the first has the vertices; of one with itself the lower point is it.
   /// Errors   NonFinitePosition; InvalidRadius, also for their number; TooLarge: 2^28 points.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// setTransform() places it. Contacts are in CollisionData::shape() and shapeShape().
   /// Errors   InvalidShape for a measure out of range.
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
-  /// setTransform() places it. Pairs need Method::DistanceField; queries refuse it. Throws
-  /// InvalidSettings for null.
+  /// setTransform() places it. Pairs need Method::DistanceField. Queries refuse it.
+  /// Errors   InvalidSettings for null.
   GeometryId addDistanceField(std::shared_ptr<const DistanceField>);
   /// Attaches a field, in the body's frame, to a rigid triangle or tetrahedral mesh; null detaches
-  /// it. Then setPositions(), setTriangles(), setTetrahedra() and setDisabledElements() throw
-  /// UnsupportedMethod.
+  /// it. Calls that change positions, topology or disabled elements then throw UnsupportedMethod.
   /// Errors   UnsupportedMethod for another type, for disabled elements, or if a pair by
   ///          Method::DistanceField needs the old field or its larger band; InvalidSettings, with
   ///          the vertex, if the field at a triangle's vertex exceeds the error bound.
@@ -129,8 +124,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
   /// Sets topology and the positions at both ends of the step. Enables all elements.
-  /// Errors   UnsupportedMethod for another type; those of addTriangleMesh(); TooLarge for
-  ///          restDistance.
+  /// Errors   UnsupportedMethod for another type; as addTriangleMesh(); TooLarge for restDistance.
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   /// The same, with the errors of addTetrahedralMesh().
@@ -157,15 +151,13 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A pair that does not collide has no contacts, no candidates and no cost, and is not trusted.
   /// Errors   InvalidSettings for Sidedness::Outer of lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
-  /// Disables these elements, of tetrahedral meshes triangles of surface(), and enables all others.
-  /// A vertex or edge is tested while an enabled element holds it. Queries search disabled
-  /// elements, too.
+  /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others. A vertex
+  /// or edge is tested while an enabled element holds it. Queries search disabled ones.
   /// Errors   IndexOutOfRange.
   /// Cost     linear in the elements.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
-  /// a == b: self-collision, without features that share a vertex. Results have ids in the order
-  /// (a, b).
+  /// a == b: self-collision, without features that share a vertex. (a, b) orders ids in results.
   /// Errors   UnsupportedMethod for types that the method does not answer, and for a placed
   ///          geometry with itself; InvalidSettings; DuplicatePair; TooLarge for restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
@@ -192,8 +184,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Passes batches to f(std::span<const ElementPair>): all pairs of enabled elements whose boxes,
   /// inflated by half of Validity::effectiveThickness and by the largest radius, overlap; over the
   /// whole step if the method needs it. Rounding may add pairs. (a, b) in either order.
-  /// Order    none. `a` is of the pair's first geometry. Of a geometry with itself a < b, without a
-  ///          common vertex.
+  /// Order    none. `a` is of the pair's first geometry; in self-collision a < b, without a common
+  ///          vertex.
   /// Threads  calls of f come one at a time, from several threads.
   /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f calls this
   ///          object; those of f.
@@ -251,16 +243,14 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Of the last detection; (a, b) in either order. Throws UnknownPair.
   PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
   const Settings& settings() const;
-  /// JSON in the Trace Event Format: stages, pairs and jobs of the last Settings::traceFrames
-  /// detections.
+  /// JSON in the Trace Event Format: stages, pairs and jobs of Settings::traceFrames detections.
   /// Errors   NotAvailable if traceFrames is 0; File, and an existing file is then unchanged.
   void writeTrace(const std::filesystem::path&) const;
   /// Differences from brute force in the sample of the last detection: faults of this library.
   /// AuditFailure::fileError names a capture that was not written.
   std::span<const AuditFailure> auditFailures() const;
-  /// A copy of what the next detection computes from, with placed deforming meshes in the world.
-  /// Throws NonFinitePosition if they exceed kLargestMeasure there, also of functions that take the
-  /// problem.
+  /// A copy of all that the next detection reads, with placed deforming meshes in the world. Beyond
+  /// kLargestMeasure there, functions that take the problem throw NonFinitePosition.
   CollisionProblem problem() const;
 
  private:
@@ -276,8 +266,7 @@ class PALPATE_EXPORT OctreeBasedCD {
 };
 
 /// The contacts of two meshes without a step, on one thread.
-/// Errors   UnsupportedMethod for Method::Continuous; those of addTriangleMesh() and
-///          addCollisionPair().
+/// Errors   UnsupportedMethod for Continuous; those of addTriangleMesh() and addCollisionPair().
 PALPATE_EXPORT CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                                              const PairSettings& = {});
 

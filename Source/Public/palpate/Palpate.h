@@ -1,7 +1,6 @@
 #pragma once
 
-// Includes all headers of the library. Those of optional targets, such as Palpate::Simplify, are
-// not among them.
+// Includes all headers of the library but those of optional targets, such as Palpate::Simplify.
 #include <palpate/AnalyticalGeometry.h>
 #include <palpate/ArrayAdapter.h>
 #include <palpate/Capture.h>

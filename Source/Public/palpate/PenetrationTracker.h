@@ -39,12 +39,12 @@ struct TrackedVertex {
 /// Finds the vertices of one geometry that are inside another, a closed body, with directions that
 /// are stable over time. Call update() in each step, after setPositions().
 /// Laws     (1) the depth is at most kMaxDepthRatio times the least depth.
-///          (2) only a direction that Jumped turns further than kMaxTurn + m. m is the distance of
-///          the vertex from its last surface point over the square root of the last depth times the
-///          least depth now.
-/// Method   the last direction turns with the triangle of its surface point. The nearest is taken
-///          within kMaxTurn + m of it (None), else the last within kMaxDepthRatio (Kept), else the
-///          nearest (Jumped).
+///          (2) only a direction that Jumped turns further than kMaxTurn + m. m is the vertex's
+///          distance from its last surface point over the root of the last depth times the least
+///          one.
+/// Method   the last direction turns with the triangle of its surface point. Taken is the nearest
+///          within kMaxTurn + m of it (None), else the last in kMaxDepthRatio (Kept), else the
+///          nearest.
 /// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
  public:
@@ -56,8 +56,7 @@ class PALPATE_EXPORT PenetrationTracker {
 
   /// The directions of this step, by vertex, valid until the next call. Repeated calls in a step
   /// continue from the last earlier step with queries of the same OctreeBasedCD.
-  /// Errors   those of SpatialQueries::findInsideVertices(), which change nothing; InvalidCall
-  ///          after a move.
+  /// Errors   those of findInsideVertices(), which change nothing; InvalidCall after a move.
   std::span<const TrackedVertex> update(const SpatialQueries&);
 
  private:

@@ -88,8 +88,7 @@ enum class Method {
   /// A point set, first, with a rigid triangle or tetrahedral mesh, in CollisionData::shape():
   /// particles at most the thickness and radius away at the step's end, within errorBound(). In an
   /// octree's leaves, planes stand for the surface where proven to be within
-  /// PairSettings::allowedError. Around closed meshes distances have a sign, to
-  /// Validity::proxyDepth.
+  /// PairSettings::allowedError. Around closed meshes distances have a sign, down to proxyDepth.
   /// Cost     the first detection after setTriangles() or new settings builds leaves: seconds of
   ///          processor time for 500,000 triangles. A frame makes no octree of the particles.
   /// Errors   detectCollision() throws UnsupportedMethod if the body's positions changed, TooLarge
@@ -143,8 +142,7 @@ struct PairSettings {
   double thickness = 0.0;
   Contacts contacts = Contacts::Distinct;  ///< Intersection reports all
   /// For a triangle, tetrahedral or line mesh with itself, else 0: features nearer than this along
-  /// edges, at the positions when topology was set, are no contacts. More than 2^28 pairs:
-  /// TooLarge.
+  /// edges, at the positions when topology was set, are no contacts. Over 2^28 pairs: TooLarge.
   double restDistance = 0.0;
   /// What an answer may be off by. Proxy needs a positive value. Auto answers by an attached field
   /// or proxy within it where that proves that nothing touches in the step. Others accept 0.

@@ -26,8 +26,7 @@ struct SurfacePoint {
   std::uint32_t element = kNoElement;     ///< triangle, segment or point; kNoElement for a shape
   std::array<std::uint32_t, 3> vertices;  ///< {p, q, q} of a segment, {p, p, p} of a point
   Eigen::Vector3d weights;                ///< of the vertices; at least 0, sum 1
-  /// L: on the triangle, centre line or point. If a segment's radii differ: the nearest ball's
-  /// centre.
+  /// L: on the triangle, centre line or point; if radii differ, the nearest ball's centre.
   Eigen::Vector3d position;
   double distance;  ///< L, less the radius of lines and points
   /// Unit, outward, also at distance 0: the face's winding normal, or the angle-weighted sum around
@@ -64,8 +63,7 @@ struct RayHit {
   bool crosses;
 };
 
-/// The first hit, and its element's vertex and edge nearest to it: kNoElement for a shape, {p, p}
-/// for a point.
+/// The first hit with its element's nearest vertex and edge; kNoElement for a shape.
 struct Pick {
   RayHit hit;
   std::uint32_t vertex;
@@ -99,8 +97,7 @@ struct Penetration {
   bool intersecting;  ///< the bodies' insides have a common point, decided exactly for meshes
   Eigen::Vector3d direction;  ///< unit; 0 if not intersecting
   double depth;  ///< L: moving a by depth * direction separates the bodies; 0 if not intersecting
-  /// The points that meet last: a.position + depth * direction is at b.position. If not
-  /// intersecting: kNoElement.
+  /// Meet last: a.position + depth * direction is b.position. kNoElement if not intersecting.
   SurfacePoint a, b;
   bool minimal;  ///< no shorter translation separates the bodies, within the stated error
 };
@@ -109,8 +106,7 @@ struct Penetration {
 struct PathInterval {
   GeometryId body;
   double enter, leave;
-  /// kNoElement for a shape, where the path starts or ends inside, and of a tetrahedral mesh off
-  /// its surface.
+  /// kNoElement for a shape, at a path's end inside, and in a tetrahedral mesh off its surface.
   std::uint32_t entryElement, exitElement;
 };
 
@@ -132,11 +128,9 @@ struct PathClearance {
 ///          UnknownGeometry; NonFinitePosition, also beyond kLargestMeasure.
 class PALPATE_EXPORT SpatialQueries {
  public:
-  /// The nearest surface point within maxDistance (L), on the lowest of equally near elements.
-  /// Exact.
+  /// The nearest surface point within maxDistance (L), on the lowest of equal elements. Exact.
   /// Errors   NonFinitePosition; InvalidSettings if maxDistance is negative or NaN.
-  /// Cost     about logarithmic in the elements. It allocates only integers that compare almost
-  ///          equal distances.
+  /// Cost     about logarithmic in the elements. Only exact comparisons of distances allocate.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
   /// The same on all threads. A point without an answer has an infinite distance.
@@ -148,15 +142,12 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   those of closestPoint(); InvalidSettings if k is below 1.
   void nearestElements(GeometryId, const Eigen::Vector3d& point, int k,
                        std::vector<SurfacePoint>& out, double maxDistance = kInfinity) const;
-  /// Whether a point is inside by InsideSettings. An undecided winding number counts as inside.
-  /// With InsideRule::Closed the surface of a triangle mesh is outside, the boundary of a
-  /// tetrahedron inside.
+  /// Whether a point is inside. An undecided winding number counts as inside. With Closed the
+  /// surface of a triangle mesh is outside, the boundary of a tetrahedron inside.
   /// Errors   those of findInsideVertices(); NonFinitePosition.
-  /// Cost     the first call after a change prepares the body: for Closed, only a change of
-  ///          topology.
+  /// Cost     the first call after a change prepares the body; for Closed, after one of topology.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
-  /// Negative where contains() holds. Throws as contains(), and NotClosed for a body without
-  /// elements.
+  /// Negative where contains() holds. Throws as contains(), and NotClosed without elements.
   SignedDistance signedDistance(GeometryId body, const Eigen::Vector3d& point,
                                 const InsideSettings& = {}) const;
   /// The same on all threads, with the errors of closestPoints(), too.
@@ -167,8 +158,7 @@ class PALPATE_EXPORT SpatialQueries {
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
 
-  /// The first hit. Rays are watertight: none passes between triangles that share an edge or
-  /// vertex.
+  /// Rays are watertight: none passes between triangles that share an edge or vertex.
   /// Errors   NonFinitePosition; InvalidSettings for a direction of length 0, or a tMin that is not
   ///          finite or exceeds tMax.
   /// Cost     about logarithmic in the elements.
@@ -190,8 +180,7 @@ class PALPATE_EXPORT SpatialQueries {
                    std::vector<std::uint32_t>& elements) const;
   /// The contacts of a pair of both by Method::Proximity and Contacts::Distinct, as in shape().
   /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
-  /// Cost     follows the elements near the shape. A repeated call allocates only for another box
-  ///          or hull.
+  /// Cost     follows the elements near the shape. Only another box or hull allocates again.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Pose&, double thickness,
                 std::vector<ShapeContact>& out) const;
   /// The contacts of a pair (geometry, mesh) by Method::Proximity and Contacts::Distinct, without
@@ -223,14 +212,12 @@ class PALPATE_EXPORT SpatialQueries {
   ///          a plane: no translation is shorter by 2^-36 of it. Other depths are upper bounds.
   /// Errors   NotClosed, with the first edge, for what has no inside; InvalidSettings if both are
   ///          the same; UnsupportedMethod for two planes.
-  /// Cost     some hundred rays and ten searches of intersections: milliseconds for 3,000 triangles
-  ///          each.
+  /// Cost     some hundred rays and ten searches of intersections: some ms for 3,000 triangles.
   Penetration penetration(GeometryId a, GeometryId b) const;
   /// Follows a ball, of radius 0 a point, along a polyline. It is in a body from its first touch
   /// until it neither touches nor is inside by contains(). A point that only touches is not in it.
   /// In a mesh that is neither closed nor tetrahedral the ball is while it touches.
-  /// Order    inside: by `enter`, then as `bodies`. outside: the bodies without an interval, as
-  ///          `bodies`.
+  /// Order    inside: by `enter`, then as `bodies`. outside: bodies without interval, as `bodies`.
   /// Accuracy which triangles a point meets is exact. Other arc lengths are within 2^-40 of the
   ///          largest coordinate, divided by the sine of the angle to the surface.
   /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, a radius outside [0,
@@ -244,12 +231,10 @@ class PALPATE_EXPORT SpatialQueries {
   /// Closed, decided exactly, the winding number is not 0, or a tetrahedron contains the vertex.
   /// The surface point is on the lowest of equally near triangles. Where parts of a closed body
   /// overlap, it is on the outer surface; where more than two meet in a point, a nearer one may be
-  /// missed. The accuracy is that of vertexTriangleDistance(), or less where almost parallel
-  /// triangles intersect.
+  /// missed. The accuracy is that of vertexTriangleDistance(), but less where triangles intersect.
   /// Order    by vertex, ascending.
-  /// Errors   NotClosed for what is no mesh, and with Closed, naming the first edge, for a mesh
-  ///          with defects; InvalidSettings if both are the same; UnsupportedMethod if `vertices`
-  ///          is a shape.
+  /// Errors   NotClosed for what is no mesh, and with Closed, with the first edge, for defects;
+  ///          InvalidSettings if both are the same; UnsupportedMethod if `vertices` is a shape.
   void findInsideVertices(GeometryId vertices, GeometryId body, std::vector<InsideVertex>& out,
                           const InsideSettings& = {}) const;
   /// The vertices in or on a tetrahedron, ascending, with the lowest that contains each, decided

@@ -34,9 +34,8 @@ struct HeldVertex {
 /// Parts    a vertex, a geometry that setTransform() moves in the step, or a rigid group. A vertex
 ///          ends at before + fraction * (now - before), rounded, and at `now` for 1; so does a
 ///          translation. A rotation is the normalised interpolation of the quaternions.
-/// Features all pairs are guarded, with their filters, predicates and disabled elements, as by
-///          Method::Continuous with thickness 0. Features of one geometry with a common vertex
-///          never touch.
+/// Features all pairs are guarded, with filters, predicates and disabled elements, as by
+///          Method::Continuous with thickness 0. Features with a common vertex never touch.
 /// Radii    count, and shapes. A segment counts with its largest radius or, if it begins nearer,
 ///          with the radii of 16 pieces. Features that restDistance excludes have no radii.
 /// Laws     for the step from `before` to the positions after hold(), as Continuous moves it:
@@ -44,15 +43,12 @@ struct HeldVertex {
 ///          (2) other features, and shapes, come no nearer than their radii, or where they began,
 ///          less 2^-33 of their largest coordinate difference and radius and 2^-38 of their motion,
 ///          and for shapes their own error (Docs/Accuracy.md).
-///          (3) a part that touches nothing makes its whole step, unless a shortened one gets in
-///          its way.
+///          (3) a part that touches nothing makes its whole step, unless a shortened one is in its
+///          way.
 ///          (4) only parts that approach are shortened, by their normal motion, to 1/8 of the room.
-///          If 8 rounds do not suffice, all parts connected by touches are, to 7/8 of the first
-///          touch's time.
-///          (5) parts change only their connected component, which parts at rest or fixed do not
-///          join.
-///          (6) a part keeps a positive fraction, unless less than rounding separates it from a
-///          touch.
+///          After 8 rounds all parts connected by touches are, to 7/8 of the first touch's time.
+///          (5) parts change only their connected component. Parts at rest or fixed connect none.
+///          (6) a part keeps a positive fraction, if more than rounding is left before a touch.
 ///          (7) a second call changes nothing.
 /// Start    features that touch when the step begins are a fault, unless a plane separates them
 ///          then, and strictly at the end. Features with radii, spheres and capsules may overlap
@@ -78,15 +74,13 @@ class PALPATE_EXPORT StepGuard {
   /// One fraction for all; groups with a common vertex join. A group may deform while it turns:
   /// place rigid bodies by setTransform(). Absent vertices do not count. Throws IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
-  /// Only these, and groups with one of them, always make their whole step; {kNoElement}: all, or a
-  /// shape. After ImpactRemains, set their `now` to `before` and call hold() again. Throws
-  /// IndexOutOfRange.
+  /// Only these, and groups with one of them, make their whole step; {kNoElement}: all. After
+  /// ImpactRemains, set their `now` to `before` and hold() again. Throws IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
-  /// Shortens steps by setting positions and transforms now; returns the size of held(). Results
-  /// stay readable.
-  /// Errors   ImpactRemains, with the features, if they touched before the step or all that move
-  ///          are fixed; UnsupportedMethod for a pair with a DistanceField; those of
+  /// Shortens steps: sets positions and transforms now, and returns the size of held().
+  /// Errors   ImpactRemains, with features that touched before the step or move only fixed
+  ///          vertices; UnsupportedMethod for pairs with a DistanceField; those of
   ///          detectCollision().
   std::size_t hold();
 

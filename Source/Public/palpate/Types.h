@@ -15,12 +15,9 @@ namespace palpate {
 /// geometry was removed.
 enum class GeometryId : std::uint32_t {};
 
-/// Stands for the index of an element or vertex where there is none, as in a shape.
-inline constexpr std::uint32_t kNoElement = 0xffffffff;
+inline constexpr std::uint32_t kNoElement = 0xffffffff;  ///< no element or vertex, as in a shape
 
-/// The geometry type: what the elements of a geometry are. The surface of a tetrahedral mesh
-/// consists of Triangles. A Shape is an analytical shape, a Field a distance field; these have no
-/// elements.
+/// The surface of a tetrahedral mesh consists of Triangles. A Shape and a Field have no elements.
 enum class GeometryType : std::uint8_t { Triangles, Lines, Points, Shape, Field };
 PALPATE_EXPORT const char* toString(GeometryType) noexcept;  ///< its name, or "unknown"
 
@@ -31,8 +28,7 @@ using Segment = std::array<std::uint32_t, 2>;
 /// Four vertex indices in any order.
 using Tetrahedron = std::array<std::uint32_t, 4>;
 
-/// Two elements, each by its index in its geometry. An element is a triangle, a segment or a point.
-/// `a` belongs to the first geometry of the pair, `b` to the second.
+/// Two triangles, segments or points: `a` of the pair's first geometry, `b` of the second.
 struct ElementPair {
   std::uint32_t a;
   std::uint32_t b;
@@ -57,13 +53,12 @@ struct Pose {
   }
 };
 
-/// The motion of a rigid body in a step. The default is a body that setTransform() never placed.
+/// The motion of a rigid body in a step; by default of one that setTransform() never placed.
 struct RigidMotion {
   Pose before, now;
 };
 
-/// A triangle mesh that stays in the caller's memory. A call that takes a view reads it and keeps
-/// no reference to it.
+/// A mesh in the caller's memory, of which a call keeps no reference.
 struct TriangleMeshView {
   std::span<const Eigen::Vector3d> positions;  ///< L
   std::span<const Triangle> triangles;
@@ -75,16 +70,13 @@ struct Welded {
   std::vector<Triangle> triangles;         ///< as many as were given, in their order
   std::vector<std::uint32_t> vertexOf;     ///< for each vertex that was given, its new index
 };
-/// Joins vertices at equal positions, such as those of an STL file, in which each triangle has
-/// three of its own. A mesh has an inside, and edges between its triangles, only if they share
-/// vertices.
+/// Joins vertices, such as those of an STL file, so that triangles become neighbours.
 ///
-/// distance  L. A vertex joins the first one before it that stayed and is at most this far away.
-///           With a positive distance the result may depend on the order of the vertices; those
-///           that stay are further apart.
-/// Returns   a triangle with two joined corners names a vertex twice, and counts for nothing.
-/// Errors    NonFinitePosition, IndexOutOfRange, TooLarge, and InvalidSettings for the distance.
-/// Cost      linear, some 0.2 microseconds a vertex.
+/// distance L: a vertex joins the first earlier one that stayed within it. With 0 equal positions
+///          join; with more the result may depend on the order of vertices.
+/// Returns  a triangle with two joined corners names a vertex twice, and counts for nothing.
+/// Errors   NonFinitePosition, IndexOutOfRange, TooLarge; InvalidSettings for the distance.
+/// Cost     linear, some 0.2 microseconds a vertex.
 PALPATE_EXPORT Welded weld(std::span<const Eigen::Vector3d> positions,
                            std::span<const Triangle> triangles, double distance = 0.0);
 

@@ -51,8 +51,7 @@ struct Validity {
   /// unless `method` is Intersection, DistanceField or Proxy, or Proximity with a radius per
   /// vertex; other methods may not know.
   bool startedApart = false;
-  /// Proximity, Continuous, Auto: the opposite of `trusted`. Intersection: always false, as it
-  /// certifies no side.
+  /// The opposite of `trusted`; by Intersection false, which certifies no side.
   bool sideMayBeWrong = true;
   /// Whether a mesh with itself has equal positions but no two triangles with a common vertex, as
   /// an STL file. The answer is then not trusted. Found when elements are set or enabled.
@@ -71,9 +70,8 @@ struct Validity {
   /// smallest height of a triangle when topology was set. Auto with two meshes: the motion
   /// tolerance, no condition. Continuous: infinity.
   double displacementLimit = 0;
-  /// L: how far straight motion is off the arcs of bodies that turn, the sum of both; infinity for
-  /// a plane. Beyond the thickness, for Proximity with `displacement` added, the answer is not
-  /// trusted.
+  /// L: how far straight motion is off the arcs of turning bodies, as a sum; infinity for a plane.
+  /// Not trusted beyond the thickness; for Proximity with `displacement` added.
   double arcDeviation = 0;
   /// L: the thickness, by Auto up to the motion tolerance more, 0 for Intersection. Feature pairs
   /// further apart at the step's end are contacts only by an impact.
@@ -90,9 +88,8 @@ struct Validity {
   /// Triangles without area in contacts, ascending. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;
 
-  /// DistanceField: indices in CollisionData::shape(), ascending. First: perhaps beyond the band,
-  /// and at least as deep as `distance` less the error bound. Second: exactly, perhaps beyond the
-  /// thickness.
+  /// DistanceField: indices in CollisionData::shape(), ascending. First: maybe beyond the band, and
+  /// at least as deep as `distance` less errorBound(). Second: maybe beyond the thickness.
   std::vector<std::uint32_t> outsideBand, nearThreshold;
   /// The same where DistanceField::signIsReliable() is false: the point may be inside.
   std::vector<std::uint32_t> unreliableSign;

@@ -19,15 +19,11 @@ struct Image {
   std::vector<std::uint8_t> rgb;  ///< three bytes per pixel; rows from the bottom up
 };
 
-/// Encodes an image as the content of a PNG file.
-PALPATE_EXPORT std::string toPng(const Image&);
+PALPATE_EXPORT std::string toPng(const Image&);  ///< the content of a file
 
-/// Opens a connection to the X display and keeps it as long as the result exists. VTK ends the
-/// program if it cannot open a display; a Window therefore calls this first. An X server such as
-/// Xvfb restarts when its last client leaves, and refuses connections for a moment; the call waits
-/// for it.
-///
-/// Errors   NotAvailable if there is no display.
+/// Keeps a connection to the X display while the result exists. A Window calls it first, as VTK
+/// ends the program without a display. Waits for a server that restarts.
+/// Errors   NotAvailable without a display.
 PALPATE_EXPORT std::shared_ptr<void> openDisplay();
 
 /// How a window draws a geometry or a part of it.
@@ -35,12 +31,10 @@ struct Appearance {
   std::string label{};                             ///< a name in the picture; empty: none
   std::array<double, 3> colour{0.62, 0.66, 0.72};  ///< red, green and blue in [0, 1]
   double opacity = 1;                              ///< in [0, 1]; 0: invisible
-  /// false: draws only faces that point away from the camera, so that you see into a cavity
-  bool frontFaces = true;
+  bool frontFaces = true;                          ///< false: only faces away from the camera
 };
 
-/// The direction and the part of the scene that a window shows. The projection is parallel: a
-/// length has the same size everywhere in the picture.
+/// The direction and the part of the scene. The projection is parallel.
 struct View {
   Eigen::Vector3d from{0.5, -1.0, 0.6};              ///< from the scene to the camera; any length
   Eigen::Vector3d up{0, 0, 1};                       ///< not parallel to `from`
@@ -48,16 +42,9 @@ struct View {
   double height = 0;  ///< L: the height of the picture; 0: everything is in view
 };
 
-/// A window that shows the geometries of an OctreeBasedCD and its last answers:
-/// - bodies and tools, with their names, if setAppearance() gave them any
-/// - contacts, midway between their two points, and their normals, coloured by distance; they shine
-///   through the bodies that hide them
-/// - vertices that validity() names, in magenta
-/// - octree cells, in green, on demand
-/// - a bar of a round length, and a bar of the colours of distances
-/// - a panel with the frame rate, contacts, times and validity, and a graph of the times
-///
-/// The mouse turns the view. A click names the element under the cursor.
+/// A window that shows the geometries of an OctreeBasedCD and its last answers: contacts midway
+/// between their points with normals, coloured by distance and visible through bodies; vertices
+/// that validity() names, in magenta; octree cells; bars of length and distance; a panel of times.
 ///
 ///   palpate::vtk::Window window(collisions);
 ///   while (window.show()) {
@@ -66,38 +53,29 @@ struct View {
 ///
 /// Keys     o: the cells of the contact nearest to the camera, all cells by depth, all cells by
 ///          occupancy, none; b: bodies solid or translucent; c: contacts; n: normals; u: untrusted
-///          elements; l: names; p: panel; t: times; r: all in view; space: waits until it is
-///          pressed again; q: closes.
-/// Needs    the OctreeBasedCD must stay at its address while the window exists. From show() to
-///          press() and pick() only its positions and transforms may change.
-/// Errors   the constructor throws NotAvailable if there is no display, which it also needs to draw
-///          off screen: run the program under xvfb-run. It throws InvalidSettings for a size
-///          outside [1, 16384] pixels.
+///          elements; l: names; p: panel; t: times; r: all in view; space: pause; q: closes. The
+///          mouse turns the view; a click names an element.
+/// Needs    an OctreeBasedCD that stays at its address. From show() to press() and pick() only its
+///          positions and transforms may change.
+/// Errors   NotAvailable without a display, also off screen; InvalidSettings: sizes are in [1,
+///          16384].
 /// Threads  make all calls from the thread that made the window.
 class PALPATE_EXPORT Window {
  public:
-  /// width, height: pixels. onScreen: false draws off screen, for image(), without panel and graph
-  /// until their keys are pressed.
+  /// Pixels. onScreen: false draws for image() only, at first without panel and graph.
   explicit Window(const OctreeBasedCD&, bool onScreen = true, int width = 1280, int height = 960);
   ~Window();
-  /// Sets how the next show() draws a geometry, from the element `firstElement` up to the first
-  /// element of the geometry's next part. The opacity and the faces of element 0 apply to all
-  /// parts. Ids of geometries that do not exist have no effect.
-  ///
+  /// For the next show(), from `firstElement` up to the next part's. Opacity and faces of element 0
+  /// apply to all parts. Unknown ids have no effect.
   /// Errors   InvalidSettings for a value outside its range.
   void setAppearance(GeometryId, const Appearance&, std::uint32_t firstElement = 0);
-  /// Aims the camera at the next show(). Without this call, everything in the first frame is in
-  /// view.
-  ///
-  /// Errors   InvalidSettings for values that are not finite, directions of length 0 or parallel to
-  ///          each other, and a negative height.
+  /// For the next show(); by default everything in the first frame is in view. Throws
+  /// InvalidSettings if not finite, for parallel directions or length 0, or height < 0.
   void setView(const View&);
   void setLengthUnit(std::string);  ///< the name of L in the picture, such as "mm"
-  /// Draws the last frame and handles keys and mouse. Returns false after the window was closed.
-  bool show();
-  void press(char key);  ///< does what the key does
-  /// Does what a click does, at pixels from the bottom left. Returns the element's name, such as
-  /// "geometry 2, triangle 417", or nothing.
+  bool show();                      ///< draws the last frame and handles input; false once closed
+  void press(char key);             ///< does what the key does
+  /// Does what a click does, at pixels from the bottom left; names the element or nothing.
   std::string pick(int x, int y);
   Image image() const;  ///< the picture that the window shows
 
