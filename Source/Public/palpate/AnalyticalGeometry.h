@@ -9,8 +9,8 @@
 namespace palpate {
 
 // Shapes in a frame that OctreeBasedCD::setTransform() places. Measures are in L, at most
-// kLargestMeasure; 0 is valid. All are solid and convex, except a two-sided plane.
-// addAnalyticalGeometry() throws InvalidShape for all other values.
+// kLargestMeasure; 0 is valid. All are solid and convex, except a two-sided plane, which has no
+// inside. Other values throw InvalidShape.
 
 inline constexpr double kLargestMeasure = 1e300;                     ///< L
 inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull

@@ -21,8 +21,8 @@
 namespace palpate {
 
 /// A contact in which a frame and brute force differ: a fault of the library. Of Auto only missing
-/// ones are reported, but where a step begins in intersection, none of vertices of triangles that
-/// intersect and of bodies with contacts left out on an inner side.
+/// ones are reported. In a step that begins in intersection, those of vertices of triangles that
+/// intersect, and of bodies with contacts left out on an inner side, are not.
 struct AuditFailure {
   enum class Fault {
     FalseNegative,  ///< not found; Earliest: too late

@@ -15,9 +15,9 @@
 
 namespace palpate {
 
-// Law of all contacts: with the positions at timeOfImpact, the sum of stencil() positions times
-// weights is (distance + radii) * normal, with radii at the closest points. Of a ShapeContact,
-// point - pointOnShape is (distance + radius) * normal.
+// Contacts of every method satisfy one law. With the positions at timeOfImpact, the sum of the
+// positions of stencil() times their weights is (distance + radii) * normal, with the radii at the
+// closest points. Of a ShapeContact, point - pointOnShape is (distance + radius) * normal.
 //
 // Error    32 ulp of the largest coordinate difference of the vertices, and the rounding of
 //          positions at that time. Continuous adds timeTolerance times the relative motion.
@@ -26,9 +26,9 @@ namespace palpate {
 //          Intersection a vertex is behind the triangle; the normal is the winding normal in the
 //          interior, else on its side along the line through the closest points, (4) by
 //          Intersection edges have crossed, (5) Side applies.
-// Depth    Intersection: a vertex is behind a surface if an edge leaves the surface at it. It has
-//          one such contact, with the nearest feature around the triangles that its edges pierce,
-//          by the lowest triangle of that feature behind which it is.
+// Depth    Intersection: a vertex is behind a surface if an edge leaves the surface towards it. It
+//          has one contact of negative distance: with the nearest feature around the triangles that
+//          its edges pierce, in the lowest triangle of that feature behind which it is.
 // Touch    at distance 0, or for an impact without a thickness, the normal can separate the
 //          surfaces, as far as such a normal exists: that of a triangle at either feature, else the
 //          cross product of two edges there, else where features came from. The step, otherwise a
@@ -38,10 +38,9 @@ namespace palpate {
 //          the other surface, and impacts that leave it, have the side on which they leave; with
 //          Contacts::Distinct such vertices have contacts of Intersection only.
 // Bodies   where a step of Auto begins with two closed bodies deep in each other, all contacts have
-//          one direction along which they part. The distance is along it, negative until the vertex
-//          leaves.
+//          one direction along which they part. The distance is along it, negative inside.
 
-/// A segment {p, q} has the vertices {p, q, q}, a point p has {p, p, p}.
+/// A contact of a vertex with a triangle, a segment {p, q} as {p, q, q}, or a point p as {p, p, p}.
 struct VertexTriangleContact {
   std::uint32_t vertex, triangle;         ///< indices; `triangle` may be a segment or a point
   std::array<std::uint32_t, 3> vertices;  ///< of the triangle, segment or point
@@ -49,7 +48,7 @@ struct VertexTriangleContact {
   Eigen::Vector3d normal;  ///< unit, to the vertex; from it where it is behind the surface
   double distance;      ///< L, at timeOfImpact, between the surfaces of the radii; sign: see above.
   double timeOfImpact;  ///< [0, 1] of the step; 1 for methods that test the step's end.
-  /// Spanned by the vertices with weights other than 0. Of a segment: EdgeAB or a corner.
+  /// The part that vertices with weights other than 0 span. Of a segment: EdgeAB or a corner.
   TriangleFeature feature = TriangleFeature::Face;
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
@@ -61,7 +60,7 @@ struct EdgeEdgeContact {
   Eigen::Vector3d normal;  ///< unit, from edge b to edge a; reversed where they crossed
   double distance;         ///< L, at timeOfImpact; negative where radii overlap or edges crossed.
   double timeOfImpact;     ///< [0, 1] of the step; 1 for methods that test the step's end
-  /// An end if the weight is 0 or 1.
+  /// The parts that hold the closest points: an end if the weight is 0 or 1.
   EdgeFeature featureA = EdgeFeature::Interior, featureB = EdgeFeature::Interior;
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
@@ -91,8 +90,7 @@ struct ShapeContact {
 
 /// At timeOfImpact: of Continuous, the first time near enough. Apart, the points are closest;
 /// overlapping, the normal is the direction of the shortest translation that separates.
-/// Error    pointA - pointB equals distance * normal, within 2e-3 of the sizes if a cylinder
-///          overlaps.
+/// Error    pointA - pointB equals distance * normal, to 2e-3 of the sizes if a cylinder overlaps.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second shape
   Eigen::Vector3d normal;          ///< unit, from shape b to shape a
@@ -120,8 +118,7 @@ PALPATE_EXPORT Stencil stencil(const EdgeEdgeContact& contact);
 /// The contacts of one pair of geometries in the last frame. No function throws palpate::Error.
 /// Order    vertexTriangle by (vertex, triangle), triangleVertex by (triangle, vertex), edgeEdge by
 ///          (edgeA, edgeB), intersectingTriangles by (a, b), shape by (element, id, vertices).
-/// Valid    with its spans until the next call on the OctreeBasedCD that is not const; a copy
-///          stays.
+/// Valid    as all results of OctreeBasedCD, with the spans. A copy stays as it is.
 class PALPATE_EXPORT CollisionData {
  public:
   /// Of an answer by another engine, in the order above.
@@ -154,7 +151,7 @@ class PALPATE_EXPORT CollisionData {
   std::span<const EdgeEdgeContact> edgeEdge() const;  ///< of both geometries
   /// Those that intersect at the step's end, from Intersection, also in Auto. Each has a contact of
   /// its own or of a vertex behind the surface, perhaps with another triangle, unless a predicate
-  /// refuses it or the two are of one mesh, share a vertex and an edge of one pierces the other.
+  /// refuses it. In self-collision triangles with a common vertex may have none.
   std::span<const ElementPair> intersectingTriangles() const;
   /// Elements with a shape, or a body by DistanceField or Proxy; no other list then has contacts. A
   /// particle that touches several triangles may have several, if Auto answers by Proxy.

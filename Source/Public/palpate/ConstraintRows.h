@@ -15,15 +15,13 @@
 namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
-/// Units    L. A solver keeps the gap at least h (Docs/HowTo/Solvers.md). The depth is h -
-///          gap(now).
+/// Units    L. A solver keeps the gap at least h (Docs/HowTo/Solvers.md); the depth is h - gap.
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
-///          and the element's radius; p is the point of the shape's surface as law (1) moves it.
+///          plus the element's radius; p is the point of the shape's surface as law (1) moves it.
 /// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
 ///          on by d until the step's end.
-///          (2) the gap's gradient at vertex i is weights[i] normal, which is the distance's there.
-///          Exceptions: radii that differ along an element, and centres at distance 0, where it is
-///          that of the distance along the normal.
+///          (2) the gap's gradient at vertex i is weights[i] normal. It is also the distance's,
+///          unless radii differ along an element or the centres coincide.
 ///          (3) a step along this row alone, by inverse masses, to a gap g > 0 gives the signed
 ///          distance g, up to (g + radii) (4 s / e)^2: s is the longest displacement of a vertex; e
 ///          the triangle's least height, or the shorter edge times the sine of the edges' angle. A
@@ -119,8 +117,7 @@ PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal);
 /// The previous tangents after the shortest rotation from the previous normal to the unit normal.
 /// Laws     (1) |t - previous t| <= |normal - previous normal|, within 2^-40, for every normal.
 ///          (2) tangents are unit and perpendicular within 4 ulp, over any number of frames.
-///          (3) if a normal returns by another path, its tangents turn by the solid angle between
-///          both.
+///          (3) if a normal returns by another path, its tangents turn by the solid angle between.
 /// Errors   none. tangentsOf(normal) if the previous tangents are zero or NaN. For opposite normals
 ///          the first tangent stays and the second turns.
 PALPATE_EXPORT Tangents tangentsOf(const Eigen::Vector3d& normal, const Tangents& previous);

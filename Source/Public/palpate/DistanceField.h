@@ -15,7 +15,7 @@ namespace palpate {
 
 /// Of DistanceField::build(). A value out of range throws InvalidSettings.
 struct DistanceFieldSettings {
-  /// L, positive: what value() may be off by in the band. At most the band counts.
+  /// L, positive: what value() may be off by in the band. If it exceeds the band, the band counts.
   double errorBound = 0.0;
   /// L, positive: up to which distance errorBound holds. Both are at least 2^-18 of the longest
   /// side of the box with the band, itself in [2^-400, 2^400], and 2^-36 of its largest coordinate.

@@ -43,9 +43,9 @@ class PALPATE_EXPORT Error : public std::runtime_error {
         std::optional<std::size_t> element = {});
 
   ErrorCode code() const noexcept { return m_code; }
-  /// At fault, if any; of a function that adds a geometry, the id that it would have had.
+  /// The geometry at fault, if any; when one is added, the id that it would have had.
   std::optional<GeometryId> geometry() const noexcept { return m_geometry; }
-  /// Of the vertex, element, tetrahedron or hull point at fault, if any; the sentence says which.
+  /// The index of the vertex, element or hull point at fault, if any; the sentence says which.
   std::optional<std::size_t> element() const noexcept { return m_element; }
 
  private:

@@ -42,8 +42,7 @@ struct VertexTriangleDistance {
 ///          the winding normal, or without area the axis of least extent, x before y before z.
 /// Laws     (1) permuting corners, mirroring an axis and scaling by powers of two, where exact,
 ///          give the same bits. If corners are mirror images, weights may differ by 2^-53.
-///          (2) if an edge or corner holds the point, each triangle that shares it gives the same
-///          bits.
+///          (2) if an edge or corner holds the point, all triangles with it give the same bits.
 /// Errors   none. A triangle without area is its longest edge or corner. NaN or infinity gives NaN.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated

@@ -4,7 +4,7 @@
 
 namespace palpate {
 
-/// Bytes of an OctreeBasedCD. Settings::memoryLimit limits `total`.
+/// Bytes that an OctreeBasedCD holds. Settings::memoryLimit limits `total`.
 struct MemoryUse {
   std::size_t geometries = 0;  ///< topologies, positions, pairs
   std::size_t octrees = 0;     ///< with the floats from which their boxes come, and leaves of Proxy

@@ -45,15 +45,16 @@ class PALPATE_EXPORT LooseOctree {
     std::span<const std::uint32_t> elements;  ///< in this node itself; valid until the next update
   };
 
-  /// With elements in their subtrees, parents before children; empty for unknown ids. Linear.
+  /// Those with elements in their subtrees, parents before children. Linear in the nodes.
   std::vector<Node> nodes(GeometryId) const;
   std::vector<GeometryId> geometries() const;  ///< those with nodes, ascending
   Update lastUpdate(GeometryId) const;         ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
-  /// One sentence for each violated invariant: each element in one node and in tight fitted boxes,
-  /// links both ways, counts of blocks; after a rebuild, elements in their centre's cell and its
-  /// loose bounds up to 2^-22 of the root's edge. Linear in the elements.
+  /// One sentence for each violated invariant. Each element is in one node and in tight fitted
+  /// boxes; links agree both ways; blocks add up. After a rebuild, elements are in their centre's
+  /// cell and its loose bounds, up to 2^-22 of the root's edge.
+  /// Cost     linear in the elements.
   std::vector<std::string> validate() const;
 
   struct State;  ///< not part of the interface

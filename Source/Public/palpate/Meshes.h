@@ -12,7 +12,7 @@
 
 namespace palpate {
 
-/// Sorted edges, lower vertex first, because of which a mesh is not closed and oriented.
+/// The edges, sorted, lower vertex first, at which a mesh is not closed and consistently oriented.
 struct MeshDefects {
   std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
   std::vector<Segment> flipped;  ///< edges that both triangles traverse in the same direction
@@ -36,8 +36,8 @@ PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 
 /// Which points are inside a body.
 enum class InsideRule {
-  /// Where the winding number is not 0, decided exactly. The mesh is tetrahedral, or closed with a
-  /// consistent orientation.
+  /// Where the winding number is not 0, decided exactly. Needs a tetrahedral mesh, or a closed one
+  /// with consistent winding.
   Closed,
   /// Where the generalised winding number of any triangles is at least 1/2 in magnitude, up to a
   /// surface that spans a hole. Closed bodies: as Closed.

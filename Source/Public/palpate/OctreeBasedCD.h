@@ -46,7 +46,7 @@ struct CollisionPair {
 ///          takes a GeometryId, except has(), throws UnknownGeometry. An exception that ends a
 ///          frame leaves the last answers readable. After a move, or from a predicate or callback
 ///          of this object, every function but assignment and destruction throws InvalidCall.
-///          MemoryLimit: see Settings.
+///          Settings::memoryLimit adds MemoryLimit.
 /// Valid    returned spans and references: until the next call that is not const, if not said.
 /// Threads  const functions may run at once while no other function does. Objects share executors.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
@@ -58,31 +58,31 @@ class PALPATE_EXPORT OctreeBasedCD {
   OctreeBasedCD& operator=(OctreeBasedCD&&) noexcept;
   ~OctreeBasedCD();
 
-  /// Copies any set of triangles, also with borders, non-manifold edges or no area.
+  /// Adds a copy. Any set of triangles is valid: with borders, non-manifold edges, or no area.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex; TooLarge for more than 2^28 vertices
   ///          or triangles or, as all functions that add a geometry, if no ids are left.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
-  /// Pairs and methods treat its surface() as a triangle mesh with the same vertex ids.
+  /// Every pair and method treats its surface() as a triangle mesh with the same vertex ids.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex, or one twice in a tetrahedron;
-  ///          SharedFace for more than two tetrahedra at a face; TooLarge: 2^28 vertices or 2^26
-  ///          cells.
+  ///          SharedFace for a face of more than two; TooLarge beyond 2^28 vertices or 2^26
+  ///          tetrahedra.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron> tetrahedra);
-  /// Radii: L, in [0, kLargestMeasure], constant, one or one per vertex, linear along segments.
+  /// Radii: L, in [0, kLargestMeasure], one for all or one per vertex, linear along segments.
   /// Lists    edgeEdge() has segments as edges. In vertexTriangle() and triangleVertex() segment
-  ///          {p, q} is the triangle {p, q, q}. The thickness and the radii where the centre lines
-  ///          come closest limit the distance.
+  ///          {p, q} is the triangle {p, q, q}. Features are a contact where their centre lines
+  ///          come closest, by the thickness and the radii there.
   /// Errors   NonFinitePosition; IndexOutOfRange for a vertex, or one twice in a segment;
-  ///          InvalidRadius, also for their number; TooLarge: 2^28 vertices or segments.
+  ///          InvalidRadius, also for their number; TooLarge beyond 2^28 vertices or segments.
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, double radius = 0.0);
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, std::span<const double> radii);
   /// Point i is vertex i. Radii are as in addLineMesh().
   /// Lists    in vertexTriangle() and triangleVertex() point p is the triangle {p, p, p}. Of two
-  ///          point sets the first has the vertices; of one with itself the lower point is it.
-  /// Errors   NonFinitePosition; InvalidRadius, also for their number; TooLarge: 2^28 points.
+  ///          point sets the first has the vertices; in one with itself the lower point is it.
+  /// Errors   NonFinitePosition; InvalidRadius, also for their number; TooLarge beyond 2^28 points.
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// setTransform() places it. Contacts are in CollisionData::shape() and shapeShape().
@@ -99,8 +99,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     one look-up for each vertex.
   void attachDistanceField(GeometryId mesh, std::shared_ptr<const DistanceField>);
   /// Attaches leaves of Method::Proxy to a rigid triangle or tetrahedral mesh, with the
-  /// consequences of attachDistanceField(). Pairs by Auto of a point set, first, and the mesh may
-  /// use them. None: detaches.
+  /// consequences of attachDistanceField(); none detaches them. Auto may use them for pairs of a
+  /// point set, first, and the mesh.
   /// Errors   UnsupportedMethod for another type; InvalidSettings; TooLarge as Method::Proxy.
   /// Cost     seconds of processor time for half a million triangles, on all threads.
   void attachSurfaceProxy(GeometryId mesh, const std::optional<SurfaceProxySettings>&);
@@ -110,27 +110,30 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::size_t vertexCount(GeometryId) const;  ///< 0 for a shape
   /// L, now; in the body's frame if setTransform() placed the geometry. Empty for a shape.
   std::span<const Eigen::Vector3d> positions(GeometryId) const;
-  /// L: the box in the world around all vertices now with radii, or a shape, up to rounding. Empty
-  /// without vertices; infinite for a plane. Linear in the vertices.
+  /// L: the box in the world around all vertices now with their radii, or around a shape, up to
+  /// rounding. Empty without vertices; infinite for a plane.
+  /// Cost     linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
   void advance();  ///< `now` becomes `before`; results stay readable
 
-  /// One per vertex. Only two arrays, and advance(), set `before`. In the step in which the
-  /// geometry is added or its topology set, `before` follows `now` unless you pass it. Linear.
+  /// Sets positions, one per vertex. Only two arrays, and advance(), set `before`. In the step in
+  /// which the geometry is added or its topology set, `before` follows `now` unless you pass it.
   /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also beyond kLargestMeasure,
   ///          as all functions that take positions.
+  /// Cost     linear in the vertices.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
-  /// Sets topology and the positions at both ends of the step. Enables all elements.
-  /// Errors   UnsupportedMethod for another type; as addTriangleMesh(); TooLarge for restDistance.
+  /// Sets the topology and the positions at both ends of the step. Enables all elements.
+  /// Errors   UnsupportedMethod for another type; TooLarge for restDistance; as addTriangleMesh().
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>);
   /// The same, with the errors of addTetrahedralMesh().
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  /// Valid until setTetrahedra() or removal. Throws UnsupportedMethod for another type.
+  /// The triangles that collide. Valid until setTetrahedra() or removal.
+  /// Errors   UnsupportedMethod for another type.
   TetrahedralSurface surface(GeometryId) const;
 
   /// Puts all positions of a geometry in a body's frame, at the pose now or at both ends of the
@@ -142,13 +145,12 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     that of turning the corners of a ConvexHull; none that grows with a mesh.
   void setTransform(GeometryId, const Pose& now);
   void setTransform(GeometryId, const Pose& before, const Pose& now);
-  /// Now, with the rotation that counts; the identity if never set.
+  /// The pose now, with the rotation that counts; the identity if never set.
   Pose transform(GeometryId) const;
-  /// A name in messages: `geometry 3 "liver"`. Captures do not hold it. Throws InvalidSettings for
-  /// null characters.
+  /// A name in messages: `geometry 3 "liver"`. A null character throws InvalidSettings.
   void setName(GeometryId, std::string name);
   const std::string& name(GeometryId) const;
-  /// A pair that does not collide has no contacts, no candidates and no cost, and is not trusted.
+  /// A pair that the filters separate has no contacts, candidates or cost, and is not trusted.
   /// Errors   InvalidSettings for Sidedness::Outer of lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
   /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others. A vertex
@@ -157,35 +159,37 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     linear in the elements.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
-  /// a == b: self-collision, without features that share a vertex. (a, b) orders ids in results.
+  /// Adds a pair; its order is that of ids in results. a == b: self-collision. Features with a
+  /// common vertex are then no contacts.
   /// Errors   UnsupportedMethod for types that the method does not answer, and for a placed
   ///          geometry with itself; InvalidSettings; DuplicatePair; TooLarge for restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
-  /// (a, b) in either order. Throws UnknownPair, and what addCollisionPair() throws.
+  /// Replaces the settings; (a, b) in either order.
+  /// Errors   UnknownPair; those of addCollisionPair().
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
-  /// Refused features are no contacts and suppress none. intersectingTriangles() and validity()
-  /// ignore the predicate. An empty one refuses nothing. (a, b) as added.
+  /// Features that it refuses are no contacts and suppress none. intersectingTriangles() and
+  /// validity() do not use it. Empty: refuses nothing. (a, b) is in the order of the addition.
   /// Errors   UnknownPair; UnsupportedMethod for a pair with a shape.
   void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
-  /// With its answer; (a, b) in either order. Throws UnknownPair.
+  /// Removes the pair and its answer; (a, b) in either order. Throws UnknownPair.
   void removeCollisionPair(GeometryId a, GeometryId b);
   std::span<const CollisionPair> pairs() const;  ///< in the order in which they were added
-  /// As passed last; (a, b) as added. Throws UnknownPair.
+  /// The settings passed last; (a, b) in the order of the addition. Throws UnknownPair.
   const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
   void update();  ///< brings octrees to the positions now
-  /// Answers every pair. Pairs without a change keep their answer. Steady frames allocate nothing,
-  /// except for integers of exact arithmetic.
+  /// Finds the contacts of every pair; what did not change keeps its answer. Steady frames allocate
+  /// nothing, except for integers of exact arithmetic.
   /// Errors   those of a predicate or executor; InvalidSettings if run() returns too early;
   ///          NotAvailable after fork() in a task. Predicates apart, update(), forEachCandidate()
   ///          and queries() throw the same.
   void detectCollision();
 
-  /// Passes batches to f(std::span<const ElementPair>): all pairs of enabled elements whose boxes,
-  /// inflated by half of Validity::effectiveThickness and by the largest radius, overlap; over the
-  /// whole step if the method needs it. Rounding may add pairs. (a, b) in either order.
-  /// Order    none. `a` is of the pair's first geometry; in self-collision a < b, without a common
-  ///          vertex.
+  /// Passes candidate pairs in batches to f(std::span<const ElementPair>): all pairs of enabled
+  /// elements whose boxes overlap. Boxes are inflated by half of Validity::effectiveThickness and
+  /// by the largest radius, and enclose the whole step if the method needs it. Rounding may add
+  /// pairs. (a, b) in either order.
+  /// Order    none. `a` is of the pair's first geometry; in self-collision a < b, no common vertex.
   /// Threads  calls of f come one at a time, from several threads.
   /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f calls this
   ///          object; those of f.
@@ -200,7 +204,7 @@ class PALPATE_EXPORT OctreeBasedCD {
         },
         const_cast<void*>(static_cast<const void*>(std::addressof(f))));
   }
-  /// Every pair without a shape, with f(const CollisionPair&, std::span<const ElementPair>).
+  /// Every pair without a shape: f(const CollisionPair&, std::span<const ElementPair>).
   template <class F>
   void forEachCandidate(F&& f) {
     forEachCandidateBatch(
@@ -213,7 +217,7 @@ class PALPATE_EXPORT OctreeBasedCD {
 
   std::vector<ElementPair> candidatePairs(GeometryId a, GeometryId b);  ///< ascending
 
-  /// At the positions now. Updates octrees, which no other thread may then read through octree().
+  /// Queries at the positions now. Updates octrees, which no other thread may read meanwhile.
   SpatialQueries queries() const;
 
   /// Makes the state now the latest snapshot. Objects from queries() stay valid.
@@ -221,32 +225,33 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Cost     copies octrees, and topology after a change, of geometries that changed since the
   ///          last publication. Steady publications allocate nothing.
   void publish(double time = 0.0);
-  /// Null before publish(). It may outlive this object.
+  /// The last published snapshot, or null. It may outlive this object.
   /// Threads  safe at any time between construction and destruction, except during a move. A
   ///          std::mutex, shared with publish(), protects the copy of the pointer.
   std::shared_ptr<const Snapshot> latestSnapshot() const;
 
-  /// Of the last detectCollision(); (a, b) as added. Throws UnknownPair; NotAvailable before it.
+  /// The answer of the last detectCollision(); (a, b) in the order of the addition.
+  /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
-  /// L, one per vertex, or one for a shape: while no point has moved further since the last
-  /// detection, features apart stay apart by thickness and radii, and those in contact do not pass
-  /// through each other. Includes rounding; filters apply. Infinity without
-  /// PairSettings::freeMotionReach. Valid until a detection or a change.
+  /// L, one per vertex, or one for a shape. While no point has moved further since the last
+  /// detection, features that were no contact come no nearer than thickness and radii. No features
+  /// pass through each other. Rounding is included; filters apply. Infinity without
+  /// PairSettings::freeMotionReach. Valid until the next detection or change of the geometry.
   /// Errors   UnknownGeometry; NotAvailable before a detection with these elements.
   std::span<const double> freeMotion(GeometryId) const;
   const LooseOctree& octree() const;  ///< valid as long as this object; updates change it
   MemoryUse memoryUse() const;        ///< now, with queries and snapshots
-  /// Gives back memory kept for next frames only; results and held snapshots stay. Restarts
+  /// Gives back memory that is only kept for next frames. Results and held snapshots stay. Resets
   /// FrameStatistics::peakMemory. Lack of memory is no error.
   void releaseMemory();
   const FrameStatistics& statistics() const;  ///< of the last detection or update()
-  /// Of the last detection; (a, b) in either order. Throws UnknownPair.
+  /// Of the pair in the last detection; (a, b) in either order. Throws UnknownPair.
   PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
   const Settings& settings() const;
-  /// JSON in the Trace Event Format: stages, pairs and jobs of Settings::traceFrames detections.
+  /// Writes times of the last Settings::traceFrames detections as JSON in the Trace Event Format.
   /// Errors   NotAvailable if traceFrames is 0; File, and an existing file is then unchanged.
   void writeTrace(const std::filesystem::path&) const;
-  /// Differences from brute force in the sample of the last detection: faults of this library.
+  /// Where the audit of the last detection differs from brute force: faults of this library.
   /// AuditFailure::fileError names a capture that was not written.
   std::span<const AuditFailure> auditFailures() const;
   /// A copy of all that the next detection reads, with placed deforming meshes in the world. Beyond

@@ -40,11 +40,10 @@ struct TrackedVertex {
 /// are stable over time. Call update() in each step, after setPositions().
 /// Laws     (1) the depth is at most kMaxDepthRatio times the least depth.
 ///          (2) only a direction that Jumped turns further than kMaxTurn + m. m is the vertex's
-///          distance from its last surface point over the root of the last depth times the least
-///          one.
-/// Method   the last direction turns with the triangle of its surface point. Taken is the nearest
-///          within kMaxTurn + m of it (None), else the last in kMaxDepthRatio (Kept), else the
-///          nearest.
+///          distance from its last surface point over the root of the last times the least depth.
+/// Method   the last direction turns with the triangle of its surface point. The nearest counts
+///          within kMaxTurn + m of it (None), else the last if within kMaxDepthRatio (Kept), else
+///          the nearest (Jumped).
 /// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
  public:

@@ -45,40 +45,40 @@ PALPATE_EXPORT const char* toString(Engine) noexcept;  ///< its name, or "unknow
 
 /// After each detection, features of a sample are tested against the whole other geometry.
 struct AuditSettings {
-  /// Per pair and frame, at least 0; 0: no audit. Each is tested against all triangles or edges.
+  /// Number per pair and frame; 0: no audit. Each is tested against all triangles or edges.
   int features = 0;
   std::uint64_t seed = 0;  ///< the sample depends only on the seed, the frame number and the pair
-  /// Existing, for a capture of each failing pair and frame; overwrites no file. Empty: none.
+  /// An existing folder for a capture of each failing pair and frame. No file is overwritten.
   std::filesystem::path folder{};
   int maxFiles = 100;  ///< most files over the life of an OctreeBasedCD, at least 0
 };
 
 /// Settings of an OctreeBasedCD for its life. A value out of range throws InvalidSettings. Results
-/// do not depend on the threads, trace and executor; captures hold only the threads of these.
+/// do not depend on threads, trace and executor. Captures hold no trace, executor and memory limit.
 struct Settings {
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
-  /// In [0, 1024]; 0: one per core, or the executor's concurrency. Fewer if refused.
+  /// In [0, 1024]; 0: one per core, or the executor's concurrency. The system may refuse some.
   int threads = 0;
   AuditSettings audit{};
-  /// Last detections that OctreeBasedCD::writeTrace() writes, in [0, 10000]; 0: none, no cost.
+  /// Number of detections that OctreeBasedCD::writeTrace() writes, in [0, 10000]; 0: no cost.
   int traceFrames = 0;
-  /// At most `threads` of its threads work. Objects may share it. Null: a thread pool of its own.
+  /// Runs the work on at most `threads` threads. Objects may share it. Null: an own thread pool.
   std::shared_ptr<Executor> executor{};
-  /// Bytes of all that the object allocates (Docs/Memory.md); 0: no limit. A call that needs more
-  /// throws MemoryLimit; the last answers stay readable and the next frame works.
+  /// Bytes that the object may allocate (Docs/Memory.md); 0: no limit. A call that needs more
+  /// throws MemoryLimit. The last answers stay readable; the next frame works.
   std::size_t memoryLimit = 0;
 };
 
 /// The definition of a contact. Docs/SupportMatrix.md lists the methods of each pair of types.
 enum class Method {
-  /// One of the others in each frame. It answers all pairs that any method answers. It misses no
-  /// impact where Continuous answers the pair and radii are not given per vertex.
+  /// The library chooses one of the others in each frame. It answers all pairs that any method
+  /// answers. Where Continuous answers the pair, it misses no impact, unless radii are per vertex.
   Auto,
   Intersection,  ///< triangles that intersect at the step's end, exact; touching counts
   /// Features at most the thickness and their radii apart at the step's end. After a crossing,
-  /// normals are on the wrong side. Trusted if all features of meshes within the thickness moved
-  /// less than their distance.
+  /// normals are on the wrong side. Two meshes are trusted only if features within the thickness
+  /// moved less than their distance.
   Proximity,
   /// Features at most the thickness and their radii apart at some time of the step (CCD).
   Continuous,
@@ -100,8 +100,8 @@ PALPATE_EXPORT const char* toString(Method) noexcept;  ///< its name, or "unknow
 
 /// Which of several contacts at the same features are reported.
 enum class Contacts {
-  /// One per pair of closest features (vertex, edge, triangle's interior): of Proximity, those that
-  /// hold the smallest distance; of impacts, the earliest, then the first in the order
+  /// One per pair of closest features: vertices, edges, triangles' interiors. Proximity: those that
+  /// hold the smallest distance. Impacts: the earliest, then the first in the order
   /// vertexTriangle(), triangleVertex(), edgeEdge(). Every vertex with weight keeps its earliest
   /// time. Shapes, lines and points have no contacts with inner edges and vertices of flat parts.
   Distinct,
@@ -120,10 +120,10 @@ struct ContinuousSettings {
 
 /// What only Auto uses.
 struct AutoSettings {
-  /// L, to 1e300; negative: half the thickness. Other methods accept negative only. Two triangle or
-  /// tetrahedral meshes with Distinct and a thickness: features that move at most this far,
-  /// relative to each other, are tested at the step's end, where the thickness is up to this much
-  /// larger. For all types it also limits the motion with which an attached field or proxy answers.
+  /// L, to 1e300; negative: half the thickness. Other methods accept negative only. For two
+  /// triangle or tetrahedral meshes with Distinct and a thickness. Features with at most this
+  /// relative motion are tested at the step's end. The thickness there is up to this much larger.
+  /// For all types it also limits the motion with which an attached field or proxy answers.
   double motionTolerance = -1.0;
 };
 
@@ -137,8 +137,8 @@ struct LeafSettings {
 /// Lengths are in L, from 0 to kLargestMeasure. See Docs/SupportMatrix.md.
 struct PairSettings {
   Method method = Method::Auto;
-  /// Features this far apart, and their radii, are contacts (d-hat of IPC). Proximity needs it to
-  /// be positive, or radii, or a shape. Intersection does not use it for contacts.
+  /// Features at most this far apart, plus radii, are contacts (d-hat of IPC). Proximity needs a
+  /// positive value, radii or a shape. The contacts of Intersection do not depend on it.
   double thickness = 0.0;
   Contacts contacts = Contacts::Distinct;  ///< Intersection reports all
   /// For a triangle, tetrahedral or line mesh with itself, else 0: features nearer than this along

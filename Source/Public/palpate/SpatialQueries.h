@@ -48,8 +48,9 @@ struct Ray {
 
 /// A connected part of what a ray and a surface share: its smallest t, on the lowest element there.
 /// Elements with radii, as one body, and shapes have a hit where the ray enters and one where it
-/// leaves, also a ray that starts on their surface and goes outward. A touch is one hit that does
-/// not cross. A ray in the face of a box or hull enters and leaves it; in a mesh it has one hit.
+/// leaves. A ray that starts on their surface and goes outward leaves them there. A touch is one
+/// hit that does not cross. A ray in the face of a box or hull enters and leaves it; in a mesh it
+/// has one hit.
 struct RayHit {
   GeometryId geometry;
   std::uint32_t element = kNoElement;
@@ -97,7 +98,8 @@ struct Penetration {
   bool intersecting;  ///< the bodies' insides have a common point, decided exactly for meshes
   Eigen::Vector3d direction;  ///< unit; 0 if not intersecting
   double depth;  ///< L: moving a by depth * direction separates the bodies; 0 if not intersecting
-  /// Meet last: a.position + depth * direction is b.position. kNoElement if not intersecting.
+  /// Points that meet last: a.position + depth * direction is at b.position. If the bodies do not
+  /// intersect, both have kNoElement.
   SurfacePoint a, b;
   bool minimal;  ///< no shorter translation separates the bodies, within the stated error
 };
@@ -118,8 +120,8 @@ struct PathClearance {
   SurfacePoint nearest;  ///< has this distance; kNoElement for a shape, or if there is no surface
 };
 
-/// Spatial queries at the positions now. Collision filters do not apply; disabled elements are
-/// searched. A segment is the hull of the balls at its ends.
+/// Spatial queries at the positions now, from OctreeBasedCD::queries(). Collision filters do not
+/// apply, and disabled elements are searched. A segment is the hull of the balls at its ends.
 /// Valid    until positions, transforms, topology or geometries change, or advance(); copies as
 ///          long. A detection leaves it valid.
 /// Threads  all functions are safe from any number of threads.
@@ -133,7 +135,7 @@ class PALPATE_EXPORT SpatialQueries {
   /// Cost     about logarithmic in the elements. Only exact comparisons of distances allocate.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
-  /// The same on all threads. A point without an answer has an infinite distance.
+  /// The same on all threads. A point without an answer has an infinite distance and kNoElement.
   /// Errors   InvalidSettings, too, for another size of `out`. Messages name the point: "point 3".
   void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
                      std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
@@ -145,9 +147,11 @@ class PALPATE_EXPORT SpatialQueries {
   /// Whether a point is inside. An undecided winding number counts as inside. With Closed the
   /// surface of a triangle mesh is outside, the boundary of a tetrahedron inside.
   /// Errors   those of findInsideVertices(); NonFinitePosition.
-  /// Cost     the first call after a change prepares the body; for Closed, after one of topology.
+  /// Cost     the first call after a change prepares the body, also in a Snapshot; of a closed
+  ///          triangle mesh only after a change of topology.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
-  /// Negative where contains() holds. Throws as contains(), and NotClosed without elements.
+  /// The distance from the surface, negative where contains() holds.
+  /// Errors   those of contains(); NotClosed for a body without elements.
   SignedDistance signedDistance(GeometryId body, const Eigen::Vector3d& point,
                                 const InsideSettings& = {}) const;
   /// The same on all threads, with the errors of closestPoints(), too.
@@ -158,18 +162,19 @@ class PALPATE_EXPORT SpatialQueries {
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
 
-  /// Rays are watertight: none passes between triangles that share an edge or vertex.
+  /// The first hit. Rays are watertight: none passes between triangles with a common vertex.
   /// Errors   NonFinitePosition; InvalidSettings for a direction of length 0, or a tMin that is not
   ///          finite or exceeds tMax.
   /// Cost     about logarithmic in the elements.
   std::optional<RayHit> firstHit(GeometryId, const Ray&) const;
   std::optional<RayHit> firstHit(const Ray&) const;  ///< of all; lowest if equal
   bool anyHit(GeometryId, const Ray&) const;         ///< whether there is a hit
-  /// First hits of many rays on all threads. A ray without a hit has an infinite t.
+  /// First hits of many rays on all threads. A ray without a hit has an infinite t and kNoElement.
   /// Errors   InvalidSettings, too, for another size of `out`. Messages name the ray: "ray 3".
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;  ///< by ascending t
-  /// Among all geometries. frontFacesOnly also leaves out lines and points without a radius.
+  /// What a ray selects among all geometries. frontFacesOnly: other hits do not count, so that
+  /// lines and points without a radius are not selected.
   std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
 
   /// The elements with a point in the solid shape, ascending.
@@ -178,15 +183,16 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   InvalidShape, InvalidTransform; UnsupportedMethod if the geometry is a shape.
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Pose&,
                    std::vector<std::uint32_t>& elements) const;
-  /// The contacts of a pair of both by Method::Proximity and Contacts::Distinct, as in shape().
+  /// The contacts that a pair of both would have by Method::Proximity and Contacts::Distinct, in
+  /// the order of CollisionData::shape().
   /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
   /// Cost     follows the elements near the shape. Only another box or hull allocates again.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Pose&, double thickness,
                 std::vector<ShapeContact>& out) const;
-  /// The contacts of a pair (geometry, mesh) by Method::Proximity and Contacts::Distinct, without
-  /// disabled elements. Of filters only Sidedness applies. With thickness 0, features that touch
-  /// have contacts; an edge that only pierces a triangle has none. validity() has the method, the
-  /// thickness and the number of contacts only.
+  /// The contacts that a pair (geometry, mesh) would have by Method::Proximity and
+  /// Contacts::Distinct, without disabled elements. Of filters only Sidedness applies. With
+  /// thickness 0, features that touch have contacts; an edge that only pierces a triangle has none.
+  /// validity() has the method, the thickness and the number of contacts only.
   /// Errors   those of the other contacts(); InvalidCall if the mesh was moved from.
   /// Cost     follows the elements near the mesh. Another size of geometry may rebuild the mesh's
   ///          octree; a repeated call allocates nothing.
@@ -233,8 +239,9 @@ class PALPATE_EXPORT SpatialQueries {
   /// overlap, it is on the outer surface; where more than two meet in a point, a nearer one may be
   /// missed. The accuracy is that of vertexTriangleDistance(), but less where triangles intersect.
   /// Order    by vertex, ascending.
-  /// Errors   NotClosed for what is no mesh, and with Closed, with the first edge, for defects;
-  ///          InvalidSettings if both are the same; UnsupportedMethod if `vertices` is a shape.
+  /// Errors   NotClosed for a body that is no mesh, and with Closed for a triangle mesh with
+  ///          defects, with the first edge; InvalidSettings if both are the same; UnsupportedMethod
+  ///          if `vertices` is a shape.
   void findInsideVertices(GeometryId vertices, GeometryId body, std::vector<InsideVertex>& out,
                           const InsideSettings& = {}) const;
   /// The vertices in or on a tetrahedron, ascending, with the lowest that contains each, decided
@@ -243,7 +250,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          InvalidSettings if both are the same.
   void findEmbeddedVertices(GeometryId vertices, GeometryId body,
                             std::vector<EmbeddedVertex>& out) const;
-  /// The same for a point in L. Throws UnsupportedMethod as above, and NonFinitePosition.
+  /// The same for a point, L.
+  /// Errors   UnsupportedMethod if the body is no tetrahedral mesh; NonFinitePosition.
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body,
                                                   const Eigen::Vector3d& point) const;
 

@@ -36,17 +36,18 @@ struct HeldVertex {
 ///          translation. A rotation is the normalised interpolation of the quaternions.
 /// Features all pairs are guarded, with filters, predicates and disabled elements, as by
 ///          Method::Continuous with thickness 0. Features with a common vertex never touch.
-/// Radii    count, and shapes. A segment counts with its largest radius or, if it begins nearer,
-///          with the radii of 16 pieces. Features that restDistance excludes have no radii.
+/// Radii    lines, points and shapes touch at the surfaces of radii and shapes. A segment counts
+///          with its largest radius or, if it begins nearer, with the radii of 16 pieces. Features
+///          that restDistance excludes have no radii.
 /// Laws     for the step from `before` to the positions after hold(), as Continuous moves it:
 ///          (1) features without radii do not touch, exactly on the doubles.
 ///          (2) other features, and shapes, come no nearer than their radii, or where they began,
 ///          less 2^-33 of their largest coordinate difference and radius and 2^-38 of their motion,
 ///          and for shapes their own error (Docs/Accuracy.md).
-///          (3) a part that touches nothing makes its whole step, unless a shortened one is in its
-///          way.
-///          (4) only parts that approach are shortened, by their normal motion, to 1/8 of the room.
-///          After 8 rounds all parts connected by touches are, to 7/8 of the first touch's time.
+///          (3) a part that touches nothing makes its whole step, unless a shortened one blocks it.
+///          (4) only parts that approach are shortened, by their normal motion, so that 1/8 of the
+///          room is left. After 8 rounds all parts connected by touches are shortened, to 7/8 of
+///          the first touch's time.
 ///          (5) parts change only their connected component. Parts at rest or fixed connect none.
 ///          (6) a part keeps a positive fraction, if more than rounding is left before a touch.
 ///          (7) a second call changes nothing.
@@ -63,7 +64,7 @@ struct HeldVertex {
 /// Threads  hold() counts as a call of the OctreeBasedCD that changes it.
 class PALPATE_EXPORT StepGuard {
  public:
-  /// It may be moved, and destroyed before the guard.
+  /// The OctreeBasedCD may be moved, and destroyed before the guard.
   explicit StepGuard(OctreeBasedCD&);
   StepGuard(StepGuard&&) noexcept;
   StepGuard& operator=(StepGuard&&) noexcept;
@@ -71,20 +72,20 @@ class PALPATE_EXPORT StepGuard {
 
   /// Whether this pair, in either order, is guarded; true at first. Throws UnknownPair.
   void setGuarded(GeometryId a, GeometryId b, bool guarded);
-  /// One fraction for all; groups with a common vertex join. A group may deform while it turns:
-  /// place rigid bodies by setTransform(). Absent vertices do not count. Throws IndexOutOfRange.
+  /// These vertices make one fraction of their steps. Groups with a common vertex join. A group
+  /// that turns may deform. Absent vertices do not count. Throws IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
-  /// Only these, and groups with one of them, make their whole step; {kNoElement}: all. After
-  /// ImpactRemains, set their `now` to `before` and hold() again. Throws IndexOutOfRange.
+  /// Only these vertices, and groups with one of them, always make their whole step; {kNoElement}:
+  /// all. After ImpactRemains, set their `now` to `before`.
+  /// Errors   IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
   /// Shortens steps: sets positions and transforms now, and returns the size of held().
   /// Errors   ImpactRemains, with features that touched before the step or move only fixed
-  ///          vertices; UnsupportedMethod for pairs with a DistanceField; those of
-  ///          detectCollision().
+  ///          vertices; UnsupportedMethod with a DistanceField; those of detectCollision().
   std::size_t hold();
 
-  /// Shortened by the last successful hold(), ascending. Valid until the next one.
+  /// What the last successful hold() shortened, ascending. Valid until the next hold().
   std::span<const HeldVertex> held() const;
   std::size_t rounds() const;  ///< number of detections in the last successful hold()
 

@@ -33,7 +33,7 @@ PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "
 /// Whether the last answer for a pair can be trusted, and what is known about the step.
 /// Laws     (1) if trusted by Proximity, Continuous or Auto: every normal is on the side from which
 ///          its features came, and no features that touched or crossed within the step are missing.
-///          By Contacts::Distinct another contact may stand for them; filters may refuse them.
+///          With Contacts::Distinct another contact may stand for them; filters may refuse them.
 ///          (2) if trusted by Intersection, also of Auto at rest without a thickness: if the meshes
 ///          touched within the step, the answer is not empty. Normals are not certified.
 ///          (3) if not trusted, Continuous and Auto still miss no impact of straight motion, except
@@ -47,17 +47,17 @@ PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "
 struct Validity {
   bool trusted = false;  ///< whether the conditions of `method` held in this step
   /// Whether surfaces are known neither to intersect nor to touch at the step's start; a mesh may
-  /// be wholly inside another. If false, Auto knows that they do, radii and shapes within rounding,
-  /// unless `method` is Intersection, DistanceField or Proxy, or Proximity with a radius per
-  /// vertex; other methods may not know.
+  /// be wholly inside another. If false, other methods than Auto may not know. Auto knows that they
+  /// do, radii and shapes within rounding, except by Intersection, DistanceField, Proxy, or
+  /// Proximity with a radius per vertex.
   bool startedApart = false;
-  /// The opposite of `trusted`; by Intersection false, which certifies no side.
+  /// The opposite of `trusted`. By Intersection it is false, although no side is certified.
   bool sideMayBeWrong = true;
   /// Whether a mesh with itself has equal positions but no two triangles with a common vertex, as
   /// an STL file. The answer is then not trusted. Found when elements are set or enabled.
   bool unwelded = false;
 
-  /// Auto: Proximity and Continuous, feature by feature. The laws of `trusted` refer to it.
+  /// The main method, to which the laws refer. Auto: Proximity and Continuous, by feature.
   Method method = Method::Auto;
   MethodReason reason = MethodReason::Requested;  ///< why `method` answered
   std::size_t atEnd = 0;                          ///< number of contacts at the step's end
@@ -66,12 +66,12 @@ struct Validity {
   /// L: upper bound on the motion of any two features relative to each other. Of a plane that
   /// turns, that of one of its points.
   double displacement = 0;
-  /// L: the limit of `displacement` for Proximity, the thickness, and for Intersection, the
-  /// smallest height of a triangle when topology was set. Auto with two meshes: the motion
-  /// tolerance, no condition. Continuous: infinity.
+  /// L: the largest `displacement` that meets the condition: of Proximity the thickness, of
+  /// Intersection the smallest height of a triangle when topology was set, of Continuous infinity.
+  /// Of Auto with two meshes it is the motion tolerance, which is no condition.
   double displacementLimit = 0;
   /// L: how far straight motion is off the arcs of turning bodies, as a sum; infinity for a plane.
-  /// Not trusted beyond the thickness; for Proximity with `displacement` added.
+  /// An answer is not trusted if it exceeds the thickness, for Proximity with `displacement` added.
   double arcDeviation = 0;
   /// L: the thickness, by Auto up to the motion tolerance more, 0 for Intersection. Feature pairs
   /// further apart at the step's end are contacts only by an impact.
@@ -80,10 +80,10 @@ struct Validity {
   /// the largest radius and the edge of the smallest leaf. 0 for other methods.
   double proxyDepth = 0;
 
-  /// Vertices that make the answer untrusted, ascending: by Proximity and Intersection the first
-  /// kMaxFastVertices of each geometry that moved, relative to the other one, over
-  /// `displacementLimit`; by Proximity those that may have touched within the step, too. Otherwise,
-  /// and with shapes, empty. Self-collision: all in A.
+  /// Vertices that make the answer untrusted, ascending. By Proximity and Intersection: the first
+  /// kMaxFastVertices of each geometry with a relative motion above `displacementLimit`. By
+  /// Proximity also those that may have touched within the step. Otherwise, and with shapes: none.
+  /// Self-collision: all in A.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles without area in contacts, ascending. Empty for pairs with a shape.
   std::vector<std::uint32_t> degenerateTrianglesA, degenerateTrianglesB;

@@ -46,7 +46,8 @@ struct MeshReadSettings {
 ///          elements, for other cells (by name), and for a coordinate not finite or beyond
 ///          kLargestMeasure. OBJ and legacy VTK files truncated between lines or sections are not
 ///          recognised. Those of weld().
-/// Cost     linear; memory of at most 20 times the file's size, by ZLib 1032.
+/// Cost     linear; memory of at most 20 times the file's size; ZLib stores up to 1032 bytes in
+///          one.
 /// Threads  safe from any number of threads. The locale has no effect.
 PALPATE_EXPORT MeshArrays readMeshFile(const std::filesystem::path& path,
                                        const MeshReadSettings& settings = {});

@@ -13,8 +13,7 @@ namespace palpate::vtk {
 /// Copies the positions and elements of a data set of VTK.
 /// Shapes   all points in their order. Polygons and quads become fans about their first corner,
 ///          strips triangles, polylines segments, vertices points. Other data are left behind.
-/// Errors   UnsupportedMethod for other cells, by name; NonFinitePosition, IndexOutOfRange,
-///          TooLarge.
+/// Errors   NonFinitePosition, IndexOutOfRange, TooLarge; UnsupportedMethod for others.
 /// Cost     linear.
 /// Threads  as VTK's, which may build its list of cells: no other thread may use the data set.
 PALPATE_EXPORT MeshArrays toMeshArrays(vtkPolyData&);

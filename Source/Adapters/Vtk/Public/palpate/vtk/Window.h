@@ -42,9 +42,9 @@ struct View {
   double height = 0;  ///< L: the height of the picture; 0: everything is in view
 };
 
-/// A window that shows the geometries of an OctreeBasedCD and its last answers: contacts midway
-/// between their points with normals, coloured by distance and visible through bodies; vertices
-/// that validity() names, in magenta; octree cells; bars of length and distance; a panel of times.
+/// A window that shows the geometries of an OctreeBasedCD and its last answers. Contacts are midway
+/// between their points, with normals, coloured by distance. Vertices that validity() names are
+/// magenta.
 ///
 ///   palpate::vtk::Window window(collisions);
 ///   while (window.show()) {
@@ -57,8 +57,8 @@ struct View {
 ///          mouse turns the view; a click names an element.
 /// Needs    an OctreeBasedCD that stays at its address. From show() to press() and pick() only its
 ///          positions and transforms may change.
-/// Errors   NotAvailable without a display, also off screen; InvalidSettings: sizes are in [1,
-///          16384].
+/// Errors   NotAvailable without a display, also off screen; InvalidSettings for sizes beyond 1 to
+///          16384.
 /// Threads  make all calls from the thread that made the window.
 class PALPATE_EXPORT Window {
  public:
