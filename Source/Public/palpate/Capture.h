@@ -88,7 +88,7 @@ struct CollisionProblem {
 
 // A capture is a text file of a CollisionProblem that keeps every double's bits.
 
-/// Writes OctreeBasedCD::problem(): after a frame and before positions change, that frame.
+/// Writes OctreeBasedCD::problem(): after a frame and before positions change it is that frame.
 /// Errors   File, and an existing file is then unchanged; NonFinitePosition beyond kLargestMeasure.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const std::filesystem::path&);
 
@@ -99,10 +99,10 @@ PALPATE_EXPORT void capture(const OctreeBasedCD&, const AuditFailure&,
 /// Writes a problem to a file, with the errors of capture() and setUp().
 PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem::path&);
 
-/// Throws File, with name and reason, also for content that an OctreeBasedCD refuses.
+/// Reads a capture. Throws File with a reason, also for content that an OctreeBasedCD refuses.
 PALPATE_EXPORT CollisionProblem readCapture(const std::filesystem::path&);
 
-/// Ready for detectCollision(), with new octrees; geometry i has the id GeometryId{i}.
+/// Makes an OctreeBasedCD with new octrees. Geometry i has the id GeometryId{i}.
 /// Errors   those of the functions of OctreeBasedCD that add geometries and pairs.
 PALPATE_EXPORT OctreeBasedCD setUp(const CollisionProblem&);
 

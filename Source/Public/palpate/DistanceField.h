@@ -13,11 +13,11 @@
 
 namespace palpate {
 
-/// Of DistanceField::build(). A value out of range throws InvalidSettings.
+/// Settings of DistanceField::build(). A value out of range throws InvalidSettings.
 struct DistanceFieldSettings {
   /// L, positive: what value() may be off by in the band. If it exceeds the band, the band counts.
   double errorBound = 0.0;
-  /// L, positive: up to which distance errorBound holds. Both are at least 2^-18 of the longest
+  /// L, positive: the distance up to which errorBound holds. Both are at least 2^-18 of the longest
   /// side of the box with the band, itself in [2^-400, 2^400], and 2^-36 of its largest coordinate.
   double band = 0.0;
   /// Bytes of the field and the build, without the queries' copy of the mesh; 0: no limit. A build
@@ -25,7 +25,7 @@ struct DistanceFieldSettings {
   std::size_t memoryLimit = std::size_t{1} << 31;
   /// In [0, 1024]; 0: one per core. The field does not depend on it.
   int threads = 0;
-  /// Gets an increasing estimate in [0, 1] on the building thread. False: build() throws Cancelled.
+  /// Called on the building thread with an increasing estimate. False: build() throws Cancelled.
   std::function<bool(double fraction)> progress{};
 };
 
@@ -55,15 +55,17 @@ class PALPATE_EXPORT DistanceField {
   ///                 band - errorBound(). In the domain, a box around the mesh and its band, it is
   ///                 at most the band; outside, the band and the distance from the domain.
   /// Where signIsReliable() is false, this holds without signs; the value jumps at faces of cells.
-  /// Units    L. Throws NonFinitePosition.
+  /// Units    L.
+  /// Errors   NonFinitePosition.
   /// Cost     some tens of nanoseconds; allocates nothing.
   double value(const Eigen::Vector3d&) const;
   /// Whether the sign of value() is reliable. Of an open mesh: every patch that closes it and has a
   /// winding number below 5/8 in magnitude there gives this sign.
   /// Errors   NonFinitePosition.
   bool signIsReliable(const Eigen::Vector3d&) const;
-  /// Of value(). It jumps at the faces of cells, where the cell with the larger coordinates counts,
-  /// and at the band's end. It is 0 where the value is the band, and unit outside the domain.
+  /// The gradient of value(). It jumps at the faces of cells, where the cell with the larger
+  /// coordinates counts, and at the band's end. It is 0 where the value is the band, and unit
+  /// outside the domain.
   /// Errors   NonFinitePosition.
   Eigen::Vector3d gradient(const Eigen::Vector3d&) const;
   /// value() of many points, with the same bits, on the calling thread.
@@ -73,7 +75,7 @@ class PALPATE_EXPORT DistanceField {
 
   /// Writes a file completely or not at all; equal fields give equal files. Throws File.
   void save(const std::filesystem::path&) const;
-  /// Reads it, safe for any content. Throws File, with the name and the byte of the fault.
+  /// Reads a file of save(); any content is safe. Throws File, with the name and the byte.
   static DistanceField load(const std::filesystem::path&);
 
   struct Implementation;  ///< not part of the interface

@@ -8,7 +8,7 @@
 
 namespace palpate {
 
-/// Runs the library's work on threads of yours. Objects and the program may share an executor.
+/// Runs the library's work on your threads. Several objects and the program may share it.
 /// Needs    run() accepts calls from any thread, from several at once, and from inside a task; in
 ///          each case the calling thread or a free one makes progress.
 /// Laws     (1) results do not depend on the executor: tasks may run in any order, on any thread.
@@ -21,7 +21,7 @@ class PALPATE_EXPORT Executor {
 
   virtual ~Executor();
 
-  /// Tasks that can run at once, with one on the calling thread: at least 1, constant.
+  /// How many tasks can run at once, with one on the calling thread: at least 1, constant.
   virtual int concurrency() const noexcept = 0;
 
   /// Calls task(context, index) once for each index in [0, count) and returns when all have ended.
@@ -36,7 +36,7 @@ class PALPATE_EXPORT Executor {
 
 /// The library's own pool, by oneTBB if built with it.
 ///
-/// threads: that run tasks at once, with the caller of run(), in [1, 1024]; 0: one per core.
+/// threads: how many run tasks, with the caller of run(), in [1, 1024]; 0: one per core.
 /// concurrency() may be smaller. In the child of a fork() the calling thread runs all tasks.
 /// Errors   InvalidSettings for `threads`. In the child of a fork() in a task, run() throws
 ///          NotAvailable if other threads had begun its tasks.

@@ -100,9 +100,9 @@ struct TimeOfImpactSettings {
 ///          - t) before + t now, in real arithmetic, t in [0, 1]. All finite doubles are valid.
 /// Returns  a fraction of the step, at most `timeTolerance` before the first impact and never after
 ///          it; none without one. Exact with minimumDistance 0, also without area, extent or
-///          motion. With d > 0, times at distances up to d + e count, too: e = timeTolerance * m +
-///          2^-35 * (c + d), m the largest displacement between vertices of both features, c their
-///          largest coordinate difference.
+///          motion. With d > 0 there may be false positives, at distances up to d + e. Here e =
+///          timeTolerance * m + 2^-35 * (c + d), m is the largest relative displacement of vertices
+///          of the two features, c their largest coordinate difference.
 /// Laws     (1) permuting corners, swapping before and now, and exact scaling by a power of two do
 ///          not change whether there is an impact.
 /// Errors   none.

@@ -45,7 +45,7 @@ class PALPATE_EXPORT LooseOctree {
     std::span<const std::uint32_t> elements;  ///< in this node itself; valid until the next update
   };
 
-  /// Those with elements in their subtrees, parents before children. Linear in the nodes.
+  /// Nodes with elements in their subtrees, parents before children. Linear in the nodes.
   std::vector<Node> nodes(GeometryId) const;
   std::vector<GeometryId> geometries() const;  ///< those with nodes, ascending
   Update lastUpdate(GeometryId) const;         ///< what the last update did to its tree

@@ -19,18 +19,18 @@ struct MeshDefects {
   std::vector<Segment> shared;   ///< edges of three triangles or more
   /// Whether two triangles or more share no vertex at all, as in an STL file: weld() joins them.
   bool unwelded = false;
-  /// By positions: a closed mesh is wound inward, its volume negative by more than rounding.
+  /// From positions: whether a closed mesh has a negative volume, by more than rounding.
   bool insideOut = false;
-  /// By positions, unless unwelded: triangles that meet, of parts not connected by vertices.
+  /// From positions, unless unwelded: triangles that meet, of parts not connected by vertices.
   std::vector<ElementPair> overlapping;
 
   /// whether no edge is at fault
   bool closed() const { return open.empty() && flipped.empty() && shared.empty(); }
 };
 
-/// By vertex indices. A triangle that names a vertex twice has no edges. No errors.
+/// Compares edges by vertex indices. A triangle that names a vertex twice has no edges.
 PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
-/// By positions, too. Throws as OctreeBasedCD::addTriangleMesh() for geometry 0.
+/// Also finds what positions show. Throws as OctreeBasedCD::addTriangleMesh(), for geometry 0.
 /// Cost     grows with the overlapping boxes of triangles: 1 s for 20,000 around one vertex.
 PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 
@@ -48,7 +48,7 @@ PALPATE_EXPORT const char* toString(InsideRule) noexcept;  ///< its name, or "un
 /// Values out of range throw InvalidSettings.
 struct InsideSettings {
   InsideRule rule = InsideRule::Closed;
-  /// In [0, 1/2). WindingNumber: this near to 1/2, InsideVertex::decided is false.
+  /// In [0, 1/2). WindingNumber finds vertices this near to 1/2 with InsideVertex::decided false.
   double margin = 0.0;
 };
 
@@ -64,7 +64,8 @@ struct InsideVertex {
   friend bool operator==(const InsideVertex&, const InsideVertex&) = default;
 };
 
-/// The faces of one tetrahedron only, which collide. triangles[i] belongs to tetrahedra[i].
+/// The triangles with which a tetrahedral mesh collides: faces of exactly one tetrahedron.
+/// triangles[i] belongs to tetrahedra[i].
 /// Order    by tetrahedron, then by the corner that the face lacks.
 /// Winding  outward at rest, decided exactly, for any order of corners; deformation does not change
 ///          it. Tetrahedra without volume are wound as the nearest ones with volume over faces, or
@@ -74,8 +75,9 @@ struct TetrahedralSurface {
   std::span<const std::uint32_t> tetrahedra;
 };
 
-/// The weighted sum of the vertices' positions. Weights are at least 0, within 2^-49 of exact, sum
-/// to 1 within 2^-50, and are 0 for the vertex opposite to a face with the point.
+/// A point of a tetrahedral mesh, as the weighted sum of vertices. Weights are at least 0, within
+/// 2^-49 of exact, sum to 1 within 2^-50, and are 0 for the vertex opposite to a face with the
+/// point.
 struct TetrahedronPoint {
   std::uint32_t tetrahedron;      ///< its index in the mesh
   Tetrahedron vertices;           ///< of the tetrahedron

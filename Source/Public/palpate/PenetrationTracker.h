@@ -18,16 +18,16 @@ enum class DirectionChange {
   None,  ///< the nearest direction; it turned no further than motion explains
   /// The last direction, as the nearest would have turned further than motion explains.
   Kept,
-  /// The nearest, which turned further, as the last one no longer leaves the body within the depth.
+  /// The nearest, which turned further: the last one does not leave within kMaxDepthRatio.
   Jumped
 };
 PALPATE_EXPORT const char* toString(DirectionChange) noexcept;  ///< its name, or "unknown"
 
 /// A vertex inside a body with a penetration direction that is stable over time.
 struct TrackedVertex {
-  /// Length of the difference of unit vectors, beyond what motion explains; 0.5 is 29 degrees.
+  /// Largest turn beyond what motion explains: a difference of unit vectors. 0.5 is 29 degrees.
   static constexpr double kMaxTurn = 0.5;
-  /// Of a kept direction's depth to the nearest surface point's.
+  /// Largest depth of a kept direction, as a multiple of the distance to the surface.
   static constexpr double kMaxDepthRatio = 2.0;
 
   InsideVertex penetration;  ///< Kept: where the last direction leaves the body
@@ -47,7 +47,7 @@ struct TrackedVertex {
 /// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
  public:
-  /// Ids of the OctreeBasedCD whose queries update() receives and checks.
+  /// The ids are those of the OctreeBasedCD whose queries update() receives and checks.
   PenetrationTracker(GeometryId vertices, GeometryId body);
   PenetrationTracker(PenetrationTracker&&) noexcept;
   PenetrationTracker& operator=(PenetrationTracker&&) noexcept;

@@ -11,14 +11,15 @@
 
 namespace palpate {
 
-/// Positions, transforms, octrees and motion at publish(); it never changes.
+/// Positions, transforms, octrees and motion of all geometries at publish(). It never changes.
 /// Valid    with its spans as long as a shared_ptr holds it, also after the OctreeBasedCD.
 /// Threads  all functions are safe from any number of threads. Batches run on the calling thread.
 /// Errors   UnknownGeometry for a geometry that the OctreeBasedCD did not have at publish().
 class PALPATE_EXPORT Snapshot {
  public:
-  /// At the positions now of publish(). A copy throws InvalidCall after the snapshot was released.
-  /// Threads with queries wait only for each other: for scratch, and while one prepares a geometry.
+  /// Queries at the positions now of publish(). A copy throws InvalidCall after the snapshot was
+  /// released. Threads with queries wait only for each other: for scratch, and while one prepares a
+  /// geometry.
   const SpatialQueries& queries() const;
   std::uint64_t number() const;  ///< counts the publications of the OctreeBasedCD, from 1
   double time() const;           ///< as passed to publish()
