@@ -64,8 +64,7 @@ std::vector<Eigen::Vector3d> copyPositions(std::span<const Real> numbers, std::s
   return positions;
 }
 
-/// A copy of the elements of an array, with N vertices each: 2 for a Segment, 3 for a Triangle, 4
-/// for a Tetrahedron.
+/// A copy of the elements of an array, with N vertices each, such as 3 for a Triangle.
 /// Needs    an array with size() and operator[], such as a std::span. Its items are integers of any
 ///          width, N for each element, or have an operator[] themselves.
 /// Errors   IndexOutOfRange names the first element with an index that is negative or beyond 32
@@ -122,10 +121,9 @@ struct CellTypes {
 };
 
 /// Appends a pair of cells for each contact: one to `a` for the first geometry, one to `b` for the
-/// second. A vertex or triangle is given by its index (idCount 1), an edge or a segment by its two
-/// vertices (idCount 2). A point of a point set is a vertex. The index of a triangle of a
-/// tetrahedral mesh is that in OctreeBasedCD::surface(). Contacts with analytical shapes are not
-/// included.
+/// second. A vertex, point or triangle is given by its index (idCount 1), an edge or segment by its
+/// two vertices (idCount 2). Triangles of tetrahedral meshes are those of OctreeBasedCD::surface().
+/// Contacts with shapes are not included.
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(); one cell per contact.
 /// Needs    an Element with ids[4], idCount and cellType.
 template <class Element, class CellType>

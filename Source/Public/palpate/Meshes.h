@@ -76,8 +76,7 @@ struct TetrahedralSurface {
 };
 
 /// A point of a tetrahedral mesh, as the weighted sum of vertices. Weights are at least 0, within
-/// 2^-49 of exact, sum to 1 within 2^-50, and are 0 for the vertex opposite to a face with the
-/// point.
+/// 2^-49 of exact, sum to 1 within 2^-50, and are 0 for vertices off a face that holds it.
 struct TetrahedronPoint {
   std::uint32_t tetrahedron;      ///< its index in the mesh
   Tetrahedron vertices;           ///< of the tetrahedron

@@ -64,7 +64,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
   /// Every pair and method treats its surface() as a triangle mesh with the same vertex ids.
-  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex, or one twice in a tetrahedron;
+  /// Errors   NonFinitePosition; IndexOutOfRange, also for a vertex twice in a tetrahedron;
   ///          SharedFace for a face of more than two; TooLarge beyond 2^28 vertices or 2^26
   ///          tetrahedra.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,

@@ -11,7 +11,7 @@
 
 namespace palpate {
 
-/// Positions, transforms, octrees and motion of all geometries at publish(). It never changes.
+/// The positions, transforms, octrees and motion at publish(). It never changes.
 /// Valid    with its spans as long as a shared_ptr holds it, also after the OctreeBasedCD.
 /// Threads  all functions are safe from any number of threads. Batches run on the calling thread.
 /// Errors   UnknownGeometry for a geometry that the OctreeBasedCD did not have at publish().

@@ -46,8 +46,7 @@ struct MeshReadSettings {
 ///          elements, for other cells (by name), and for a coordinate not finite or beyond
 ///          kLargestMeasure. OBJ and legacy VTK files truncated between lines or sections are not
 ///          recognised. Those of weld().
-/// Cost     linear; memory of at most 20 times the file's size; ZLib stores up to 1032 bytes in
-///          one.
+/// Cost     linear; memory of 20 times the file's size at most; ZLib stores 1032 bytes in one.
 /// Threads  safe from any number of threads. The locale has no effect.
 PALPATE_EXPORT MeshArrays readMeshFile(const std::filesystem::path& path,
                                        const MeshReadSettings& settings = {});

@@ -43,8 +43,7 @@ struct View {
 };
 
 /// A window that shows the geometries of an OctreeBasedCD and its last answers. Contacts are midway
-/// between their points, with normals, coloured by distance. Vertices that validity() names are
-/// magenta.
+/// between their points, with normals, coloured by distance. Vertices of validity() are magenta.
 ///
 ///   palpate::vtk::Window window(collisions);
 ///   while (window.show()) {
@@ -57,7 +56,7 @@ struct View {
 ///          mouse turns the view; a click names an element.
 /// Needs    an OctreeBasedCD that stays at its address. From show() to press() and pick() only its
 ///          positions and transforms may change.
-/// Errors   NotAvailable without a display, also off screen; InvalidSettings for sizes beyond 1 to
+/// Errors   NotAvailable without a display, also off screen; InvalidSettings for a size beyond
 ///          16384.
 /// Threads  make all calls from the thread that made the window.
 class PALPATE_EXPORT Window {
