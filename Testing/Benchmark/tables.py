@@ -112,14 +112,12 @@ def provenance(figures):
 TABLES = {
     "provenance": provenance,
     "race": race,
-    "stages": metrics("stages", "1 / 2 threads", lambda s: s in SHOWN, lambda e: e == "as shipped",
-                      columns=["boxes ms", "octree ms", "pairs ms"]),
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
     "continuous": metrics("continuous", "1 / 2 threads", engines=lambda e: not e.startswith("Embree"),
                           columns=["ms", "narrow phase ms"]),
-    "fields": metrics("fields", "1 thread", scenes=lambda s: s.endswith((" 1 %, band 3 %", " 0.1 %, band 0.3 %"))),
+    "fields": metrics("fields", "1 thread", scenes=lambda s: s.startswith(("sphere", "liver", "bone")) and
+                      s.endswith((" 1 %, band 3 %", " 0.1 %, band 0.3 %"))),
     "spatial": spatial,
-    "simd": metrics("simd", "1 thread", scenes=lambda s: s == "organs"),
     "types": types,
     "rigid": metrics("rigid", "1 / 2 threads"),
     "simplify": metrics("simplify", "1 thread"),
