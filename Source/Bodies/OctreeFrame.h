@@ -14,8 +14,8 @@
 namespace palpate {
 
 /// The float frame of a body's octree as it stands in the world now: positions of the world become
-/// floats, and boxes of floats become boxes in the world. Docs/Algorithms/LooseOctree.md proves the
-/// bounds of the errors.
+/// floats, and boxes of floats become boxes in the world. OctreeFrame.cpp proves the bounds of the
+/// errors.
 class OctreeFrame {
  public:
   explicit OctreeFrame(const Body&);
