@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""report.py COVERAGE: prints the lines and branches of each module from gcovr's JSON file and writes the table to
+"""report.py COVERAGE: prints the lines and branches of each module from gcovr's JSON file and writes their sum to
 Docs/Notes/Coverage.md. Lists what no test reaches in the checked modules and explained.txt does not explain: branches, and
 functions that are never called. Exit code 1 if there are any, or if an explanation applies to nothing."""
 
