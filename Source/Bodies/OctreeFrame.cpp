@@ -14,12 +14,6 @@ namespace palpate {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Notation of the proofs in this file. u is 2^-53, and |x| the largest coordinate of x. A body has
-// the rotation R and the translation t. o is the origin of its floats, and s their scale. w is the
-// origin's place in the world: o or, for a body that is placed, R o + t as rounded. L is the
-// largest magnitude of all floats, and r = L / s. No coordinate of a vertex of the body exceeds
-// |o| + r, and |t| is at most |w| + sqrt(3) |o|.
-
 namespace {
 
 double largest(const Vector3d& v) { return v.cwiseAbs().maxCoeff(); }
@@ -75,18 +69,7 @@ Matrix3d inverseOf(const Matrix3d& m) {
 /// All positions move in straight lines, and the inverse does not change in the step. Positions of
 /// a therefore move in straight lines in b's body, too, and the boxes of both ends enclose them.
 ///
-/// Errors: let A and B be the origins of the two float frames, s and t the translations, and r and
-/// q the reaches of the boxes about A and B. A row of a rotation has magnitudes whose sum is at
-/// most sqrt(3). In b's body, errors are at most
-///
-///     7 u (sqrt(3) (|A| + r) + |s|)              of a's vertices; 4 u of the same in the world
-///     7 u (sqrt(3) (|B| + q) + |t|)              of b's vertices
-///     75 u r                                     of the product of both rotations, 25 u an entry
-///     50 u (sqrt(3) |A| + |s| + |t|) + u |B|     of the offset
-///
-/// Together they are less than 128 u = 4 kPlacedError times 2 (|A| + r + |B| + q) + |s| + |t|. The
-/// length of the inverse's product with a unit vector exceeds 1 by less than 2 kOrthonormal. So
-/// does the thickness along a direction of b's body.
+/// LooseOctree.md derives the bound of the errors.
 template <class F>
 void forEachBodyEnd(const Body& a, const Body& b, double thickness, bool wholeStep, F&& f) {
   PALPATE_ASSERT(a.isPlaced() && b.isPlaced() && thickness >= 0.0);
@@ -136,23 +119,6 @@ double OctreeFrame::error() const {
   return m_pose ? kPlacedPointError * m_frame.scale * magnitude() : 0.0;
 }
 
-/// A position p becomes the floats nearest to s R^T (p - w), and a vertex x those nearest to
-/// s (x - o). The vertex is at R x + t in the world, as rounded. The distance of the floats is the
-/// distance in the world times s, with an error of less than kFloatPointError L + error():
-///
-/// - Each float is off by 2^-24 L. The distance of two points is off by 2 sqrt(3) times that, less
-///   than 0.44 times kFloatPointError L.
-/// - Entries of R^T R differ from the identity by at most kOrthonormal, so that the transpose is
-/// not
-///   quite the inverse. Lengths in the frame are at most 2 sqrt(3) r. They change by less than
-///   2^-25 L, times 1 / s.
-/// - w and the vertex are off by 4 u (sqrt(3) (|o| + r) + |t|) each, for a coordinate. The
-///   difference and its product with the transpose add less than 16 u r. Lengths are off by sqrt(3)
-///   times as much. The terms with r are far below 2^-40 L / s. The others are less than
-///   64 u (|w| + |o|), and error() is twice that.
-/// - kAbsolute covers floats that are denormal.
-///
-/// A body that is not placed has only the first error and the last.
 float OctreeFrame::slackAt(const FloatPoint& position) const {
   const float largest = std::max(m_body.tree.octree().box(0).reach(), position.box().reach());
   return largest >= kLargestFloat ? std::numeric_limits<float>::infinity()
@@ -160,10 +126,6 @@ float OctreeFrame::slackAt(const FloatPoint& position) const {
                                         OutwardRounding::kAbsolute;
 }
 
-/// Entries of the map are floats, and Octree/BoxMap.h covers all roundings in float. With q the
-/// origin of the result, vertices are off by 4 u (sqrt(3) (|o| + r) + |t|), and the offset
-/// R o + t - q by as much and u (|w| + |q|). BoxMap::kRelative covers the terms with r. The others
-/// are less than 32 u = kPlacedError times 2 |o| + |t| + |q|.
 BoxMap OctreeFrame::toWorld(const Vector3d& origin, double thickness, bool wholeStep) const {
   BoxMap map;
   if (!m_pose) return map;
