@@ -353,7 +353,7 @@ std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {
   Geometry& geometry = all.geometries.at(id);
   if (geometry.freeMotion.size() == geometry.freeMotionCount()) return geometry.freeMotion;
   for (const auto& record : all.pairs.records())
-    if (record->pair.settings.freeMotionReach > 0.0 &&
+    if (record->pair.settings.freeMotionReach > 0.0 && record->collides() &&
         (record->a == &geometry || record->b == &geometry))
       throw Error(ErrorCode::NotAvailable,
                   nameOf(geometry) + " has no free motion yet: call detectCollision() first", id);

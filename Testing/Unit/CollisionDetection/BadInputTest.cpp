@@ -433,9 +433,6 @@ TEST(BadInput, CandidatePairs) {
   expectKnown([&](Scene& scene, GeometryId id) { ask(scene, id, scene.tool); });
   expectRefused([&](Scene& scene) { ask(scene, scene.tool, scene.other); },
                 {ErrorCode::UnknownPair, {}});
-  // detectCollision() does not keep candidates by default.
-  expectRefused([&](Scene& scene) { ask(scene, scene.organ, scene.tool); },
-                {ErrorCode::NotAvailable, {}});
 }
 
 TEST(BadInput, OneCallPath) {
