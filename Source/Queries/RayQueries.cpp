@@ -169,7 +169,8 @@ void SpatialQueries::firstHits(GeometryId id, std::span<const Ray> rays,
   for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
   const Body& geometry = source->at(id);
   forParts(*source, rays.size(), [&](std::size_t begin, std::size_t end) {
-    RayQuery(*source).first(geometry, rays.subspan(begin, end - begin), out.subspan(begin));
+    RayQuery(*source).first(geometry, rays.subspan(begin, end - begin),
+                            out.subspan(begin, end - begin));
   });
 }
 
