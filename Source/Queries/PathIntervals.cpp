@@ -48,10 +48,10 @@ void append(const PathPart& part, std::vector<PathPart>& parts) {
   }
 }
 
-/// A place of [from, to] where f changes from above 0, at `from`, to at most 0, at `to`.
+/// A place between `from` and `to`, of which either may be the lower one, where f changes from
+/// above 0, at `from`, to at most 0, at `to`.
 template <class F>
 double rootBetween(double from, double to, F&& f) {
-  PALPATE_ASSERT(from <= to);
   for (;;) {
     const double middle = from + 0.5 * (to - from);
     if (middle == from || middle == to) return to;
