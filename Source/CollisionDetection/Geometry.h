@@ -61,7 +61,7 @@ struct Geometry : CountedObject {
   std::shared_ptr<const SurfaceProxy> proxy;  ///< attached, or null
   SurfaceProxySettings proxySettings;         ///< if there is one
   /// L: OctreeBasedCD::freeMotion(), of the last detection and of the one that runs. Empty before
-  /// one is needed. unlimited: the answer without a pair.
+  /// one is needed, and after a change of the elements. unlimited: the answer without a pair.
   Buffer<double> freeMotion, nextFreeMotion, unlimited;
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 

@@ -257,6 +257,7 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.smallestHeight = smallestHeight(geometry.body.mesh);
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
+  geometry.freeMotion.clear();
 }
 
 void GeometryTable::setName(GeometryId id, std::string name) {
@@ -298,6 +299,7 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
                   id, element);
   topology.disable(elements);
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
+  geometry.freeMotion.clear();
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads,

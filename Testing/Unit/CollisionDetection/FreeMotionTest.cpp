@@ -440,6 +440,20 @@ TEST(FreeMotion, FollowsPairsFiltersAndElements) {
   ASSERT_EQ(collisions.freeMotion(a).size(), low.positions.size());
   expectAll(a, 0.2), expectAll(b, 0.2), expectAll(alone, kInfinity);
 
+  // What was found for other elements is no answer, not even for as many vertices.
+  const auto expectOutdated = [&] {
+    expectRefused(ErrorCode::NotAvailable, "has no free motion yet",
+                  [&] { collisions.freeMotion(a); });
+    collisions.detectCollision();
+  };
+  collisions.setDisabledElements(a, std::vector<std::uint32_t>{0});
+  expectOutdated();
+  collisions.setDisabledElements(a, {});
+  expectOutdated();
+  collisions.setTriangles(a, low.positions, low.triangles);
+  expectOutdated();
+  expectAll(a, 0.2), expectAll(b, 0.2);
+
   collisions.setPairSettings(a, b, {.thickness = 0.1, .freeMotionReach = 0.1});
   collisions.detectCollision();
   expectAll(a, 0.05);
