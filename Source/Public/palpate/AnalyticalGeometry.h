@@ -15,7 +15,6 @@ namespace palpate {
 inline constexpr double kLargestMeasure = 1e300;                     ///< L
 inline constexpr std::size_t kMaxHullPoints = std::size_t{1} << 17;  ///< of one ConvexHull
 
-/// A ball.
 struct Sphere {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 0.0;  ///< finite, not negative

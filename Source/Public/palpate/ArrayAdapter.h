@@ -21,10 +21,8 @@ namespace palpate {
 
 static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
 
-/// The positions in an array of contiguous triples of doubles. Nothing is copied: the span is valid
-/// as long as the array.
-/// Needs    an array with size() and operator[]. Its items are contiguous doubles, three for each
-///          position, as in a std::vector<double>; or contiguous triples of doubles.
+/// The positions in an array of contiguous triples of doubles, in place: valid as the array is.
+/// Needs    size() and operator[], whose items are contiguous doubles or contiguous triples.
 /// Errors   WrongPositionCount for a number of doubles that is no multiple of 3.
 template <class Array>
 std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
@@ -43,9 +41,8 @@ std::span<const Eigen::Vector3d> positionsOf(const Array& array) {
   return {reinterpret_cast<const Eigen::Vector3d*>(&array[0]), size};
 }
 
-/// A copy of positions in floats or doubles, such as those of a vertex buffer for drawing.
-/// numbers  position i begins at numbers[i * stride]
-/// Errors   WrongPositionCount if a position is not whole, and InvalidSettings for a stride below 3.
+/// A copy of positions in floats or doubles; position i begins at numbers[i * stride].
+/// Errors   WrongPositionCount if a position is not whole; InvalidSettings for a stride below 3.
 template <class Real>
 std::vector<Eigen::Vector3d> copyPositions(std::span<const Real> numbers, std::size_t stride = 3) {
   static_assert(std::is_floating_point_v<Real>);
@@ -65,8 +62,7 @@ std::vector<Eigen::Vector3d> copyPositions(std::span<const Real> numbers, std::s
 }
 
 /// A copy of the elements of an array, with N vertices each, such as 3 for a Triangle.
-/// Needs    an array with size() and operator[], such as a std::span. Its items are integers of any
-///          width, N for each element, or have an operator[] themselves.
+/// Needs    size() and operator[], whose items are integers of any width or have an operator[].
 /// Errors   IndexOutOfRange names the first element with an index that is negative or beyond 32
 ///          bits, and WrongPositionCount a number of integers that is no multiple of N.
 template <std::size_t N, class Array>
@@ -102,8 +98,7 @@ std::vector<std::array<std::uint32_t, N>> elementsOf(const Array& array) {
   return elements;
 }
 
-/// The triangles of quads: (a, b, c) and (a, c, d) of each quad (a, b, c, d), in their order.
-/// Needs, Errors   as elementsOf<4>()
+/// The triangles (a, b, c) and (a, c, d) of each quad (a, b, c, d), in order, as elementsOf<4>().
 template <class Array>
 std::vector<std::array<std::uint32_t, 3>> trianglesOfQuads(const Array& array) {
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -114,7 +109,6 @@ std::vector<std::array<std::uint32_t, 3>> trianglesOfQuads(const Array& array) {
   return triangles;
 }
 
-/// The cell types of a simulator, for appendCells().
 template <class CellType>
 struct CellTypes {
   CellType vertex, edge, triangle;
@@ -122,9 +116,8 @@ struct CellTypes {
 
 /// Appends a pair of cells for each contact: one to `a` for the first geometry, one to `b` for the
 /// second. A vertex, point or triangle is given by its index (idCount 1), an edge or segment by its
-/// two vertices (idCount 2). Triangles of tetrahedral meshes are those of OctreeBasedCD::surface().
-/// Contacts with shapes are not included.
-/// Order    vertexTriangle(), triangleVertex(), edgeEdge(); one cell per contact.
+/// two vertices (idCount 2). Contacts with shapes are not included.
+/// Order    vertexTriangle(), triangleVertex(), edgeEdge().
 /// Needs    an Element with ids[4], idCount and cellType.
 template <class Element, class CellType>
 void appendCells(const CollisionData& contacts, const CellTypes<CellType>& types,

@@ -21,15 +21,13 @@
 namespace palpate {
 
 /// A contact in which a frame and brute force differ: a fault of the library. Of Auto only missing
-/// ones are reported. In a step that begins in intersection, those of vertices of triangles that
-/// intersect, and of bodies with contacts left out on an inner side, are not.
+/// ones are reported, with two exceptions (Docs/Accuracy.md).
 struct AuditFailure {
   enum class Fault {
     FalseNegative,  ///< not found; Earliest: too late
     FalsePositive,  ///< found, not expected, or found twice
     Different       ///< found with other values than expected
   };
-  /// The list of CollisionData, or its earliest time.
   enum class List {
     VertexTriangle,
     TriangleVertex,
@@ -55,7 +53,6 @@ PALPATE_EXPORT const char* toString(AuditFailure::List) noexcept;   ///< its nam
 
 /// All on which a frame depends except predicates, from OctreeBasedCD::problem().
 struct CollisionProblem {
-  /// A geometry of any type.
   struct Geometry {
     GeometryId id;  ///< in the original OctreeBasedCD; no answer depends on it
     /// L, in the world, also if placed; of a mesh with a field or leaves in the body's frame.
@@ -74,7 +71,6 @@ struct CollisionProblem {
     std::optional<SurfaceProxySettings> proxy{};   ///< of the leaves that are attached to a mesh
     std::string name{};                            ///< OctreeBasedCD::setName(); not in a file
   };
-  /// A collision pair.
   struct Pair {
     std::uint32_t a, b;  ///< indices in `geometries`
     PairSettings settings;
@@ -92,7 +88,6 @@ struct CollisionProblem {
 /// Errors   File, and an existing file is then unchanged; NonFinitePosition beyond kLargestMeasure.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const std::filesystem::path&);
 
-/// The same for one pair.
 PALPATE_EXPORT void capture(const OctreeBasedCD&, const AuditFailure&,
                             const std::filesystem::path&);
 
@@ -102,8 +97,7 @@ PALPATE_EXPORT void writeCapture(const CollisionProblem&, const std::filesystem:
 /// Reads a capture. Throws File with a reason, also for content that an OctreeBasedCD refuses.
 PALPATE_EXPORT CollisionProblem readCapture(const std::filesystem::path&);
 
-/// Makes an OctreeBasedCD with new octrees. Geometry i has the id GeometryId{i}.
-/// Errors   those of the functions of OctreeBasedCD that add geometries and pairs.
+/// A new OctreeBasedCD, where geometry i is GeometryId{i}. Throws as the calls that add to it.
 PALPATE_EXPORT OctreeBasedCD setUp(const CollisionProblem&);
 
 }  // namespace palpate

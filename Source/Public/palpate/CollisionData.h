@@ -18,27 +18,24 @@ namespace palpate {
 // Contacts of every method satisfy one law. With the positions at timeOfImpact, the sum of the
 // positions of stencil() times their weights is (distance + radii) * normal, with the radii at the
 // closest points. Of a ShapeContact, point - pointOnShape is (distance + radius) * normal.
-//
 // Error    32 ulp of the largest coordinate difference of the vertices, and the rounding of
 //          positions at that time. Continuous adds timeTolerance times the relative motion.
 // Time     contacts by Proximity and Intersection, also in Auto, are at the step's end: time 1.
 // Sign     a distance is negative where (1) radii overlap, (2) a shape overlaps, (3) by
-//          Intersection a vertex is behind the triangle; the normal is the winding normal in the
-//          interior, else on its side along the line through the closest points, (4) by
-//          Intersection edges have crossed, (5) Side applies.
+//          Intersection a vertex is behind the triangle or edges have crossed, (4) Side applies.
 // Depth    Intersection: a vertex is behind a surface if an edge leaves the surface towards it. It
-//          has one contact of negative distance: with the nearest feature around the triangles that
-//          its edges pierce, in the lowest triangle of that feature behind which it is.
+//          has one contact of negative distance: with the nearest feature around the triangles
+//          that its edges pierce, in the lowest triangle of that feature behind which it is. In
+//          the interior its normal is the winding normal, else on that side along the line through
+//          the closest points.
 // Touch    at distance 0, or for an impact without a thickness, the normal can separate the
-//          surfaces, as far as such a normal exists: that of a triangle at either feature, else the
-//          cross product of two edges there, else where features came from. The step, otherwise a
-//          closed surface, tells its side.
-// Side     by Proximity, that of the positions at the end, wrong after a crossing; of an impact,
-//          where its features came from. If a step of Auto begins in intersection, vertices behind
-//          the other surface, and impacts that leave it, have the side on which they leave; with
-//          Contacts::Distinct such vertices have contacts of Intersection only.
-// Bodies   where a step of Auto begins with two closed bodies deep in each other, all contacts have
-//          one direction along which they part. The distance is along it, negative inside.
+//          surfaces, as far as such a normal exists: that of a triangle at either feature, else
+//          the cross product of two edges there, else where features came from. The step,
+//          otherwise a closed surface, tells its side.
+// Side     by Proximity, that of the positions at the end; of an impact, where its features came
+//          from. Steps of Auto that begin in intersection: Docs/HowTo/Validity.md.
+// Bodies   Auto parts closed bodies deep in each other along one direction:
+//          Docs/Algorithms/Validity.md.
 
 /// A contact of a vertex with a triangle, a segment {p, q} as {p, q, q}, or a point p as {p, p, p}.
 struct VertexTriangleContact {
@@ -53,7 +50,6 @@ struct VertexTriangleContact {
   friend bool operator==(const VertexTriangleContact&, const VertexTriangleContact&) = default;
 };
 
-/// A contact of two edges.
 struct EdgeEdgeContact {
   std::array<std::uint32_t, 2> edgeA, edgeB;  ///< vertex indices, lower first
   double weightA, weightB;                    ///< closest point = p0 + weight (p1 - p0)
@@ -65,15 +61,14 @@ struct EdgeEdgeContact {
   friend bool operator==(const EdgeEdgeContact&, const EdgeEdgeContact&) = default;
 };
 
-/// The type of feature that touches a shape or a field.
 enum class ShapeElement : std::uint32_t { Vertex, Edge, Face };
 PALPATE_EXPORT const char* toString(ShapeElement) noexcept;  ///< its name, or "unknown"
 
 /// An element with an analytical shape, or with a body by DistanceField or Proxy, at timeOfImpact.
 /// Field    distance: the field's value at `point` less the radius; normal: along its gradient, or
 ///          the field's last axis where that is 0. pointOnShape follows from both.
-/// Proxy    the surface is a plane or triangle within CollisionData::errorBound(). By Auto,
-///          particles that may touch within the step have the exact method's contacts.
+/// Proxy    the surface is a plane or triangle within CollisionData::errorBound(); particles of
+///          Auto that may touch within the step have the exact method's contacts.
 struct ShapeContact {
   ShapeElement element;
   std::uint32_t id;  ///< Index of the vertex or triangle; for an edge its lower vertex.
@@ -88,8 +83,8 @@ struct ShapeContact {
   friend bool operator==(const ShapeContact&, const ShapeContact&) = default;
 };
 
-/// At timeOfImpact: of Continuous, the first time near enough. Apart, the points are closest;
-/// overlapping, the normal is the direction of the shortest translation that separates.
+/// At timeOfImpact the points are closest; overlapping, the normal is the direction of the shortest
+/// translation that separates.
 /// Error    pointA - pointB equals distance * normal, to 2e-3 of the sizes if a cylinder overlaps.
 struct ShapeShapeContact {
   Eigen::Vector3d pointA, pointB;  ///< L, on the surfaces of the first and of the second shape
@@ -99,8 +94,7 @@ struct ShapeShapeContact {
   friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
 };
 
-/// The weighted sum of the positions is the vector between the closest points. A contact force
-/// along the normal acts on vertex i with weight i.
+/// The weighted sum of the positions is the vector between the closest points.
 struct Stencil {
   std::array<std::uint32_t, 4> vertices;
   std::array<double, 4> weights;
@@ -150,11 +144,9 @@ class PALPATE_EXPORT CollisionData {
   std::span<const VertexTriangleContact> triangleVertex() const;
   std::span<const EdgeEdgeContact> edgeEdge() const;  ///< of both geometries
   /// Those that intersect at the step's end, from Intersection, also in Auto. Each has a contact of
-  /// its own or of a vertex behind the surface, perhaps with another triangle, unless a predicate
-  /// refuses it. In self-collision triangles with a common vertex may have none.
+  /// its own or of a vertex behind the surface, but for predicates and neighbours of one mesh.
   std::span<const ElementPair> intersectingTriangles() const;
-  /// Elements with a shape, or a body by DistanceField or Proxy; no other list then has contacts. A
-  /// particle that touches several triangles may have several, if Auto answers by Proxy.
+  /// Elements with a shape, or with a body by DistanceField or Proxy; other lists are then empty.
   std::span<const ShapeContact> shape() const;
   /// One contact if two shapes are at most the thickness apart, by Continuous at any time.
   std::span<const ShapeShapeContact> shapeShape() const;
@@ -162,18 +154,16 @@ class PALPATE_EXPORT CollisionData {
   double earliestTimeOfImpact() const;
 
   /// L: by how much distances may be off; 0 for methods exact up to rounding.
-  ///
   /// Field    that of the field, for each contact's point in the band. The least distance of an
-  ///          edge or triangle may be lower by half of it, and those up to that far below the
-  ///          thickness may be missing.
+  ///          edge or triangle may be lower by half of it, or missing if as near as that to the
+  ///          thickness.
   /// Proxy    what is proven of the planes that answered, and rounding. A particle is missing, or
   ///          in excess, only within this of the limit.
   double errorBound() const;
 
   const Validity& validity() const;
 
-  /// Of the ids, weights, normals, distances, times and features of all contacts in their order,
-  /// without validity(). Equal bits have equal hashes on every machine.
+  /// Of all contacts in their order, without validity(): the same bits on every machine.
   std::uint64_t hash() const;
 
   struct Contents;  ///< not part of the interface

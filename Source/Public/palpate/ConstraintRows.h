@@ -15,9 +15,10 @@
 namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
-/// Units    L. A solver keeps the gap at least h (Docs/HowTo/Solvers.md); the depth is h - gap.
+/// Units    L. A solver keeps the gap at least h; the depth is h - gap (Docs/HowTo/Solvers.md).
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
-///          plus the element's radius; p is the point of the shape's surface as law (1) moves it.
+///          plus the element's radius; p is the shape's touched point, where it is at the step's
+///          end.
 /// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
 ///          on by d until the step's end.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. It is also the distance's,
@@ -42,27 +43,22 @@ struct SolverVertices {
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
 };
 
-/// Appends a row for each contact of (a, b), linearised at its timeOfImpact.
-///
-/// body     the motion of the pair's shape or field's body, as set. Rows refer to where the touched
-///          point is at the step's end; by default the shape rests from timeOfImpact on.
-/// Needs    a body that turns by less than 90 degrees in the step.
+/// Appends a row for each contact of (a, b), linearised at its timeOfImpact, in linear time.
+/// body     the motion of the pair's shape or field's body, which turns by less than 90 degrees in
+///          the step. By default the shape rests from timeOfImpact on.
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(), shape(). shapeShape() has no rows.
 /// Errors   WrongPositionCount for the first contact with a vertex without position, and if both
 ///          sides have positions but shape() has contacts. No row is added then.
-/// Cost     linear in the contacts.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
                                const SolverVertices& b, std::vector<ConstraintRow>& rows,
                                const RigidMotion& body = {});
 
-/// Calls entry(context, row, 3 vertex + axis, value) for each entry of the rows' Jacobian that is
-/// not 0. Entries at one place add up.
+/// Calls entry(context, row, 3 vertex + axis, value) for the Jacobian; values at one place add up.
 PALPATE_EXPORT void forEachEntry(std::span<const ConstraintRow> rows,
                                  void (*entry)(void* context, int row, int column, double value),
                                  void* context);
 
-/// Appends the same as triplets, whose values at equal places add up.
-/// Needs    Triplet(row, column, value), such as Eigen::Triplet<double>.
+/// Appends them as Triplet(row, column, value), such as Eigen::Triplet<double>.
 template <class Triplet>
 void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& triplets) {
   forEachEntry(
@@ -73,7 +69,6 @@ void appendTriplets(std::span<const ConstraintRow> rows, std::vector<Triplet>& t
       &triplets);
 }
 
-/// One geometry of a pair, for appendMotions().
 struct ContactSide {
   SolverVertices vertices{};           ///< of a mesh, lines or points; empty for a shape
   std::span<const double> radii = {};  ///< L: none, one for all vertices, or one per vertex
@@ -84,19 +79,16 @@ struct ContactSide {
 /// Units    L; relativeDisplacement is that of the whole step.
 /// Laws     (1) point - opposite = distance normal, within the contact's error.
 ///          (2) normal . relativeDisplacement is the row's gap at `now` less that at `before`,
-///          within rounding, for two geometries with vertices. A tangent as normal, and offset 0,
-///          make a row of sliding.
+///          within rounding, for two geometries with vertices; also with a tangent and offset 0.
 struct ContactMotion {
   Eigen::Vector3d point;     ///< on the surface of the first side, at the contact's time
   Eigen::Vector3d opposite;  ///< the same on the other side
-  /// Over the step, of the first side's material less the other's, at the contact's weights. Lines
-  /// and points do not spin about their axes.
+  /// Of the first side's material less the other's, at the contact's weights. Lines do not spin.
   Eigen::Vector3d relativeDisplacement;
 };
 
 /// Appends a ContactMotion for each contact of (a, b) at its timeOfImpact.
 /// Order    that of appendRows(); for two shapes shapeShape(), whose first side is a.
-/// Needs    shapes that turn by less than 90 degrees in the step.
 /// Errors   those of appendRows(); InvalidRadius for radii that are not none, one, or one per
 ///          vertex. No motion is added then.
 /// Cost     linear in the contacts. It allocates nothing if the capacity is large enough.

@@ -38,7 +38,6 @@ PALPATE_EXPORT const char* toString(ErrorCode) noexcept;  ///< its name, or "unk
 /// Invalid calls throw it and change nothing. what() names geometry, element and value at fault.
 class PALPATE_EXPORT Error : public std::runtime_error {
  public:
-  /// sentence: the text of what().
   Error(ErrorCode code, const std::string& sentence, std::optional<GeometryId> geometry = {},
         std::optional<std::size_t> element = {});
 

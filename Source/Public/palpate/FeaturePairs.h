@@ -9,6 +9,8 @@
 
 namespace palpate {
 
+// No function throws, and the caller's floating-point environment changes no result.
+
 /// What holds a point. Corner i has the value i, the edge from it to the next corner 3 + i.
 enum class TriangleFeature : std::uint8_t {
   CornerA,
@@ -21,11 +23,9 @@ enum class TriangleFeature : std::uint8_t {
 };
 PALPATE_EXPORT const char* toString(TriangleFeature) noexcept;  ///< its name, or "unknown"
 
-/// The part of an edge that holds a point.
 enum class EdgeFeature : std::uint8_t { Start, End, Interior };
 PALPATE_EXPORT const char* toString(EdgeFeature) noexcept;  ///< its name, or "unknown"
 
-/// The result of vertexTriangleDistance().
 struct VertexTriangleDistance {
   Eigen::Vector3d weights;     ///< Weights of the closest point: at least 0, sum exactly 1.
   Eigen::Vector3d difference;  ///< L: from the closest point to the vertex.
@@ -39,12 +39,11 @@ struct VertexTriangleDistance {
 /// Shapes   one position each, any winding, all finite doubles. L in and out; weights 1.
 /// Returns  all within 8 ulp of the largest coordinate difference of the positions, the normal
 ///          within that divided by the distance; the feature exactly. At distance 0 the normal is
-///          the winding normal, or without area the axis of least extent, x before y before z.
+///          the winding normal, or without area the axis of least extent, x before y before z. A
+///          triangle without area is its longest edge or corner. NaN or infinity gives NaN.
 /// Laws     (1) permuting corners, mirroring an axis and scaling by powers of two, where exact,
 ///          give the same bits. If corners are mirror images, weights may differ by 2^-53.
 ///          (2) if an edge or corner holds the point, all triangles with it give the same bits.
-/// Errors   none. A triangle without area is its longest edge or corner. NaN or infinity gives NaN.
-/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Source   Gram-determinant signs certified by error bounds, else by integers; one compensated
 ///          Newton step in the feature's own coordinates. See Docs/Accuracy.md.
 PALPATE_EXPORT VertexTriangleDistance vertexTriangleDistance(const Eigen::Vector3d& p,
@@ -52,7 +51,6 @@ PALPATE_EXPORT VertexTriangleDistance vertexTriangleDistance(const Eigen::Vector
                                                              const Eigen::Vector3d& b,
                                                              const Eigen::Vector3d& c);
 
-/// The result of edgeEdgeDistance().
 struct EdgeEdgeDistance {
   double weightA, weightB;     ///< Closest points: p0 + weightA (p1 - p0), q0 + weightB (q1 - q0).
   Eigen::Vector3d difference;  ///< L: from the point on edge q to the point on edge p.
@@ -64,7 +62,7 @@ struct EdgeEdgeDistance {
 };
 
 /// The closest points of edges (p0, p1) and (q0, q1), and their distance.
-/// Shapes   one position each, all finite doubles.
+/// Shapes   one position each, all finite doubles. NaN or infinity gives NaN.
 /// Returns  with the accuracy of vertexTriangleDistance(). At distance 0 the normal is the cross
 ///          product of p1 - p0 and q1 - q0. For parallel edges it is then the axis of least extent,
 ///          x before y before z, reversed if edge q comes before p in lexicographic order. Parallel
@@ -72,8 +70,6 @@ struct EdgeEdgeDistance {
 /// Laws     (1) swapping an edge's ends turns its weight w into 1 - w, and reverses the normal at
 ///          distance 0 of edges that are not parallel; all else has the same bits.
 ///          (2) swapping different edges swaps the weights and reverses difference and normal.
-/// Errors   none. NaN or infinity in gives NaN out.
-/// Floating point  as for vertexTriangleDistance().
 PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
                                                  const Eigen::Vector3d& p1,
                                                  const Eigen::Vector3d& q0,
@@ -81,13 +77,11 @@ PALPATE_EXPORT EdgeEdgeDistance edgeEdgeDistance(const Eigen::Vector3d& p0,
 
 /// Whether two triangles have a common point, also by touching, decided exactly for finite doubles.
 /// A triangle without area is the segment or point that it covers. NaN has no meaning.
-/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Cost     bounded: least where floating point decides, most where only exact sums do.
 PALPATE_EXPORT bool trianglesIntersect(const Eigen::Vector3d& a0, const Eigen::Vector3d& a1,
                                        const Eigen::Vector3d& a2, const Eigen::Vector3d& b0,
                                        const Eigen::Vector3d& b1, const Eigen::Vector3d& b2);
 
-/// The definition of an impact and the accuracy of its time.
 struct TimeOfImpactSettings {
   /// L, finite: an impact is a distance of at most this; if not positive, a touch, decided exactly.
   double minimumDistance = 0.0;
@@ -105,8 +99,6 @@ struct TimeOfImpactSettings {
 ///          of the two features, c their largest coordinate difference.
 /// Laws     (1) permuting corners, swapping before and now, and exact scaling by a power of two do
 ///          not change whether there is an impact.
-/// Errors   none.
-/// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 /// Cost     bounded, most where floating point cannot decide; for d > 0 by 1 / timeTolerance steps.
 PALPATE_EXPORT std::optional<double> vertexTriangleTimeOfImpact(
     const Eigen::Vector3d& vBefore, const Eigen::Vector3d& aBefore, const Eigen::Vector3d& bBefore,

@@ -13,7 +13,6 @@
 
 namespace palpate {
 
-/// Sizes of all octrees of an OctreeBasedCD together.
 struct OctreeStatistics {
   std::size_t nodesInUse = 0;      ///< nodes with an element in their subtree
   std::size_t nodesAllocated = 0;  ///< eight per block of the pools, used or free
@@ -25,12 +24,11 @@ struct OctreeStatistics {
   std::size_t bytes = 0;  ///< memory of boxes, keys, nodes and scratch
 };
 
-/// A view of the octrees of all geometries with elements, for diagnostics and display.
+/// A view of the octrees of all geometries with elements (Docs/Algorithms/LooseOctree.md).
 /// Units    L, in the body's frame if setTransform() placed the geometry.
 /// Valid    as long as its OctreeBasedCD. Updates change it; after one that an exception ended, the
 ///          geometries concerned have no nodes.
 /// Threads  as const functions of OctreeBasedCD, but not while queries() updates octrees.
-/// Source   Docs/Algorithms/LooseOctree.md.
 class PALPATE_EXPORT LooseOctree {
  public:
   enum class Update { Rebuilt, Refitted, Unchanged };
@@ -51,10 +49,7 @@ class PALPATE_EXPORT LooseOctree {
   Update lastUpdate(GeometryId) const;         ///< what the last update did to its tree
   OctreeStatistics statistics() const;
 
-  /// One sentence for each violated invariant. Each element is in one node and in tight fitted
-  /// boxes; links agree both ways; blocks add up. After a rebuild, elements are in their centre's
-  /// cell and its loose bounds, up to 2^-22 of the root's edge.
-  /// Cost     linear in the elements.
+  /// A sentence for each violated invariant (Docs/Algorithms/LooseOctree.md), in linear time.
   std::vector<std::string> validate() const;
 
   struct State;  ///< not part of the interface

@@ -17,14 +17,11 @@ struct MeshDefects {
   std::vector<Segment> open;     ///< edges of only one triangle, as at the rim of a hole
   std::vector<Segment> flipped;  ///< edges that both triangles traverse in the same direction
   std::vector<Segment> shared;   ///< edges of three triangles or more
-  /// Whether two triangles or more share no vertex at all, as in an STL file: weld() joins them.
-  bool unwelded = false;
-  /// From positions: whether a closed mesh has a negative volume, by more than rounding.
-  bool insideOut = false;
+  bool unwelded = false;   ///< no two triangles share a vertex, as in STL files: weld() joins them
+  bool insideOut = false;  ///< from positions: the volume is negative, by more than rounding
   /// From positions, unless unwelded: triangles that meet, of parts not connected by vertices.
   std::vector<ElementPair> overlapping;
 
-  /// whether no edge is at fault
   bool closed() const { return open.empty() && flipped.empty() && shared.empty(); }
 };
 
@@ -34,13 +31,10 @@ PALPATE_EXPORT MeshDefects findMeshDefects(std::span<const Triangle> triangles);
 /// Cost     grows with the overlapping boxes of triangles: 1 s for 20,000 around one vertex.
 PALPATE_EXPORT MeshDefects findMeshDefects(const TriangleMeshView& mesh);
 
-/// Which points are inside a body.
 enum class InsideRule {
-  /// Where the winding number is not 0, decided exactly. Needs a tetrahedral mesh, or a closed one
-  /// with consistent winding.
+  /// Where the winding number of a closed mesh is not 0, or in a tetrahedron, decided exactly.
   Closed,
-  /// Where the generalised winding number of any triangles is at least 1/2 in magnitude, up to a
-  /// surface that spans a hole. Closed bodies: as Closed.
+  /// Where the generalised winding number is at least 1/2 in magnitude. Closed bodies: as Closed.
   WindingNumber
 };
 PALPATE_EXPORT const char* toString(InsideRule) noexcept;  ///< its name, or "unknown"
@@ -67,9 +61,8 @@ struct InsideVertex {
 /// The triangles with which a tetrahedral mesh collides: faces of exactly one tetrahedron.
 /// triangles[i] belongs to tetrahedra[i].
 /// Order    by tetrahedron, then by the corner that the face lacks.
-/// Winding  outward at rest, decided exactly, for any order of corners; deformation does not change
-///          it. Tetrahedra without volume are wound as the nearest ones with volume over faces, or
-///          as if the lowest connected one were wound correctly.
+/// Winding  outward at rest, decided exactly; deformation does not change it. Tetrahedra without
+///          volume are wound as the nearest ones with volume over faces, or as the lowest.
 struct TetrahedralSurface {
   std::span<const Triangle> triangles;
   std::span<const std::uint32_t> tetrahedra;
@@ -84,7 +77,6 @@ struct TetrahedronPoint {
   friend bool operator==(const TetrahedronPoint&, const TetrahedronPoint&) = default;
 };
 
-/// A vertex of another geometry in a tetrahedral mesh.
 struct EmbeddedVertex {
   std::uint32_t vertex;
   TetrahedronPoint at;

@@ -30,7 +30,6 @@ class StepSource;
 struct AuditFailure;
 struct CollisionProblem;
 
-/// A pair that is tested in each frame.
 struct CollisionPair {
   GeometryId a, b;
   PairSettings settings;
@@ -39,16 +38,15 @@ struct CollisionPair {
 /// Collision detection of deforming meshes, lines, points, and of analytical shapes. Call in each
 /// step setPositions(), detectCollision(), collisionData() and advance().
 /// Step     vertices move in straight lines from `before` to `now`. advance() turns `now` into
-///          `before` for all geometries; what is not set afterwards is at rest. Within a step any
-///          calls are valid in any order. Contacts depend only on the last values.
+///          `before` for all geometries; what is not set afterwards is at rest.
 /// Units    L is the length unit of the positions; all lengths are in L.
-/// Errors   a function that throws palpate::Error for its data changes nothing. Every function that
-///          takes a GeometryId, except has(), throws UnknownGeometry. An exception that ends a
-///          frame leaves the last answers readable. After a move, or from a predicate or callback
-///          of this object, every function but assignment and destruction throws InvalidCall.
-///          Settings::memoryLimit adds MemoryLimit.
+/// Errors   UnknownGeometry, UnknownPair. NonFinitePosition for positions, also beyond
+///          kLargestMeasure; IndexOutOfRange for elements; TooLarge beyond 2^28 vertices or
+///          elements, 2^26 tetrahedra, or if no ids are left. MemoryLimit by Settings::memoryLimit.
+///          InvalidCall after a move, or from a predicate or callback. An exception that ends a
+///          frame leaves the last answers readable.
 /// Valid    returned spans and references: until the next call that is not const, if not said.
-/// Threads  const functions may run at once while no other function does. Objects share executors.
+/// Threads  const functions may run at once while no other function does.
 /// Floating point  the caller's rounding mode, traps and treatment of denormals change no result.
 class PALPATE_EXPORT OctreeBasedCD {
  public:
@@ -59,48 +57,34 @@ class PALPATE_EXPORT OctreeBasedCD {
   ~OctreeBasedCD();
 
   /// Adds a copy. Any set of triangles is valid: with borders, non-manifold edges, or no area.
-  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex; TooLarge for more than 2^28 vertices
-  ///          or triangles or, as all functions that add a geometry, if no ids are left.
   GeometryId addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                              std::span<const Triangle> triangles);
   /// Every pair and method treats its surface() as a triangle mesh with the same vertex ids.
-  /// Errors   NonFinitePosition; IndexOutOfRange, also for a vertex twice in a tetrahedron;
-  ///          SharedFace for a face of more than two; TooLarge beyond 2^28 vertices or 2^26
-  ///          tetrahedra.
+  /// Errors   SharedFace for a face of more than two; IndexOutOfRange, too, for equal vertices.
   GeometryId addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                 std::span<const Tetrahedron> tetrahedra);
   /// Radii: L, in [0, kLargestMeasure], one for all or one per vertex, linear along segments.
-  /// Lists    edgeEdge() has segments as edges. In vertexTriangle() and triangleVertex() segment
-  ///          {p, q} is the triangle {p, q, q}. Features are a contact where their centre lines
-  ///          come closest, by the thickness and the radii there.
-  /// Errors   NonFinitePosition; IndexOutOfRange for a vertex, or one twice in a segment;
-  ///          InvalidRadius, also for their number; TooLarge beyond 2^28 vertices or segments.
+  /// Features are a contact by the thickness and the radii where their centre lines come closest.
+  /// Errors   InvalidRadius, also for their number; IndexOutOfRange, too, for equal ends.
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, double radius = 0.0);
   GeometryId addLineMesh(std::span<const Eigen::Vector3d> positions,
                          std::span<const Segment> segments, std::span<const double> radii);
-  /// Point i is vertex i. Radii are as in addLineMesh().
-  /// Lists    in vertexTriangle() and triangleVertex() point p is the triangle {p, p, p}. Of two
-  ///          point sets the first has the vertices; in one with itself the lower point is it.
-  /// Errors   NonFinitePosition; InvalidRadius, also for their number; TooLarge beyond 2^28 points.
+  /// Point i is vertex i. Radii and their errors are those of addLineMesh().
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, double radius = 0.0);
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
-  /// setTransform() places it. Contacts are in CollisionData::shape() and shapeShape().
-  /// Errors   InvalidShape for a measure out of range.
+  /// setTransform() places it. Throws InvalidShape for a measure out of range.
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
-  /// setTransform() places it. Pairs need Method::DistanceField. Queries refuse it.
-  /// Errors   InvalidSettings for null.
+  /// Likewise. Only DistanceField and Auto answer its pairs. Throws InvalidSettings for null.
   GeometryId addDistanceField(std::shared_ptr<const DistanceField>);
   /// Attaches a field, in the body's frame, to a rigid triangle or tetrahedral mesh; null detaches
   /// it. Calls that change positions, topology or disabled elements then throw UnsupportedMethod.
-  /// Errors   UnsupportedMethod for another type, for disabled elements, or if a pair by
-  ///          Method::DistanceField needs the old field or its larger band; InvalidSettings, with
-  ///          the vertex, if the field at a triangle's vertex exceeds the error bound.
+  /// Errors   UnsupportedMethod for another type, disabled elements, or if a pair needs the old
+  ///          field or its larger band; InvalidSettings, with the vertex, if the field there
+  ///          exceeds its error bound.
   /// Cost     one look-up for each vertex.
   void attachDistanceField(GeometryId mesh, std::shared_ptr<const DistanceField>);
-  /// Attaches leaves of Method::Proxy to a rigid triangle or tetrahedral mesh, with the
-  /// consequences of attachDistanceField(); none detaches them. Auto may use them for pairs of a
-  /// point set, first, and the mesh.
+  /// Likewise attaches leaves of Method::Proxy, for Auto; none detaches them.
   /// Errors   UnsupportedMethod for another type; InvalidSettings; TooLarge as Method::Proxy.
   /// Cost     seconds of processor time for half a million triangles, on all threads.
   void attachSurfaceProxy(GeometryId mesh, const std::optional<SurfaceProxySettings>&);
@@ -110,18 +94,15 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::size_t vertexCount(GeometryId) const;  ///< 0 for a shape
   /// L, now; in the body's frame if setTransform() placed the geometry. Empty for a shape.
   std::span<const Eigen::Vector3d> positions(GeometryId) const;
-  /// L: the box in the world around all vertices now with their radii, or around a shape, up to
-  /// rounding. Empty without vertices; infinite for a plane.
-  /// Cost     linear in the vertices.
+  /// L: the box in the world around all vertices now, with radii, or a shape, up to rounding. Empty
+  /// without vertices; infinite for a plane. Linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
   void advance();  ///< `now` becomes `before`; results stay readable
 
-  /// Sets positions, one per vertex. Only two arrays, and advance(), set `before`. In the step in
-  /// which the geometry is added or its topology set, `before` follows `now` unless you pass it.
-  /// Errors   WrongPositionCount, also for a shape; NonFinitePosition, also beyond kLargestMeasure,
-  ///          as all functions that take positions.
-  /// Cost     linear in the vertices.
+  /// Sets positions, one per vertex, in linear time. Only two arrays and advance() set `before`; in
+  /// the step in which the geometry is added or its topology set, one array does, too.
+  /// Errors   WrongPositionCount, also for a shape.
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
@@ -132,67 +113,58 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The same, with the errors of addTetrahedralMesh().
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  /// The triangles that collide. Valid until setTetrahedra() or removal.
-  /// Errors   UnsupportedMethod for another type.
+  /// The triangles that collide, until setTetrahedra() or removal. UnsupportedMethod for others.
   TetrahedralSurface surface(GeometryId) const;
 
   /// Puts all positions of a geometry in a body's frame, at the pose now or at both ends of the
-  /// step. A vertex in the world is ((r0 x + r1 y) + r2 z) + t in double; it moves straight between
-  /// the ends. If R^T R is off the identity by over 1e-9, the nearest rotation counts.
+  /// step. A vertex is rounded as Pose does, and moves straight between the ends. If R^T R is off
+  /// the identity by over 1e-9, the nearest rotation counts.
   /// Errors   InvalidTransform: R^T R is off by over 1e-5, the determinant is not positive, an
   ///          entry not finite, or the translation beyond kLargestMeasure. UnsupportedMethod for a
   ///          geometry with a pair with itself.
   /// Cost     that of turning the corners of a ConvexHull; none that grows with a mesh.
   void setTransform(GeometryId, const Pose& now);
   void setTransform(GeometryId, const Pose& before, const Pose& now);
-  /// The pose now, with the rotation that counts; the identity if never set.
-  Pose transform(GeometryId) const;
+  Pose transform(GeometryId) const;  ///< now, with the rotation that counts; default: identity
   /// A name in messages: `geometry 3 "liver"`. A null character throws InvalidSettings.
   void setName(GeometryId, std::string name);
   const std::string& name(GeometryId) const;
-  /// A pair that the filters separate has no contacts, candidates or cost, and is not trusted.
-  /// Errors   InvalidSettings for Sidedness::Outer of lines, points and shapes.
+  /// Separated pairs have no contacts and no trust. Outer of others than meshes: InvalidSettings.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
-  /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others. A vertex
-  /// or edge is tested while an enabled element holds it. Queries search disabled ones.
-  /// Errors   IndexOutOfRange.
-  /// Cost     linear in the elements.
+  /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others, in
+  /// linear time. A vertex or edge is tested while an enabled element holds it.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
 
-  /// Adds a pair; its order is that of ids in results. a == b: self-collision. Features with a
-  /// common vertex are then no contacts.
+  /// Adds a pair; its order is that of ids in results. a == b: self-collision, in which features
+  /// with a common vertex are no contacts.
   /// Errors   UnsupportedMethod for types that the method does not answer, and for a placed
   ///          geometry with itself; InvalidSettings; DuplicatePair; TooLarge for restDistance.
   void addCollisionPair(GeometryId a, GeometryId b, const PairSettings& = {});
-  /// Replaces the settings; (a, b) in either order.
-  /// Errors   UnknownPair; those of addCollisionPair().
+  /// Replaces the settings; (a, b) in either order. Throws as addCollisionPair().
   void setPairSettings(GeometryId a, GeometryId b, const PairSettings&);
-  /// Features that it refuses are no contacts and suppress none. intersectingTriangles() and
+  /// Features that it refuses are no contacts and suppress none; intersectingTriangles() and
   /// validity() do not use it. Empty: refuses nothing. (a, b) is in the order of the addition.
-  /// Errors   UnknownPair; UnsupportedMethod for a pair with a shape.
+  /// Errors   UnsupportedMethod for a pair with a shape or by a field or proxy.
   void setContactPredicate(GeometryId a, GeometryId b, ContactPredicate);
-  /// Removes the pair and its answer; (a, b) in either order. Throws UnknownPair.
-  void removeCollisionPair(GeometryId a, GeometryId b);
-  std::span<const CollisionPair> pairs() const;  ///< in the order in which they were added
-  /// The settings passed last; (a, b) in the order of the addition. Throws UnknownPair.
+  void removeCollisionPair(GeometryId a, GeometryId b);  ///< in either order
+  std::span<const CollisionPair> pairs() const;          ///< in the order in which they were added
+  /// The settings passed last; (a, b) in the order of the addition.
   const PairSettings& pairSettings(GeometryId a, GeometryId b) const;
 
   void update();  ///< brings octrees to the positions now
   /// Finds the contacts of every pair; what did not change keeps its answer. Steady frames allocate
   /// nothing, except for integers of exact arithmetic.
-  /// Errors   those of a predicate or executor; InvalidSettings if run() returns too early;
-  ///          NotAvailable after fork() in a task. Predicates apart, update(), forEachCandidate()
-  ///          and queries() throw the same.
+  /// Errors   also of update(), forEachCandidate() and queries(): those of a predicate or executor;
+  ///          InvalidSettings if run() returns too early; NotAvailable after fork() in a task.
   void detectCollision();
 
   /// Passes candidate pairs in batches to f(std::span<const ElementPair>): all pairs of enabled
-  /// elements whose boxes overlap. Boxes are inflated by half of Validity::effectiveThickness and
-  /// by the largest radius, and enclose the whole step if the method needs it. Rounding may add
-  /// pairs. (a, b) in either order.
-  /// Order    none. `a` is of the pair's first geometry; in self-collision a < b, no common vertex.
+  /// elements whose boxes overlap, and some more by rounding. Boxes are inflated by half of
+  /// Validity::effectiveThickness and the largest radius, and enclose the step if the method does.
+  /// Order    none; (a, b) in either order. `a` of ElementPair is of the pair's first geometry; in
+  ///          self-collision a < b, no common vertex.
   /// Threads  calls of f come one at a time, from several threads.
-  /// Errors   UnknownPair; NotAvailable for a pair with a shape; InvalidCall if f calls this
-  ///          object; those of f.
+  /// Errors   NotAvailable for a pair with a shape or by a field or proxy; those of f.
   /// Cost     with Engine::Octree memory does not grow with the number of pairs.
   template <class F>
   void forEachCandidate(GeometryId a, GeometryId b, F&& f) {
@@ -220,42 +192,37 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Queries at the positions now. Updates octrees, which no other thread may read meanwhile.
   SpatialQueries queries() const;
 
-  /// Makes the state now the latest snapshot. Objects from queries() stay valid.
-  /// Errors   those of queries(); the last snapshot then stays the latest.
-  /// Cost     copies octrees, and topology after a change, of geometries that changed since the
-  ///          last publication. Steady publications allocate nothing.
+  /// Makes the state now the latest snapshot. Objects from queries() stay valid. If it throws, as
+  /// queries() does, the last snapshot stays the latest.
+  /// Cost     copies octrees and topologies that changed. Steady publications allocate nothing.
   void publish(double time = 0.0);
   /// The last published snapshot, or null. It may outlive this object.
-  /// Threads  safe at any time between construction and destruction, except during a move. A
-  ///          std::mutex, shared with publish(), protects the copy of the pointer.
+  /// Threads  safe except during construction, destruction and a move; waits for a pointer's copy.
   std::shared_ptr<const Snapshot> latestSnapshot() const;
 
   /// The answer of the last detectCollision(); (a, b) in the order of the addition.
-  /// Errors   UnknownPair; NotAvailable before the first detection of the pair.
+  /// Errors   NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
   /// L, one per vertex, or one for a shape. While no point has moved further since the last
-  /// detection, features that were no contact come no nearer than thickness and radii. No features
-  /// pass through each other. Rounding is included; filters apply. Infinity without
-  /// PairSettings::freeMotionReach. Valid until the next detection or change of the geometry.
-  /// Errors   UnknownGeometry; NotAvailable before a detection with these elements.
+  /// detection, no new contact or crossing exists, rounding included
+  /// (Docs/Algorithms/FreeMotion.md). Infinity without PairSettings::freeMotionReach. Valid until
+  /// the next detection or change of the geometry.
+  /// Errors   NotAvailable before a detection with these elements.
   std::span<const double> freeMotion(GeometryId) const;
   const LooseOctree& octree() const;  ///< valid as long as this object; updates change it
   MemoryUse memoryUse() const;        ///< now, with queries and snapshots
-  /// Gives back memory that is only kept for next frames. Results and held snapshots stay. Resets
+  /// Gives back what is only kept for next frames, but no result or held snapshot, and resets
   /// FrameStatistics::peakMemory. Lack of memory is no error.
   void releaseMemory();
   const FrameStatistics& statistics() const;  ///< of the last detection or update()
-  /// Of the pair in the last detection; (a, b) in either order. Throws UnknownPair.
-  PairStatistics pairStatistics(GeometryId a, GeometryId b) const;
+  PairStatistics pairStatistics(GeometryId a, GeometryId b) const;  ///< of it; in either order
   const Settings& settings() const;
   /// Writes times of the last Settings::traceFrames detections as JSON in the Trace Event Format.
   /// Errors   NotAvailable if traceFrames is 0; File, and an existing file is then unchanged.
   void writeTrace(const std::filesystem::path&) const;
   /// Where the audit of the last detection differs from brute force: faults of this library.
-  /// AuditFailure::fileError names a capture that was not written.
   std::span<const AuditFailure> auditFailures() const;
-  /// A copy of all that the next detection reads, with placed deforming meshes in the world. Beyond
-  /// kLargestMeasure there, functions that take the problem throw NonFinitePosition.
+  /// A copy of all that the next detection reads, with placed deforming meshes in the world.
   CollisionProblem problem() const;
 
  private:
@@ -270,8 +237,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::unique_ptr<Implementation> m_implementation;
 };
 
-/// The contacts of two meshes without a step, on one thread.
-/// Errors   UnsupportedMethod for Continuous; those of addTriangleMesh() and addCollisionPair().
+/// The contacts of two meshes without a step, on one thread. UnsupportedMethod for Continuous.
 PALPATE_EXPORT CollisionData detectCollision(const TriangleMeshView& a, const TriangleMeshView& b,
                                              const PairSettings& = {});
 

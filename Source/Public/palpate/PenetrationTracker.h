@@ -37,14 +37,11 @@ struct TrackedVertex {
 };
 
 /// Finds the vertices of one geometry that are inside another, a closed body, with directions that
-/// are stable over time. Call update() in each step, after setPositions().
+/// are stable over time. Call update() in each step, after setPositions(), from one thread at a
+/// time.
 /// Laws     (1) the depth is at most kMaxDepthRatio times the least depth.
 ///          (2) only a direction that Jumped turns further than kMaxTurn + m. m is the vertex's
 ///          distance from its last surface point over the root of the last times the least depth.
-/// Method   the last direction turns with the triangle of its surface point. The nearest counts
-///          within kMaxTurn + m of it (None), else the last if within kMaxDepthRatio (Kept), else
-///          the nearest (Jumped).
-/// Threads  use an object from one thread at a time.
 class PALPATE_EXPORT PenetrationTracker {
  public:
   /// The ids are those of the OctreeBasedCD whose queries update() receives and checks.
@@ -54,8 +51,7 @@ class PALPATE_EXPORT PenetrationTracker {
   ~PenetrationTracker();
 
   /// The directions of this step, by vertex, valid until the next call. Repeated calls in a step
-  /// continue from the last earlier step with queries of the same OctreeBasedCD.
-  /// Errors   those of findInsideVertices(), which change nothing; InvalidCall after a move.
+  /// continue from the last earlier step of the same OctreeBasedCD. Throws as findInsideVertices().
   std::span<const TrackedVertex> update(const SpatialQueries&);
 
  private:

@@ -31,9 +31,7 @@ struct OctreeSettings {
   int maxDepth = 32;            ///< deepest level, in [1, 60]; the root has level 0
   int maxElementsPerLeaf = 32;  ///< in [1, 1024]; cells with more elements are split
   OctreeUpdate update = OctreeUpdate::Auto;
-  /// Two placed bodies that do not deform in the step use directions that both have.
-  /// Cost     32 or 48 bytes an element and 256 or 384 a block; time only when positions were set.
-  OctreeBounds bounds = OctreeBounds::Box;
+  OctreeBounds bounds = OctreeBounds::Box;  ///< for pairs of two bodies that do not deform
 };
 
 /// How candidates are found. Contacts do not depend on it.
@@ -45,16 +43,15 @@ PALPATE_EXPORT const char* toString(Engine) noexcept;  ///< its name, or "unknow
 
 /// After each detection, features of a sample are tested against the whole other geometry.
 struct AuditSettings {
-  /// Number per pair and frame; 0: no audit. Each is tested against all triangles or edges.
-  int features = 0;
+  int features = 0;        ///< number per pair and frame; 0: no audit
   std::uint64_t seed = 0;  ///< the sample depends only on the seed, the frame number and the pair
   /// An existing folder for a capture of each failing pair and frame. No file is overwritten.
   std::filesystem::path folder{};
   int maxFiles = 100;  ///< most files over the life of an OctreeBasedCD, at least 0
 };
 
-/// Settings of an OctreeBasedCD for its life. A value out of range throws InvalidSettings. Results
-/// do not depend on threads, trace and executor. Captures hold no trace, executor and memory limit.
+/// Of an OctreeBasedCD for its life. A value out of range throws InvalidSettings. Results do not
+/// depend on threads, trace and executor; captures hold none of trace, executor, memory limit.
 struct Settings {
   OctreeSettings octree{};
   Engine engine = Engine::Octree;
@@ -65,20 +62,17 @@ struct Settings {
   int traceFrames = 0;
   /// Runs the work on at most `threads` threads. Objects may share it. Null: an own thread pool.
   std::shared_ptr<Executor> executor{};
-  /// Bytes that the object may allocate (Docs/Memory.md); 0: no limit. A call that needs more
-  /// throws MemoryLimit. The last answers stay readable; the next frame works.
+  /// Bytes that the object may allocate (Docs/Memory.md); more throws MemoryLimit. 0: no limit.
   std::size_t memoryLimit = 0;
 };
 
 /// The definition of a contact. Docs/SupportMatrix.md lists the methods of each pair of types.
 enum class Method {
-  /// The library chooses one of the others in each frame. It answers all pairs that any method
-  /// answers. Where Continuous answers the pair, it misses no impact, unless radii are per vertex.
+  /// Chosen in each frame from the others, for all pairs that any method answers. No impact is
+  /// missing where Continuous answers the types and radii.
   Auto,
   Intersection,  ///< triangles that intersect at the step's end, exact; touching counts
-  /// Features at most the thickness and their radii apart at the step's end. After a crossing,
-  /// normals are on the wrong side. Two meshes are trusted only if features within the thickness
-  /// moved less than their distance.
+  /// Features at most the thickness and radii apart at the step's end, on whatever side they are.
   Proximity,
   /// Features at most the thickness and their radii apart at some time of the step (CCD).
   Continuous,
@@ -86,24 +80,20 @@ enum class Method {
   /// end, in CollisionData::shape(). Distances are within errorBound(). Impacts may be missing.
   DistanceField,
   /// A point set, first, with a rigid triangle or tetrahedral mesh, in CollisionData::shape():
-  /// particles at most the thickness and radius away at the step's end, within errorBound(). In an
-  /// octree's leaves, planes stand for the surface where proven to be within
-  /// PairSettings::allowedError. Around closed meshes distances have a sign, down to proxyDepth.
-  /// Cost     the first detection after setTriangles() or new settings builds leaves: seconds of
-  ///          processor time for 500,000 triangles. A frame makes no octree of the particles.
-  /// Errors   detectCollision() throws UnsupportedMethod if the body's positions changed, TooLarge
-  ///          for too many leaves.
+  /// particles at most the thickness and radius away at the step's end, within errorBound(). Around
+  /// closed meshes distances have a sign, down to Validity::proxyDepth.
+  /// Cost     of the first detection after setTriangles() or new settings: seconds for 500,000
+  ///          triangles.
+  /// Errors   UnsupportedMethod if the body's positions changed, TooLarge for too many leaves.
   /// Source   octree proxies: Fan et al. (2013). The proof of the error: Docs/SurfaceProxies.md.
   Proxy
 };
 PALPATE_EXPORT const char* toString(Method) noexcept;  ///< its name, or "unknown"
 
-/// Which of several contacts at the same features are reported.
 enum class Contacts {
   /// One per pair of closest features: vertices, edges, triangles' interiors. Proximity: those that
-  /// hold the smallest distance. Impacts: the earliest, then the first in the order
-  /// vertexTriangle(), triangleVertex(), edgeEdge(). Every vertex with weight keeps its earliest
-  /// time. Shapes, lines and points have no contacts with inner edges and vertices of flat parts.
+  /// hold the smallest distance. Impacts: the earliest; every vertex with weight keeps its earliest
+  /// time. Docs/SupportMatrix.md has the rules.
   Distinct,
   All  ///< every feature pair that the method's definition includes
 };
@@ -114,16 +104,14 @@ struct ContinuousSettings {
   /// Fraction of the step, in [2^-50, 1]. A time of impact is never late, and early by at most
   /// this. With a thickness, what comes within it and this fraction of the motion may be reported.
   double timeTolerance = 1e-6;
-  /// Only Continuous accepts true: no contacts, only CollisionData::earliestTimeOfImpact().
+  /// Of Continuous alone: no contacts, only CollisionData::earliestTimeOfImpact().
   bool earliestTimeOnly = false;
 };
 
-/// What only Auto uses.
 struct AutoSettings {
-  /// L, to 1e300; negative: half the thickness. Other methods accept negative only. For two
-  /// triangle or tetrahedral meshes with Distinct and a thickness. Features with at most this
-  /// relative motion are tested at the step's end. The thickness there is up to this much larger.
-  /// For all types it also limits the motion with which an attached field or proxy answers.
+  /// L, to 1e300; negative: half the thickness. Other methods accept negative only. Features of two
+  /// meshes that move at most this are tested at the step's end, with a thickness up to this
+  /// larger. It also limits the motion with which an attached field or proxy answers.
   double motionTolerance = -1.0;
 };
 
@@ -141,14 +129,14 @@ struct PairSettings {
   /// positive value, radii or a shape. The contacts of Intersection do not depend on it.
   double thickness = 0.0;
   Contacts contacts = Contacts::Distinct;  ///< Intersection reports all
-  /// For a triangle, tetrahedral or line mesh with itself, else 0: features nearer than this along
-  /// edges, at the positions when topology was set, are no contacts. Over 2^28 pairs: TooLarge.
+  /// For a mesh or lines with themselves, else 0: features nearer than this along edges, at rest,
+  /// are no contacts. Over 2^28 pairs of vertices: TooLarge.
   double restDistance = 0.0;
-  /// What an answer may be off by. Proxy needs a positive value. Auto answers by an attached field
-  /// or proxy within it where that proves that nothing touches in the step. Others accept 0.
+  /// What distances may be off by. Proxy needs a positive value, Auto uses an attached field or
+  /// proxy within it where nothing touches in the step. Others accept 0.
   double allowedError = 0.0;
-  /// Positive: detections find OctreeBasedCD::freeMotion(), which is at most half of this. A larger
-  /// value costs more. A distance field that is a geometry accepts only 0.
+  /// Positive: detections find OctreeBasedCD::freeMotion(), at most half of this, at growing cost.
+  /// A distance field that is a geometry accepts only 0.
   double freeMotionReach = 0.0;
   ContinuousSettings continuous{};
   AutoSettings automatic{};
@@ -157,8 +145,8 @@ struct PairSettings {
 
 /// Leaves of OctreeBasedCD::attachSurfaceProxy().
 struct SurfaceProxySettings {
-  /// L, positive: the distance up to which leaves answer; at least the thickness and the largest
-  /// radius. Particles further away that move by more than the difference are tested exactly.
+  /// L, positive, at least the thickness and largest radius: leaves answer up to it. Particles
+  /// further away that move by more than the difference are tested exactly.
   double reach = 0.0;
   double errorBound = 0.0;         ///< L, positive: the largest proven error of a leaf's plane
   double widestNormalCone = 0.25;  ///< rad, in (0, 1.5], as LeafSettings
@@ -168,8 +156,8 @@ struct SurfaceProxySettings {
 /// From which sides other geometries can touch a triangle mesh.
 enum class Sidedness {
   Both,
-  /// The side to which winding normals point. A contact that leads inward from the closest feature
-  /// of this mesh is dropped, but none of Intersection or with shapes.
+  /// The side of winding normals. A contact that leads inward from the closest feature of this mesh
+  /// is dropped, but none of Intersection or with shapes.
   Outer
 };
 PALPATE_EXPORT const char* toString(Sidedness) noexcept;  ///< its name, or "unknown"
@@ -190,10 +178,8 @@ struct ContactFeatures {
 };
 PALPATE_EXPORT const char* toString(ContactFeatures::Kind) noexcept;  ///< its name, or "unknown"
 
-/// Whether two features may be a contact. Called once or more for features that are near enough.
-/// Needs    the same result for the same features within one frame.
-/// Threads  several threads call it at once, in any order.
-/// Errors   detectCollision() throws the exception, which ends the frame.
+/// Whether two features that are near enough may be a contact: the same each time in a frame.
+/// Several threads call it at once, in any order. detectCollision() throws its exception.
 using ContactPredicate = std::function<bool(const ContactFeatures&)>;
 
 }  // namespace palpate

@@ -18,8 +18,7 @@ namespace palpate {
 class PALPATE_EXPORT Snapshot {
  public:
   /// Queries at the positions now of publish(). A copy throws InvalidCall after the snapshot was
-  /// released. Threads with queries wait only for each other: for scratch, and while one prepares a
-  /// geometry.
+  /// released. Threads wait only for each other: for scratch, and while one prepares a geometry.
   const SpatialQueries& queries() const;
   std::uint64_t number() const;  ///< counts the publications of the OctreeBasedCD, from 1
   double time() const;           ///< as passed to publish()

@@ -20,7 +20,6 @@ namespace palpate {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// A point of a geometry's surface.
 struct SurfacePoint {
   GeometryId geometry;
   std::uint32_t element = kNoElement;     ///< triangle, segment or point; kNoElement for a shape
@@ -29,12 +28,11 @@ struct SurfacePoint {
   /// L: on the triangle, centre line or point; if radii differ, the nearest ball's centre.
   Eigen::Vector3d position;
   double distance;  ///< L, less the radius of lines and points
-  /// Unit, outward, also at distance 0: the face's winding normal, or the angle-weighted sum around
-  /// its edge or vertex; away from the centre line or point. 0 without a surface point.
+  /// Unit, outward, also at distance 0: of the face, or angle-weighted around its edge or vertex;
+  /// away from the centre line or point. 0 without a surface point.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 
-/// The distance of a point from the surface of a body, negative inside.
 struct SignedDistance {
   SurfacePoint nearest;  ///< nearest.distance is not negative
   double distance;       ///< L
@@ -47,10 +45,7 @@ struct Ray {
 };
 
 /// A connected part of what a ray and a surface share: its smallest t, on the lowest element there.
-/// Elements with radii, as one body, and shapes have a hit where the ray enters and one where it
-/// leaves. A ray that starts on their surface and goes outward leaves them there. A touch is one
-/// hit that does not cross. A ray in the face of a box or hull enters and leaves it; in a mesh it
-/// has one hit.
+/// Radii, as one body, and shapes have a hit where the ray enters and one where it leaves.
 struct RayHit {
   GeometryId geometry;
   std::uint32_t element = kNoElement;
@@ -58,9 +53,8 @@ struct RayHit {
   Eigen::Vector3d weights;                ///< as in SurfacePoint; 0 for a shape
   double t;                               ///< finite, unless firstHits() finds no hit
   bool frontFace;                         ///< whether the ray comes against the winding normal
-  /// Whether the ray changes sides. From a point with odd winding number in a closed mesh, the
-  /// number of such hits is odd. At tMin and tMax the endless ray decides, and of a part in the
-  /// surface only the elements within the range count.
+  /// Whether the ray changes sides; at tMin and tMax the endless ray decides. Of a part in the
+  /// surface only elements within the range count.
   bool crosses;
 };
 
@@ -86,14 +80,13 @@ class PALPATE_EXPORT RigidMesh {
   std::unique_ptr<Implementation> m_implementation;
 };
 
-/// The least distance of two geometries. It is 0 if they have a common point; both positions are
-/// then such a point up to rounding, or on the centre lines of radii.
+/// The least distance of two geometries. At a common point it is 0, and both positions are such a
+/// point up to rounding, or on the centre lines of radii.
 struct GeometryDistance {
   SurfacePoint a, b;  ///< both have this distance
   double distance;    ///< L, less the radii of lines and points; never negative
 };
 
-/// How a translation separates two bodies.
 struct Penetration {
   bool intersecting;  ///< the bodies' insides have a common point, decided exactly for meshes
   Eigen::Vector3d direction;  ///< unit; 0 if not intersecting
@@ -122,59 +115,52 @@ struct PathClearance {
 
 /// Spatial queries at the positions now, from OctreeBasedCD::queries(). Collision filters do not
 /// apply, and disabled elements are searched. A segment is the hull of the balls at its ends.
-/// Valid    until positions, transforms, topology or geometries change, or advance(); copies as
-///          long. A detection leaves it valid.
-/// Threads  all functions are safe from any number of threads.
+/// Valid    until positions, transforms, topology or geometries change, or advance(); so are
+///          copies.
+/// Threads  all functions are safe from any number of threads; batches use all.
 /// Returns  lists replace the content of the caller's vector, which stays if a function throws.
 /// Errors   InvalidCall if not valid or moved from, or from a predicate or callback;
-///          UnknownGeometry; NonFinitePosition, also beyond kLargestMeasure.
+///          UnknownGeometry; NonFinitePosition, also beyond kLargestMeasure; InvalidSettings for
+///          two equal geometries, `out` of another size, a radius or thickness outside [0,
+///          kLargestMeasure], and a negative maxDistance. Batches name the item at fault: "point
+///          3".
+/// Cost     of a point or ray about logarithmic in the elements. Only exact comparisons allocate.
 class PALPATE_EXPORT SpatialQueries {
  public:
   /// The nearest surface point within maxDistance (L), on the lowest of equal elements. Exact.
-  /// Errors   NonFinitePosition; InvalidSettings if maxDistance is negative or NaN.
-  /// Cost     about logarithmic in the elements. Only exact comparisons of distances allocate.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
-  /// The same on all threads. A point without an answer has an infinite distance and kNoElement.
-  /// Errors   InvalidSettings, too, for another size of `out`. Messages name the point: "point 3".
+  /// Many. A point without an answer has an infinite distance and kNoElement.
   void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
                      std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
-  /// The k nearest elements, or all if there are fewer.
+  /// The k nearest elements, or all if there are fewer. InvalidSettings for k < 1.
   /// Order    by distance, then by element, decided exactly.
-  /// Errors   those of closestPoint(); InvalidSettings if k is below 1.
   void nearestElements(GeometryId, const Eigen::Vector3d& point, int k,
                        std::vector<SurfacePoint>& out, double maxDistance = kInfinity) const;
-  /// Whether a point is inside. An undecided winding number counts as inside. With Closed the
-  /// surface of a triangle mesh is outside, the boundary of a tetrahedron inside.
-  /// Errors   those of findInsideVertices(); NonFinitePosition.
+  /// Whether a point is inside, or its winding number undecided. With Closed the surface of a
+  /// triangle mesh is outside, the boundary of a tetrahedron inside. Throws as
+  /// findInsideVertices().
   /// Cost     the first call after a change prepares the body, also in a Snapshot; of a closed
   ///          triangle mesh only after a change of topology.
   bool contains(GeometryId body, const Eigen::Vector3d& point, const InsideSettings& = {}) const;
-  /// The distance from the surface, negative where contains() holds.
-  /// Errors   those of contains(); NotClosed for a body without elements.
+  /// The distance from the surface, negative where contains() holds. NotClosed without elements.
   SignedDistance signedDistance(GeometryId body, const Eigen::Vector3d& point,
                                 const InsideSettings& = {}) const;
-  /// The same on all threads, with the errors of closestPoints(), too.
   void signedDistances(GeometryId body, std::span<const Eigen::Vector3d> points,
                        std::span<SignedDistance> out, const InsideSettings& = {}) const;
   /// The elements with a point within the radius, ascending, decided exactly.
-  /// Errors   NonFinitePosition; InvalidSettings if the radius is not in [0, kLargestMeasure].
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
 
   /// The first hit. Rays are watertight: none passes between triangles with a common vertex.
-  /// Errors   NonFinitePosition; InvalidSettings for a direction of length 0, or a tMin that is not
-  ///          finite or exceeds tMax.
-  /// Cost     about logarithmic in the elements.
+  /// Errors   InvalidSettings for a direction of length 0, a tMin not finite, or above tMax.
   std::optional<RayHit> firstHit(GeometryId, const Ray&) const;
   std::optional<RayHit> firstHit(const Ray&) const;  ///< of all; lowest if equal
   bool anyHit(GeometryId, const Ray&) const;         ///< whether there is a hit
-  /// First hits of many rays on all threads. A ray without a hit has an infinite t and kNoElement.
-  /// Errors   InvalidSettings, too, for another size of `out`. Messages name the ray: "ray 3".
+  /// Of many rays. A ray without a hit has an infinite t and kNoElement.
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;  ///< by ascending t
-  /// What a ray selects among all geometries. frontFacesOnly: other hits do not count, so that
-  /// lines and points without a radius are not selected.
+  /// Among all geometries. frontFacesOnly excludes other hits, also lines and points of radius 0.
   std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
 
   /// The elements with a point in the solid shape, ascending.
@@ -184,74 +170,62 @@ class PALPATE_EXPORT SpatialQueries {
   void overlapping(GeometryId, const AnalyticalGeometry& shape, const Pose&,
                    std::vector<std::uint32_t>& elements) const;
   /// The contacts that a pair of both would have by Method::Proximity and Contacts::Distinct, in
-  /// the order of CollisionData::shape().
-  /// Errors   those of overlapping(); InvalidSettings for a thickness outside [0, kLargestMeasure].
+  /// the order of CollisionData::shape(). Throws as overlapping().
   /// Cost     follows the elements near the shape. Only another box or hull allocates again.
   void contacts(GeometryId, const AnalyticalGeometry& shape, const Pose&, double thickness,
                 std::vector<ShapeContact>& out) const;
-  /// The contacts that a pair (geometry, mesh) would have by Method::Proximity and
-  /// Contacts::Distinct, without disabled elements. Of filters only Sidedness applies. With
-  /// thickness 0, features that touch have contacts; an edge that only pierces a triangle has none.
-  /// validity() has the method, the thickness and the number of contacts only.
-  /// Errors   those of the other contacts(); InvalidCall if the mesh was moved from.
+  /// The same of a pair (geometry, mesh), without disabled elements. Of filters only Sidedness
+  /// applies. With thickness 0, features that touch have contacts; an edge that only pierces a
+  /// triangle has none. validity() has only method, thickness and numbers of contacts.
+  /// Errors   InvalidSettings; InvalidTransform; InvalidCall if the mesh was moved from.
   /// Cost     follows the elements near the mesh. Another size of geometry may rebuild the mesh's
   ///          octree; a repeated call allocates nothing.
   void contacts(GeometryId, RigidMesh& mesh, const Pose&, double thickness,
                 CollisionData& out) const;
 
-  /// The least distance, between surfaces of meshes. Lines and points with radii, and shapes, are
-  /// solid. Of equally near pairs the lowest element of a counts, then that of b. If a mesh has no
-  /// elements, the distance is infinite and the element kNoElement.
+  /// The least distance, between surfaces of meshes; lines and points with radii, and shapes, are
+  /// solid. Of equally near pairs the lowest element of a counts, then that of b. Without elements
+  /// it is infinite and the element kNoElement. UnsupportedMethod for two planes.
   /// Accuracy common points of elements without radii are exact, distances as edgeEdgeDistance().
-  /// Errors   InvalidSettings if both are the same; UnsupportedMethod for two planes.
   /// Cost     about 2 us for each pair of elements almost as near as the nearest.
   GeometryDistance distance(GeometryId a, GeometryId b) const;
   /// A translation after which the insides of a and b share no point. Bodies are closed triangle
-  /// meshes, tetrahedral meshes (by their surfaces) and shapes; inside a mesh the winding number is
-  /// not 0. Bodies that only touch do not intersect; one inside another does.
+  /// meshes, tetrahedral meshes (by their surfaces) and shapes. Bodies that only touch do not
+  /// intersect; one inside another does. M is the largest coordinate.
   /// Laws     (1) that meshes are apart afterwards is tested exactly at positions + depth *
-  ///          direction, or at a placed body's translation + depth * direction. The depth exceeds
-  ///          that of the last touch by about 2^-40 of the largest coordinate. A sphere, capsule or
-  ///          cylinder and a mesh are tested by distance; intersecting is false for depths below
-  ///          2^-36 of that coordinate.
-  ///          (2) minimal is true for two shapes or meshes that are convex to 2^-40 of it, and for
-  ///          a plane: no translation is shorter by 2^-36 of it. Other depths are upper bounds.
-  /// Errors   NotClosed, with the first edge, for what has no inside; InvalidSettings if both are
-  ///          the same; UnsupportedMethod for two planes.
+  ///          direction, or at a placed body's translation + that. The depth exceeds that of the
+  ///          last touch by about 2^-40 M. A sphere, capsule or cylinder and a mesh are tested by
+  ///          distance; intersecting is false for depths below 2^-36 M.
+  ///          (2) minimal is true for two shapes or meshes that are convex to 2^-40 M, and for a
+  ///          plane: no translation is shorter by 2^-36 M. Other depths are upper bounds.
+  /// Errors   NotClosed, with the first edge, for what has no inside; UnsupportedMethod for two
+  ///          planes.
   /// Cost     some hundred rays and ten searches of intersections: some ms for 3,000 triangles.
   Penetration penetration(GeometryId a, GeometryId b) const;
   /// Follows a ball, of radius 0 a point, along a polyline. It is in a body from its first touch
   /// until it neither touches nor is inside by contains(). A point that only touches is not in it.
-  /// In a mesh that is neither closed nor tetrahedral the ball is while it touches.
   /// Order    inside: by `enter`, then as `bodies`. outside: bodies without interval, as `bodies`.
   /// Accuracy which triangles a point meets is exact. Other arc lengths are within 2^-40 of the
   ///          largest coordinate, divided by the sine of the angle to the surface.
-  /// Errors   NonFinitePosition; InvalidSettings for fewer than two points, a radius outside [0,
-  ///          kLargestMeasure], or a length that is not finite.
+  /// Errors   InvalidSettings, too, for fewer than two points and a length that is not finite.
   /// Cost     for each body and segment a ray; without an interval also a distance() to a line.
   void path(std::span<const Eigen::Vector3d> polyline, double radius,
             std::span<const GeometryId> bodies, std::vector<PathInterval>& inside,
             std::vector<PathClearance>& outside) const;
 
-  /// The vertices inside the body by InsideSettings, at any depth, but none on its surface. With
-  /// Closed, decided exactly, the winding number is not 0, or a tetrahedron contains the vertex.
-  /// The surface point is on the lowest of equally near triangles. Where parts of a closed body
-  /// overlap, it is on the outer surface; where more than two meet in a point, a nearer one may be
-  /// missed. The accuracy is that of vertexTriangleDistance(), but less where triangles intersect.
-  /// Order    by vertex, ascending.
+  /// The vertices inside the body, ascending, at any depth, but none on its surface. The surface
+  /// point is on the lowest of equally near triangles. Where parts of a closed body overlap, it is
+  /// on the outer surface; where more than two meet in a point, a nearer one may be missed. Its
+  /// accuracy is that of vertexTriangleDistance(), less where triangles intersect.
   /// Errors   NotClosed for a body that is no mesh, and with Closed for a triangle mesh with
-  ///          defects, with the first edge; InvalidSettings if both are the same; UnsupportedMethod
-  ///          if `vertices` is a shape.
+  ///          defects, with the first edge; UnsupportedMethod if `vertices` is a shape.
   void findInsideVertices(GeometryId vertices, GeometryId body, std::vector<InsideVertex>& out,
                           const InsideSettings& = {}) const;
   /// The vertices in or on a tetrahedron, ascending, with the lowest that contains each, decided
-  /// exactly. Inverted tetrahedra count; those without volume do not.
-  /// Errors   UnsupportedMethod if the body is no tetrahedral mesh or `vertices` is a shape;
-  ///          InvalidSettings if both are the same.
+  /// exactly. Inverted tetrahedra count, flat ones do not. UnsupportedMethod for other types.
   void findEmbeddedVertices(GeometryId vertices, GeometryId body,
                             std::vector<EmbeddedVertex>& out) const;
   /// The same for a point, L.
-  /// Errors   UnsupportedMethod if the body is no tetrahedral mesh; NonFinitePosition.
   std::optional<TetrahedronPoint> findTetrahedron(GeometryId body,
                                                   const Eigen::Vector3d& point) const;
 

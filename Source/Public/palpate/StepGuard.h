@@ -36,9 +36,8 @@ struct HeldVertex {
 ///          translation. A rotation is the normalised interpolation of the quaternions.
 /// Features all pairs are guarded, with filters, predicates and disabled elements, as by
 ///          Method::Continuous with thickness 0. Features with a common vertex never touch.
-/// Radii    lines, points and shapes touch at the surfaces of radii and shapes. A segment counts
-///          with its largest radius or, if it begins nearer, with the radii of 16 pieces. Features
-///          that restDistance excludes have no radii.
+/// Radii    a segment counts with its largest radius or, if it begins nearer, with those of 16
+///          pieces. Features that restDistance excludes have no radii.
 /// Laws     for the step from `before` to the positions after hold(), as Continuous moves it:
 ///          (1) features without radii do not touch, exactly on the doubles.
 ///          (2) other features, and shapes, come no nearer than their radii, or where they began,
@@ -46,22 +45,19 @@ struct HeldVertex {
 ///          and for shapes their own error (Docs/Accuracy.md).
 ///          (3) a part that touches nothing makes its whole step, unless a shortened one blocks it.
 ///          (4) only parts that approach are shortened, by their normal motion, so that 1/8 of the
-///          room is left. After 8 rounds all parts connected by touches are shortened, to 7/8 of
-///          the first touch's time.
+///          room is left. After 8 rounds all parts connected by touches are, to 7/8 of the first
+///          touch's time.
 ///          (5) parts change only their connected component. Parts at rest or fixed connect none.
 ///          (6) a part keeps a positive fraction, if more than rounding is left before a touch.
-///          (7) a second call changes nothing.
+///          (7) a second call changes nothing. Results do not depend on threads and order of calls.
 /// Start    features that touch when the step begins are a fault, unless a plane separates them
 ///          then, and strictly at the end. Features with radii, spheres and capsules may overlap
 ///          and come no nearer; boxes, hulls, cylinders and turning planes must not. Surfaces that
-///          cross at `before` stay so.
+///          cross stay so.
 /// Cost     a round is a detection of the pairs that changed. Without a touch there is one; a
-///          component takes at most 13 after it was last joined. Steady steps allocate only
-///          integers of exact arithmetic.
-/// Order    results depend neither on the number of threads nor on the order of calls.
+///          component takes at most 13 after it was last joined. Steady steps allocate like frames.
 /// Errors   UnknownGeometry; InvalidCall after a move or the end of the OctreeBasedCD. An exception
 ///          changes neither the guard nor the OctreeBasedCD.
-/// Threads  hold() counts as a call of the OctreeBasedCD that changes it.
 class PALPATE_EXPORT StepGuard {
  public:
   /// The OctreeBasedCD may be moved, and destroyed before the guard.
@@ -76,8 +72,7 @@ class PALPATE_EXPORT StepGuard {
   /// that turns may deform. Absent vertices do not count. Throws IndexOutOfRange.
   void addRigidGroup(std::span<const GuardedVertex>);
   /// Only these vertices, and groups with one of them, always make their whole step; {kNoElement}:
-  /// all. After ImpactRemains, set their `now` to `before`.
-  /// Errors   IndexOutOfRange.
+  /// all. Throws IndexOutOfRange.
   void setFixedVertices(GeometryId, std::span<const std::uint32_t> vertices);
 
   /// Shortens steps: sets positions and transforms now, and returns the size of held().

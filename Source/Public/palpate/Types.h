@@ -11,8 +11,7 @@
 
 namespace palpate {
 
-/// Identifies a geometry of one OctreeBasedCD. An id is never given out twice, also after its
-/// geometry was removed.
+/// Identifies a geometry of one OctreeBasedCD. An id is never given out twice.
 enum class GeometryId : std::uint32_t {};
 
 inline constexpr std::uint32_t kNoElement = 0xffffffff;  ///< no element or vertex, as in a shape
@@ -64,17 +63,15 @@ struct TriangleMeshView {
   std::span<const Triangle> triangles;
 };
 
-/// The result of weld().
 struct Welded {
   std::vector<Eigen::Vector3d> positions;  ///< L
   std::vector<Triangle> triangles;         ///< as many as were given, in their order
   std::vector<std::uint32_t> vertexOf;     ///< for each vertex that was given, its new index
 };
-/// Joins vertices, such as those of an STL file, so that triangles become neighbours.
-///
+/// Joins vertices, such as those of an STL file, so that triangles become neighbours. A triangle
+/// with two joined corners names a vertex twice, and counts for nothing.
 /// distance L: a vertex joins the first earlier one that stayed within it. With 0 equal positions
 ///          join; with more the result may depend on the order of vertices.
-/// Returns  a triangle with two joined corners names a vertex twice, and counts for nothing.
 /// Errors   NonFinitePosition, IndexOutOfRange, TooLarge; InvalidSettings for the distance.
 /// Cost     linear, some 0.2 microseconds a vertex.
 PALPATE_EXPORT Welded weld(std::span<const Eigen::Vector3d> positions,

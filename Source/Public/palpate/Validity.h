@@ -14,18 +14,16 @@ enum class MethodReason {
   Requested,  ///< The pair's settings name the method. Also the value of a separated pair.
   // The reasons of Method::Auto. Motion is that of features in the step, relative to each other.
   Still,  ///< Nothing moves: Proximity, or Intersection for two meshes without a thickness.
-  /// All features move at most AutoSettings::motionTolerance: Proximity. Impacts are reported, too.
+  /// All features move at most AutoSettings::motionTolerance: Proximity, and impacts.
   Slow,
   Fast,   ///< All or most features move further: Continuous.
   Mixed,  ///< Some features move further: Continuous for them, Proximity for the rest.
   /// Continuous costs least: without a thickness, and with Contacts::All.
   Cheapest,
-  /// With lines, points or shapes: Continuous if features move or Proximity would need a thickness
-  /// or radius, else Proximity. If Continuous does not answer the types: Proximity, which may miss
-  /// impacts. With addDistanceField(): DistanceField.
+  /// Lines, points or shapes: Continuous if features move or Proximity lacks a thickness or radius,
+  /// else Proximity. One radius per vertex: Proximity, may miss impacts. A field: DistanceField.
   NoAlternative,
-  /// An attached DistanceField or proxy within PairSettings::allowedError proves that nothing
-  /// touched. The exact method answers particles for which a proxy does not prove it.
+  /// An attached DistanceField or proxy within allowedError proves that nothing touched.
   AllowedError
 };
 PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "unknown"
@@ -39,22 +37,18 @@ PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "
 ///          (3) if not trusted, Continuous and Auto still miss no impact of straight motion, except
 ///          where Auto answers with one radius per vertex. DistanceField, Proxy and pairs separated
 ///          by filters are never trusted.
-///          (4) the laws are about one step: after a passage in an earlier one, a trusted answer
-///          may push further through.
-///          (5) the laws are about surfaces: a closed mesh wholly inside another may be trusted.
-///          Shapes and radii are solid. Disabled elements count as absent.
+///          (4) the laws are about one step and about surfaces: not about a passage in an earlier
+///          step, nor a closed mesh wholly inside another. Shapes and radii are solid.
 /// Source   Docs/Algorithms/Validity.md has the conditions, their proofs and the cost.
 struct Validity {
   bool trusted = false;  ///< whether the conditions of `method` held in this step
-  /// Whether surfaces are known neither to intersect nor to touch at the step's start; a mesh may
-  /// be wholly inside another. If false, other methods than Auto may not know. Auto knows that they
-  /// do, radii and shapes within rounding, except by Intersection, DistanceField, Proxy, or
-  /// Proximity with a radius per vertex.
+  /// Whether surfaces are known neither to intersect nor to touch at the step's start. False: Auto
+  /// knows that they do, radii and shapes within rounding, except by Intersection, DistanceField,
+  /// Proxy, or Proximity with a radius per vertex; other methods may not know.
   bool startedApart = false;
   /// The opposite of `trusted`. By Intersection it is false, although no side is certified.
   bool sideMayBeWrong = true;
-  /// Whether a mesh with itself has equal positions but no two triangles with a common vertex, as
-  /// an STL file. The answer is then not trusted. Found when elements are set or enabled.
+  /// A mesh with itself has equal positions, but its triangles share no vertex: not trusted.
   bool unwelded = false;
 
   /// The main method, to which the laws refer. Auto: Proximity and Continuous, by feature.
@@ -63,7 +57,7 @@ struct Validity {
   std::size_t atEnd = 0;                          ///< number of contacts at the step's end
   std::size_t atImpact = 0;                       ///< number of impacts; both 0 by earliestTimeOnly
 
-  /// L: upper bound on the motion of any two features relative to each other. Of a plane that
+  /// L: upper bound on the motion of any two features relative to each other; of a plane that
   /// turns, that of one of its points.
   double displacement = 0;
   /// L: the largest `displacement` that meets the condition: of Proximity the thickness, of
@@ -71,18 +65,17 @@ struct Validity {
   /// Of Auto with two meshes it is the motion tolerance, which is no condition.
   double displacementLimit = 0;
   /// L: how far straight motion is off the arcs of turning bodies, as a sum; infinity for a plane.
-  /// An answer is not trusted if it exceeds the thickness, for Proximity with `displacement` added.
+  /// Above the thickness, for Proximity with `displacement` added, no answer is trusted.
   double arcDeviation = 0;
   /// L: the thickness, by Auto up to the motion tolerance more, 0 for Intersection. Feature pairs
   /// further apart at the step's end are contacts only by an impact.
   double effectiveThickness = 0;
-  /// L: Proxy does not report particles deeper than this in a closed mesh. At least the thickness,
-  /// the largest radius and the edge of the smallest leaf. 0 for other methods.
+  /// L: Proxy does not report particles deeper in a closed mesh. 0 for other methods.
   double proxyDepth = 0;
 
   /// Vertices that make the answer untrusted, ascending. By Proximity and Intersection: the first
-  /// kMaxFastVertices of each geometry with a relative motion above `displacementLimit`. By
-  /// Proximity also those that may have touched within the step. Otherwise, and with shapes: none.
+  /// kMaxFastVertices of each geometry with a relative motion above `displacementLimit`; by
+  /// Proximity also those that may have touched within the step. Else, and with shapes: none.
   /// Self-collision: all in A.
   std::vector<std::uint32_t> untrustedVerticesA, untrustedVerticesB;
   /// Triangles without area in contacts, ascending. Empty for pairs with a shape.
@@ -96,8 +89,7 @@ struct Validity {
 
   static constexpr std::size_t kMaxFastVertices = 128;
 
-  /// Above 1 the motion violates the condition of a requested Proximity or Intersection. For Auto
-  /// with two meshes it means only that Proximity alone does not answer.
+  /// Above 1 the motion violates the condition of a requested Proximity or Intersection.
   double displacementOverLimit() const {
     return displacement > 0 ? displacement / displacementLimit : 0;
   }

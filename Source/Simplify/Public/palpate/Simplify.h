@@ -19,7 +19,6 @@ struct SimplifySettings {
   std::function<bool(double fraction)> progress{};
 };
 
-/// A closed surface around a closed mesh.
 struct SimplifiedMesh {
   std::vector<Eigen::Vector3d> positions;  ///< L
   std::vector<Triangle> triangles;         ///< wound as those of the mesh, at most as many
@@ -28,17 +27,14 @@ struct SimplifiedMesh {
   int rounds = 0;  ///< number of simplifications, at most 24
 };
 
-/// Simplifies a closed, consistently oriented mesh. Exact arithmetic proves of the result that
-///   encloses  each point of the mesh's surface, and each point inside the mesh (winding number not
-///             0), is strictly inside the result. The surfaces have no point in common.
-///   near      each point of the result's surface is within `distance` of the mesh's surface.
-///
-/// Where the mesh cannot be coarser, its triangles move outward. Inner shells vanish.
-/// Errors   NonFinitePosition; IndexOutOfRange for a vertex; TooLarge: 2^28 vertices or triangles;
-///          NotClosed, also without triangles; InvalidSettings, also for a longest side outside
-///          [2^-200, 2^200]; UnsupportedMethod, with two triangles, for a mesh that meets itself
-///          where the proof fails; NotAvailable, with a place, if the proof fails in all rounds;
-///          Cancelled. Messages name geometry 0.
+/// Simplifies a closed, consistently oriented mesh. Exact arithmetic proves of the result that it
+/// encloses each point of the mesh's surface and inside (winding number not 0), and touches none.
+/// Each point of its surface is within `distance` of the mesh's, also proven. Where the mesh cannot
+/// be coarser, its triangles move outward. Inner shells vanish.
+/// Errors   NonFinitePosition; IndexOutOfRange; TooLarge: 2^28 vertices or triangles; NotClosed,
+///          also without triangles; InvalidSettings, also for a longest side outside [2^-200,
+///          2^200]; UnsupportedMethod, with two triangles, for a mesh that meets itself where the
+///          proof fails; NotAvailable, with a place, if the proof fails in all rounds; Cancelled.
 /// Source   Garland and Heckbert, Surface simplification using quadric error metrics, SIGGRAPH
 ///          1997, by meshoptimizer. Difference: the result is moved outward and certified.
 PALPATE_EXPORT SimplifiedMesh simplify(const TriangleMeshView&, const SimplifySettings&);

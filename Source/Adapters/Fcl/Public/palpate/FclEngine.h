@@ -9,12 +9,11 @@ namespace palpate {
 
 /// FCL behind functions of OctreeBasedCD. It decides in floating point, within absolute tolerances:
 /// the promises of OctreeBasedCD do not hold (Docs/Fcl.md), and validity() is never trusted.
-///
 /// Pairs    two triangle meshes by Method::Intersection, with intersectingTriangles() and no
 ///          contacts; two shapes by Method::Proximity. The thickness must be 0 except for a sphere
 ///          with a sphere, capsule, box or cylinder, and for two capsules.
-/// Errors   those of OctreeBasedCD, which changes nothing then. addCollisionPair() throws
-///          UnsupportedMethod for others, detectCollision() NotAvailable if FCL throws.
+/// Errors   those of OctreeBasedCD. addCollisionPair() throws UnsupportedMethod for others,
+///          detectCollision() NotAvailable if FCL throws.
 /// Threads  it starts none. Use an object from one thread at a time.
 class PALPATE_EXPORT FclEngine {
  public:

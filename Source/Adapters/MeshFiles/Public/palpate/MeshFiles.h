@@ -30,16 +30,8 @@ struct MeshReadSettings {
   std::optional<double> weldDistance;
 };
 
-/// Reads a mesh file in the format of its extension, of either case:
-///
-///   .obj          v, p, l and f; normals, texture coordinates, groups and materials are ignored
-///   .ply          vertices, faces, triangle strips and edges; text and binary of both byte orders
-///   .stl          text and binary
-///   .vtk          legacy VTK 1 to 5.1, text and binary: polygonal data and unstructured grids
-///   .vtp, .vtu    the same in XML: text, Base64, raw, also compressed by ZLib or LZ4
-///   .msh          Gmsh 2.2 and 4.1, text and binary of both byte orders
-///   .mesh         MEDIT, text
-///
+/// Reads a mesh file in the format of its extension, of either case: .obj, .ply, .stl, .vtk, .vtp,
+/// .vtu, .msh or .mesh. Docs/HowTo/Organs.md says what each may have.
 /// Shapes   all vertices in the file's order. Polygons become fans about their first corner, strips
 ///          triangles. A grid has the triangles of its file. Other data are ignored.
 /// Errors   File, with the name, the line or byte, and what was expected there; also without
@@ -56,12 +48,8 @@ struct MeshWriteSettings {
   bool gmsh22 = false;  ///< .msh: version 2.2 instead of 4.1
 };
 
-/// Writes a file completely or not at all. readMeshFile() then gives the same, in order.
-///
-///   .vtk          polygonal data, or an unstructured grid if there are tetrahedra; version 3.0
-///   .vtp, .vtu    binary: raw, appended, not compressed
-///   .stl          binary rounds positions to floats, and has no vertex without a triangle
-///
+/// Writes a file completely or not at all. readMeshFile() then gives the same, in order; binary
+/// .stl rounds positions to floats, and has no vertex without a triangle.
 /// Errors   File for a path that is no regular file or cannot be written, or elements that it
 ///          lacks; NonFinitePosition, IndexOutOfRange, TooLarge (2^31 vertices). An old file stays.
 /// Cost     linear; the file is made in memory first.

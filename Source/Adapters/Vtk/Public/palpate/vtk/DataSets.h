@@ -10,11 +10,9 @@ class vtkSmartPointer;
 
 namespace palpate::vtk {
 
-/// Copies the positions and elements of a data set of VTK.
-/// Shapes   all points in their order. Polygons and quads become fans about their first corner,
-///          strips triangles, polylines segments, vertices points. Other data are left behind.
+/// Copies the positions and elements of a data set of VTK, as readMeshFile() does those of a file;
+/// polylines become segments, vertices points.
 /// Errors   NonFinitePosition, IndexOutOfRange, TooLarge; UnsupportedMethod for others.
-/// Cost     linear.
 /// Threads  as VTK's, which may build its list of cells: no other thread may use the data set.
 PALPATE_EXPORT MeshArrays toMeshArrays(vtkPolyData&);
 PALPATE_EXPORT MeshArrays toMeshArrays(vtkUnstructuredGrid&);

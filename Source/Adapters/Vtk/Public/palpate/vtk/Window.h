@@ -13,7 +13,6 @@
 
 namespace palpate::vtk {
 
-/// A picture of width times height pixels.
 struct Image {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;  ///< three bytes per pixel; rows from the bottom up
@@ -21,12 +20,10 @@ struct Image {
 
 PALPATE_EXPORT std::string toPng(const Image&);  ///< the content of a file
 
-/// Keeps a connection to the X display while the result exists. A Window calls it first, as VTK
-/// ends the program without a display. Waits for a server that restarts.
-/// Errors   NotAvailable without a display.
+/// Keeps a connection to the X display while the result exists, and waits for a server that
+/// restarts. A Window calls it first. Throws NotAvailable without a display.
 PALPATE_EXPORT std::shared_ptr<void> openDisplay();
 
-/// How a window draws a geometry or a part of it.
 struct Appearance {
   std::string label{};                             ///< a name in the picture; empty: none
   std::array<double, 3> colour{0.62, 0.66, 0.72};  ///< red, green and blue in [0, 1]
@@ -46,27 +43,19 @@ struct View {
 /// between their points, with normals, coloured by distance. Vertices of validity() are magenta.
 ///
 ///   palpate::vtk::Window window(collisions);
-///   while (window.show()) {
-///     moveAndDetect(collisions);  // a frame
-///   }
+///   while (window.show()) moveAndDetect(collisions);  // a frame
 ///
-/// Keys     o: the cells of the contact nearest to the camera, all cells by depth, all cells by
-///          occupancy, none; b: bodies solid or translucent; c: contacts; n: normals; u: untrusted
-///          elements; l: names; p: panel; t: times; r: all in view; space: pause; q: closes. The
-///          mouse turns the view; a click names an element.
+/// Keys     Docs/Scenes.md lists them. The mouse turns the view; a click names an element.
 /// Needs    an OctreeBasedCD that stays at its address. From show() to press() and pick() only its
-///          positions and transforms may change.
-/// Errors   NotAvailable without a display, also off screen; InvalidSettings for a size beyond
-///          16384.
-/// Threads  make all calls from the thread that made the window.
+///          positions and transforms may change. Make all calls from one thread.
+/// Errors   NotAvailable without a display, also off screen; InvalidSettings beyond 16384 pixels.
 class PALPATE_EXPORT Window {
  public:
   /// Pixels. onScreen: false draws for image() only, at first without panel and graph.
   explicit Window(const OctreeBasedCD&, bool onScreen = true, int width = 1280, int height = 960);
   ~Window();
   /// For the next show(), from `firstElement` up to the next part's. Opacity and faces of element 0
-  /// apply to all parts. Unknown ids have no effect.
-  /// Errors   InvalidSettings for a value outside its range.
+  /// apply to all parts. Unknown ids have no effect. InvalidSettings for a value outside its range.
   void setAppearance(GeometryId, const Appearance&, std::uint32_t firstElement = 0);
   /// For the next show(); by default everything in the first frame is in view. Throws
   /// InvalidSettings if not finite, for parallel directions or length 0, or height < 0.
