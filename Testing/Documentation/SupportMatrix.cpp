@@ -18,12 +18,10 @@ namespace palpate::testing {
 namespace {
 
 using Named = std::pair<std::string, GeometryType>;
-const std::vector<Named> kTypes{{"triangles", GeometryType::Triangles},
+const std::vector<Named> kTypes{{"meshes", GeometryType::Triangles},
                                 {"lines", GeometryType::Lines},
                                 {"points", GeometryType::Points},
-                                {"tetrahedra", GeometryType::Triangles},
                                 {"shapes", GeometryType::Shape}};
-const std::vector<std::string> kShapes{"sphere", "capsule", "plane", "box", "cylinder", "hull"};
 
 std::string cellOf(GeometryType a, GeometryType b) {
   std::vector<Method> methods = supportedMethods(a, b);
@@ -36,17 +34,16 @@ std::string cellOf(GeometryType a, GeometryType b) {
   return cell + " |";
 }
 
-/// The row that begins with this name, with a cell for each of the first `columns` types.
-std::string rowOf(const Named& first, std::size_t columns) {
+/// The row that begins with this name, with a cell for each type.
+std::string rowOf(const Named& first) {
   std::string row = "| **" + first.first + "** |";
-  for (std::size_t i = 0; i < columns; ++i) row += cellOf(first.second, kTypes[i].second);
+  for (const Named& second : kTypes) row += cellOf(first.second, second.second);
   return row;
 }
 
 int run(const std::string& path, bool writes) {
   std::vector<std::string> rows;
-  for (const Named& type : kTypes) rows.push_back(rowOf(type, kTypes.size()));
-  for (const std::string& shape : kShapes) rows.push_back(rowOf({shape, GeometryType::Shape}, 3));
+  for (const Named& type : kTypes) rows.push_back(rowOf(type));
   std::ifstream file(path);
   std::string old, line, text;
   while (std::getline(file, line)) {
