@@ -75,7 +75,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   GeometryId addPointSet(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   /// setTransform() places it. Throws InvalidShape for a measure out of range.
   GeometryId addAnalyticalGeometry(const AnalyticalGeometry&);
-  /// Likewise. Only DistanceField and Auto answer its pairs. Throws InvalidSettings for null.
+  /// setTransform() places it. Only DistanceField and Auto answer its pairs.
+  /// Errors   InvalidSettings for null.
   GeometryId addDistanceField(std::shared_ptr<const DistanceField>);
   /// Attaches a field, in the body's frame, to a rigid triangle or tetrahedral mesh; null detaches
   /// it. Calls that change positions, topology or disabled elements then throw UnsupportedMethod.
@@ -84,7 +85,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          exceeds its error bound.
   /// Cost     one look-up for each vertex.
   void attachDistanceField(GeometryId mesh, std::shared_ptr<const DistanceField>);
-  /// Likewise attaches leaves of Method::Proxy, for Auto; none detaches them.
+  /// Like attachDistanceField(), with leaves of Method::Proxy, for Auto; none detaches them.
   /// Errors   UnsupportedMethod for another type; InvalidSettings; TooLarge as Method::Proxy.
   /// Cost     seconds of processor time for half a million triangles, on all threads.
   void attachSurfaceProxy(GeometryId mesh, const std::optional<SurfaceProxySettings>&);
@@ -113,7 +114,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The same, with the errors of addTetrahedralMesh().
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  /// The triangles that collide, until setTetrahedra() or removal. UnsupportedMethod for others.
+  /// The triangles that collide. Valid until setTetrahedra() or removal.
+  /// Errors   UnsupportedMethod for another type.
   TetrahedralSurface surface(GeometryId) const;
 
   /// Puts all positions of a geometry in a body's frame, at the pose now or at both ends of the
@@ -129,7 +131,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A name in messages: `geometry 3 "liver"`. A null character throws InvalidSettings.
   void setName(GeometryId, std::string name);
   const std::string& name(GeometryId) const;
-  /// Separated pairs have no contacts and no trust. Outer of others than meshes: InvalidSettings.
+  /// A pair that filters separate has no contacts and is not trusted.
+  /// Errors   InvalidSettings for Sidedness::Outer of lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
   /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others, in
   /// linear time. A vertex or edge is tested while an enabled element holds it.
@@ -154,8 +157,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   void update();  ///< brings octrees to the positions now
   /// Finds the contacts of every pair; what did not change keeps its answer. Steady frames allocate
   /// nothing, except for integers of exact arithmetic.
-  /// Errors   also of update(), forEachCandidate() and queries(): those of a predicate or executor;
-  ///          InvalidSettings if run() returns too early; NotAvailable after fork() in a task.
+  /// Errors   those of a predicate. Also of update(), forEachCandidate() and queries(): those of an
+  ///          executor; InvalidSettings if run() returns too early; NotAvailable after fork() in a
+  ///          task.
   void detectCollision();
 
   /// Passes candidate pairs in batches to f(std::span<const ElementPair>): all pairs of enabled

@@ -72,7 +72,8 @@ enum class Method {
   /// missing where Continuous answers the types and radii.
   Auto,
   Intersection,  ///< triangles that intersect at the step's end, exact; touching counts
-  /// Features at most the thickness and radii apart at the step's end, on whatever side they are.
+  /// Features at most the thickness and their radii apart at the step's end. After a crossing,
+  /// normals are on the wrong side.
   Proximity,
   /// Features at most the thickness and their radii apart at some time of the step (CCD).
   Continuous,

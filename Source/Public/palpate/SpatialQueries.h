@@ -130,7 +130,7 @@ class PALPATE_EXPORT SpatialQueries {
   /// The nearest surface point within maxDistance (L), on the lowest of equal elements. Exact.
   std::optional<SurfacePoint> closestPoint(GeometryId, const Eigen::Vector3d& point,
                                            double maxDistance = kInfinity) const;
-  /// Many. A point without an answer has an infinite distance and kNoElement.
+  /// closestPoint() of many points; without an answer the distance is infinite, with kNoElement.
   void closestPoints(GeometryId, std::span<const Eigen::Vector3d> points,
                      std::span<SurfacePoint> out, double maxDistance = kInfinity) const;
   /// The k nearest elements, or all if there are fewer. InvalidSettings for k < 1.
@@ -148,7 +148,7 @@ class PALPATE_EXPORT SpatialQueries {
                                 const InsideSettings& = {}) const;
   void signedDistances(GeometryId body, std::span<const Eigen::Vector3d> points,
                        std::span<SignedDistance> out, const InsideSettings& = {}) const;
-  /// The elements with a point within the radius, ascending, decided exactly.
+  /// The elements with a point within the radius (L), ascending, decided exactly.
   void elementsWithin(GeometryId, const Eigen::Vector3d& point, double radius,
                       std::vector<std::uint32_t>& elements) const;
 
@@ -157,7 +157,7 @@ class PALPATE_EXPORT SpatialQueries {
   std::optional<RayHit> firstHit(GeometryId, const Ray&) const;
   std::optional<RayHit> firstHit(const Ray&) const;  ///< of all; lowest if equal
   bool anyHit(GeometryId, const Ray&) const;         ///< whether there is a hit
-  /// Of many rays. A ray without a hit has an infinite t and kNoElement.
+  /// firstHit() of many rays; without a hit t is infinite and the element kNoElement.
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;  ///< by ascending t
   /// Among all geometries. frontFacesOnly excludes other hits, also lines and points of radius 0.
