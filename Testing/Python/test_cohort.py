@@ -100,6 +100,36 @@ def test_a_worker_that_dies_loses_nothing(cluster, tmp_path):
     assert table(serial, tmp_path / "a.csv") == table(outcomes, tmp_path / "b.csv")
 
 
+def test_a_cluster_that_dask_closed_is_started_again(monkeypatch, tmp_path):
+    """All workers leave after the first answer, and no new one comes by itself."""
+    clusters, examined, examine = [], [], cohort._lost
+
+    def examine_again(*arguments):
+        examined.append(arguments)
+        assert len(examined) < 20, "no cluster was started again"
+        return examine(*arguments)
+
+    class Recorded(distributed.LocalCluster):
+        def __init__(self, **options):
+            super().__init__(**options)
+            clusters.append(self)
+
+    monkeypatch.setattr(distributed, "LocalCluster", Recorded)
+    monkeypatch.setattr(cohort, "PATIENCE", 1.0)
+    monkeypatch.setattr(cohort, "_lost", examine_again)
+    log = str(tmp_path / "log")
+    tasks = cohort.sweep(shift=[0, 1, 2, 3, 4, 6], rows=[6], log=[log])
+    outcomes = []
+    for outcome in cohort.run(depth, tasks, workers=1):
+        outcomes.append(outcome)
+        if len(outcomes) == 1:
+            clusters[0].scale(0)
+    assert len(clusters) >= 2
+    assert not any(outcome.error for outcome in outcomes)
+    serial = list(cohort.run(depth, tasks, workers=0))
+    assert table(serial, tmp_path / "a.csv") == table(outcomes, tmp_path / "b.csv")
+
+
 @pytest.mark.parametrize("parallel", [False, True])
 def test_failed_tasks_are_tried_again_and_reported(cluster, tmp_path, parallel):
     log = str(tmp_path / "log")
