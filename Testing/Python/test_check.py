@@ -147,6 +147,23 @@ def test_surfaces_that_touch_are_no_fault(tmp_path):
     assert run(folder, tmp_path / "out", "--touch")[0] == 1
 
 
+def test_a_box_that_rests_on_another_is_no_fault(tmp_path):
+    """In frame 0 it is above, in frame 1 it rests, and in frame 2 it is 0.125 deep."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = palpate.triangles_of_quads(quads)
+    write(folder / "lower.obj", 4 * corners, triangles)
+    for frame, height in enumerate((4.5, 4.0, 3.875)):
+        write(folder / f"upper_{frame}.obj", corners + [1.25, 1.5, height], triangles)
+    code, rows = run(folder, tmp_path / "out")
+    assert code == 1 and frames_of(rows, "penetration") == {2}
+    assert 1 in frames_of(rows, "touch")
+    depths = {float(row["depth"]) for row in rows if row["text"] == "inside"}
+    assert depths == {0.125}
+
+
 def test_wrong_frames_are_reported_and_the_others_checked(tmp_path):
     folder = made(sequences.pierced_membrane, tmp_path)
     (folder / "membrane_01.vtp").unlink()
