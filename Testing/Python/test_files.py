@@ -40,6 +40,7 @@ def test_vertices_of_an_stl_file_are_joined(tmp_path):
     palpate.write_mesh_file(path, palpate.MeshArrays(TETRAHEDRON, TETRAHEDRON_TRIANGLES))
     assert len(palpate.read_mesh_file(path).positions) == 12
     joined = palpate.read_mesh_file(path, weld_distance=0)
+    assert repr(joined) == "<palpate.MeshArrays: 4 positions, 4 triangles>"
     assert len(joined.positions) == 4 and joined.joined_vertices == 8
     assert palpate.find_mesh_defects(joined.triangles).closed
 

@@ -71,6 +71,11 @@ class MeshArrays(NamedTuple):
     points: IndexArray = np.empty(0, np.uint32)
     joined_vertices: int = 0
 
+    def __repr__(self) -> str:
+        counts = {name: len(getattr(self, name)) for name in self._fields[:5]}
+        listed = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        return f"<palpate.MeshArrays: {listed}>"
+
 
 class SimplifiedMesh(NamedTuple):
     """The result of simplify().

@@ -1,5 +1,7 @@
 """Poses and analytical shapes. Arrays in them are copies that cannot be written."""
 
+from __future__ import annotations  # help() then shows the names of types
+
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
