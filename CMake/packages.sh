@@ -5,9 +5,10 @@ set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
-python="python3-dev pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel
-  python3-pytest python3-mypy mypy python3-distributed"
-test="python3 libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
+# All that pip needs to build the Python package, and SciPy for rows().
+python="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libmeshoptimizer-dev python3-dev
+  pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel"
+test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
   clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe"
 figures="python3 python3-matplotlib python3-pil"
