@@ -32,7 +32,8 @@ class BuildByCMake(build_ext):
                     "-DCMAKE_BUILD_TYPE=Release",
                     f"-DPython_EXECUTABLE={sys.executable}",
                     "-DPALPATE_WITH_PYTHON=ON",
-                    "-DPALPATE_PRECOMPILED_HEADERS=ON",  # a fifth less to compile
+                    "-DPALPATE_PRECOMPILED_HEADERS=ON",
+                    "-DPALPATE_UNITY=ON",  # with both, compilation takes less than half the time
                 ]
                 options += [
                     f"-DPALPATE_{part}=OFF"

@@ -9,7 +9,7 @@ namespace palpate {
 
 namespace {
 
-constexpr std::size_t kGroupGrain = 128;
+constexpr std::size_t kTetrahedronGroupGrain = 128;
 
 FloatBox boxOf(const Tetrahedron& tetrahedron, const FloatPoint* floats) {
   FloatBox box;
@@ -59,7 +59,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
 void TetrahedronTree::fit(const FloatPoint* floats, const Threads& threads) {
   PALPATE_ASSERT(m_ordered.size() == m_octree.size() && m_octree.size() > 0);
   const std::span<const std::uint32_t> groups = m_octree.groups();
-  threads.forChunks(groups.size() - 1, kGroupGrain,
+  threads.forChunks(groups.size() - 1, kTetrahedronGroupGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {
                       for (std::size_t g = from; g < to; ++g) {
                         FloatBox all;

@@ -14,7 +14,7 @@ namespace {
 
 /// Jobs of a pair with at least this many elements near the field, where there is more than one
 /// thread.
-constexpr std::size_t kJobs = 32, kSharedSize = 512;
+constexpr std::size_t kFieldJobs = 32, kSharedFieldSize = 512;
 
 /// Validity's lists, and the error bound.
 void describeField(const PairRecord& record, CollisionData::Contents& contents) {
@@ -42,8 +42,8 @@ std::size_t FieldWork::start(const FrameStart& frame) {
   const PlacedField placed = m_record->placedField();
   m_record->fieldContacts(placed).start(m_record->mesh().body);
   const std::size_t elements = m_record->fieldScratch->elements.size();
-  const bool shared = frame.threads.count() > 1 && elements >= kSharedSize;
-  m_jobs = elements == 0 ? 0 : shared ? kJobs : 1;
+  const bool shared = frame.threads.count() > 1 && elements >= kSharedFieldSize;
+  m_jobs = elements == 0 ? 0 : shared ? kFieldJobs : 1;
   return m_jobs;
 }
 

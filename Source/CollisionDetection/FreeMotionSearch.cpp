@@ -16,7 +16,7 @@ namespace {
 
 /// Jobs of a pair, and node pairs for them, where there is more than one thread and enough
 /// elements.
-constexpr std::size_t kJobs = 32, kNodePairsWanted = 256, kSharedSize = 8192;
+constexpr std::size_t kSearchJobs = 32, kSearchNodePairs = 256, kSharedSearchSize = 8192;
 
 bool takesPart(const PairRecord& record) {
   return record.pair.settings.freeMotionReach > 0.0 && record.collides();
@@ -115,11 +115,11 @@ void FreeMotionSearch::startSearch(Work& work, const Threads& threads) {
   const Body &a = work.record->a->body, &b = work.record->b->body;
   const std::size_t elements = a.tree.octree().size() + b.tree.octree().size();
   work.trees = treesOf(a, b, work.searchDistance, false);
-  startPairs(work.trees, threads.count() > 1 && elements >= kSharedSize ? kNodePairsWanted : 1,
-             m_stack);
+  startPairs(work.trees,
+             threads.count() > 1 && elements >= kSharedSearchSize ? kSearchNodePairs : 1, m_stack);
   work.first = m_nodePairs.size(), work.count = m_stack.pairs.size();
   m_nodePairs.insert(m_nodePairs.end(), m_stack.pairs.begin(), m_stack.pairs.end());
-  work.grain = std::max<std::size_t>(1, (work.count + kJobs - 1) / kJobs);
+  work.grain = std::max<std::size_t>(1, (work.count + kSearchJobs - 1) / kSearchJobs);
 }
 
 void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch) const {

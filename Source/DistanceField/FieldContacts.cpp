@@ -88,7 +88,7 @@ double depthToleranceOf(const DistanceField& field) {
 
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr double kNoDistance = std::numeric_limits<double>::infinity();
 
 /// Decides which features of a mesh are contacts, and at which points.
 class FeaturesNearField {
@@ -135,7 +135,7 @@ class FeaturesNearField {
     if (isOwn && !deep && m_reportsAll && boundary <= m_thickness)
       add(ShapeElement::Edge, p, vertices,
           ends[0] <= ends[1] ? Vector3d::UnitX() : Vector3d::UnitY());
-    return deep ? deep->value : kNone;
+    return deep ? deep->value : kNoDistance;
   }
 
   /// least: what findEdge() returned for each edge; edge i joins corners i and i + 1.
@@ -384,7 +384,7 @@ void FieldContacts::start(const Body& geometry) {
     }
     // An edge whose owner is not among the elements has no point within the thickness.
     for (const std::uint32_t edge : topology.triangleEdges[element])
-      if (edge != kNoEdge) scratch.least[edge] = kNone;
+      if (edge != kNoEdge) scratch.least[edge] = kNoDistance;
   }
 }
 
@@ -430,7 +430,7 @@ void FieldContacts::findFaces(std::size_t begin, std::size_t end, ShapeContactBu
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t edge = topology.triangleEdges[element][i];
       values[i] = m_scratch.values[topology.elements[element][i]];
-      least[i] = edge == kNoEdge ? kNone : m_scratch.least[edge];
+      least[i] = edge == kNoEdge ? kNoDistance : m_scratch.least[edge];
     }
     features.findFace(element, values, least);
   }
@@ -447,7 +447,7 @@ void FieldContacts::findByBruteForce(const TriangleMesh& mesh, const PlacedField
     std::array<double, 3> values, least;
     for (int i = 0; i < 3; ++i) values[i] = features.valueAt(topology.elements[element][i]);
     for (int i = 0; i < 3; ++i) {
-      least[i] = kNone;
+      least[i] = kNoDistance;
       if (topology.ownsCorner(element, i))
         features.findVertex(topology.elements[element][i], values[i]);
       if (topology.triangleEdges[element][i] == kNoEdge) continue;

@@ -27,7 +27,7 @@ constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeader = 104, kChecksum = 8;
 /// L: no build makes a domain with larger coordinates. The surface and its band are within
 /// 2 kLargestMeasure, and the units add less than half of it.
-constexpr double kLargestDomain = 4.0 * kLargestMeasure;
+constexpr double kLargestFileDomain = 4.0 * kLargestMeasure;
 
 std::uint64_t checksumOf(std::string_view bytes) {
   std::uint64_t sum = 0xcbf29ce484222325u;
@@ -177,7 +177,7 @@ FieldCells readField(const std::filesystem::path& path) {
   }
   for (std::size_t k = 0; k < 3; ++k)
     for (const std::int64_t end : {cells.origin[k], cells.origin[k] + cells.size[k]})
-      if (!(std::abs(std::ldexp(static_cast<double>(end), cells.exponent)) <= kLargestDomain))
+      if (!(std::abs(std::ldexp(static_cast<double>(end), cells.exponent)) <= kLargestFileDomain))
         file.refuse("the domain is out of range");
   const auto isOpen = file.integer<std::uint32_t>();
   if (isOpen > 1) file.refuse("the number is not 0 or 1");

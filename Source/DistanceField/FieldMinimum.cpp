@@ -31,7 +31,7 @@ Corner between(const Corner& a, const Corner& b, double share) {
 
 /// The part of a feature in a cell: a segment, or a convex polygon. A triangle clipped by a box has
 /// at most 9 corners. Rounding may add some to it.
-struct Part {
+struct FeaturePart {
   static constexpr std::size_t kMostCorners = 16;
 
   std::array<Corner, kMostCorners> corners;
@@ -44,7 +44,7 @@ struct Part {
 };
 
 /// The part on one side of the plane at[axis] = plane. Its corners are exactly on that side.
-void clip(const Part& part, int axis, double plane, bool upper, Part& out) {
+void clip(const FeaturePart& part, int axis, double plane, bool upper, FeaturePart& out) {
   out.size = 0;
   const auto isOn = [&](const Corner& c) {
     return upper ? c.at[axis] >= plane : c.at[axis] <= plane;
@@ -76,7 +76,7 @@ class DeepPointSearch {
         m_band(m_cells.band * m_toUnits),
         m_limit(target * m_toUnits),
         m_tolerance(tolerance * m_toUnits) {
-    Part part;
+    FeaturePart part;
     const double unit = std::ldexp(1.0, m_cells.exponent);
     for (std::size_t i = 0; i < corners.size(); ++i) {
       Corner corner{{}, {}, radii[i] * m_toUnits};
@@ -100,12 +100,12 @@ class DeepPointSearch {
  private:
   /// Cuts the part by the planes between root cells, axis by axis. Outside the domain the distance
   /// is beyond the band.
-  void searchRoots(const Part& part, int axis, std::array<std::uint32_t, 3> root) {
+  void searchRoots(const FeaturePart& part, int axis, std::array<std::uint32_t, 3> root) {
     if (part.size == 0) return;
     if (axis == 3) {
       const CellEntry entry = m_cells.root(root);
       if (entry.kind() == CellKind::Outside) return;
-      Part inCell;
+      FeaturePart inCell;
       inCell.size = part.size;
       for (std::size_t i = 0; i < part.size; ++i) {
         inCell.corners[i] = part.corners[i];
@@ -122,7 +122,7 @@ class DeepPointSearch {
     if (!(upper >= 0.0 && lower <= size)) return;
     const auto first = static_cast<std::uint32_t>(std::max(lower, 0.0)),
                last = static_cast<std::uint32_t>(std::min(upper, size));
-    Part above, slab;
+    FeaturePart above, slab;
     for (root[axis] = std::min(first, m_cells.size[axis] - 1);
          root[axis] <= std::min(last, m_cells.size[axis] - 1); ++root[axis]) {
       const double bottom = root[axis], top = bottom + 1.0;
@@ -136,7 +136,7 @@ class DeepPointSearch {
     }
   }
 
-  void searchCell(const Part& part, CellEntry entry) {
+  void searchCell(const FeaturePart& part, CellEntry entry) {
     if (part.size == 0) return;
     switch (entry.kind()) {
       case CellKind::Outside:
@@ -153,11 +153,12 @@ class DeepPointSearch {
   }
 
   /// Cuts the part by the middle planes of a cell, axis by axis.
-  void searchBlock(const Part& part, const FieldCells::Block& children, int axis, unsigned octant) {
+  void searchBlock(const FeaturePart& part, const FieldCells::Block& children, int axis,
+                   unsigned octant) {
     if (part.size == 0) return;
     if (axis == 3) {
       if (children[octant].kind() == CellKind::Outside) return;  // as searchCell() does
-      Part inChild;
+      FeaturePart inChild;
       inChild.size = part.size;
       for (std::size_t i = 0; i < part.size; ++i) {
         inChild.corners[i] = part.corners[i];
@@ -173,14 +174,14 @@ class DeepPointSearch {
     }
     if (below) return searchBlock(part, children, axis + 1, octant);
     if (above) return searchBlock(part, children, axis + 1, octant | 1u << axis);
-    Part half;
+    FeaturePart half;
     for (const bool upper : {false, true}) {
       clip(part, axis, 0.5, upper, half);
       searchBlock(half, children, axis + 1, octant | (upper ? 1u << axis : 0u));
     }
   }
 
-  void searchLeaf(const Part& part, const FieldCells::Leaf& leaf) {
+  void searchLeaf(const FeaturePart& part, const FieldCells::Leaf& leaf) {
     const auto least = static_cast<double>(*std::min_element(leaf.begin(), leaf.end()));
     if (bounded(least - m_largestRadius, m_largestRadius) > m_limit) return;
     if (part.size == 2) return searchSegment(leaf, part.corners[0], part.corners[1]);

@@ -60,15 +60,15 @@ Difference betweenMiddles(const Vector3d& a0, const Vector3d& a1, const Vector3d
 }
 
 /// The range of a foot's weights.
-enum class Range { ZeroToOne, MinusOneToOne };
+enum class WeightRange { ZeroToOne, MinusOneToOne };
 
-double weightOf(const Weight& weight, Range range) {
-  return range == Range::ZeroToOne ? unitWeight(weight) : halvedWeight(weight);
+double weightOf(const Weight& weight, WeightRange range) {
+  return range == WeightRange::ZeroToOne ? unitWeight(weight) : halvedWeight(weight);
 }
 
-double extentOf(const Difference& m, const Difference& u, const Difference& v, Range range) {
+double extentOf(const Difference& m, const Difference& u, const Difference& v, WeightRange range) {
   const double edges = std::max(largest(u.high), largest(v.high));
-  return std::max(largest(m.high), range == Range::ZeroToOne ? edges : 2.0 * edges);
+  return std::max(largest(m.high), range == WeightRange::ZeroToOne ? edges : 2.0 * edges);
 }
 
 /// The foot of the perpendicular from the origin to the plane m + s u + t v. It is found by one
@@ -78,7 +78,7 @@ double extentOf(const Difference& m, const Difference& u, const Difference& v, R
 /// Needs    a moderate extent, from extentOf().
 /// Swapping (u, s) and (v, t) gives the same bits, mapped.
 std::optional<Foot> footOnPlane(const Difference& m, const Difference& u, const Difference& v,
-                                Range range, double extent) {
+                                WeightRange range, double extent) {
   const double square = dot(u.high, u.high) * dot(v.high, v.high);
   Vector3d normal = u.high.cross(v.high);
   double normalSquare = dot(normal, normal);
@@ -169,10 +169,10 @@ Foot footOnLine(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
 
 Foot footOnFace(const Vector3d& p, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
   const Difference m = difference(p, a), u = difference(a, b), v = difference(a, c);
-  const double extent = extentOf(m, u, v, Range::ZeroToOne);
+  const double extent = extentOf(m, u, v, WeightRange::ZeroToOne);
   if (!isModerate(extent))
     return atModerateScale(extent, footOnFace, exact::footOnPlane, p, a, b, c);
-  std::optional<Foot> foot = footOnPlane(m, u, v, Range::ZeroToOne, extent);
+  std::optional<Foot> foot = footOnPlane(m, u, v, WeightRange::ZeroToOne, extent);
   if (!foot || !hasRightDistance(*foot, p, a, b, c) || foot->s - (1.0 - foot->t) > kWeightStep)
     return exact::footOnPlane(p, a, b, c);
   foot->exact = foot->distance == 0.0;
@@ -191,7 +191,7 @@ EdgePair::EdgePair(const Vector3d& newP0, const Vector3d& newP1, const Vector3d&
 
 Foot footBetweenEdges(const EdgePair& edges) {
   const auto& [p0, p1, q0, q1, m, u, v] = edges;
-  const double extent = extentOf(m, u, v, Range::MinusOneToOne);
+  const double extent = extentOf(m, u, v, WeightRange::MinusOneToOne);
   if (!isModerate(extent)) {
     const auto find = [](const auto&... positions) {
       return footBetweenEdges(EdgePair(positions...));
@@ -199,7 +199,7 @@ Foot footBetweenEdges(const EdgePair& edges) {
     return atModerateScale(extent, find, exact::footBetweenLines, p0, p1, q0, q1);
   }
   PALPATE_ASSERT(p0 != p1 && q0 != q1);
-  std::optional<Foot> foot = footOnPlane(m, u, v, Range::MinusOneToOne, extent);
+  std::optional<Foot> foot = footOnPlane(m, u, v, WeightRange::MinusOneToOne, extent);
   if (!foot || !hasRightDistance(*foot, p0, p1, q0, q1))
     return exact::footBetweenLines(p0, p1, q0, q1);
   foot->exact = foot->distance == 0.0;

@@ -21,15 +21,15 @@ bool haveBothSigns(const Signs& s) {
   return (s[0] > 0 || s[1] > 0 || s[2] > 0) && (s[0] < 0 || s[1] < 0 || s[2] < 0);
 }
 
-struct Box {
+struct DoubleBox {
   Eigen::Array3d lower, upper;
-  Box(const Eigen::Vector3d& p, const Eigen::Vector3d& q)
+  DoubleBox(const Eigen::Vector3d& p, const Eigen::Vector3d& q)
       : lower(p.array().min(q.array())), upper(p.array().max(q.array())) {}
-  explicit Box(const Corners& c) : Box(c[0], c[1]) {
+  explicit DoubleBox(const Corners& c) : DoubleBox(c[0], c[1]) {
     lower = lower.min(c[2].array());
     upper = upper.max(c[2].array());
   }
-  bool overlaps(const Box& other) const {
+  bool overlaps(const DoubleBox& other) const {
     return (lower <= other.upper).all() && (other.lower <= upper).all();
   }
   bool contains(const Eigen::Vector3d& p) const {
@@ -40,7 +40,7 @@ struct Box {
 /// A triangle and, for each of its corners, its side of the other triangle's plane.
 struct ClassifiedTriangle {
   const Corners& corners;
-  const Box& box;
+  const DoubleBox& box;
   unsigned excluded;  ///< bit i: corner i is a corner of the other, too
   Signs sides{};
 
@@ -185,12 +185,13 @@ TriangleIntersection intersectTouching(const ClassifiedTriangle& a, const Classi
   result.cornersOfBOnA = cornersOn(b, a, ofA, sidesOfA);
   for (int i = 0; i < 3; ++i) {
     const Eigen::Vector3d &p0 = a.corners[i], &p1 = a.corners[next(i)];
-    const Box boxP(p0, p1);
+    const DoubleBox boxP(p0, p1);
     if (a.isEdgeOnOneSide(i) || !boxP.overlaps(b.box)) continue;
     for (int j = 0; j < 3; ++j) {
       const Eigen::Vector3d &q0 = b.corners[j], &q1 = b.corners[next(j)];
       const unsigned bit = TriangleIntersection::edgesBit(i, j);
-      if (excludedEdges & bit || b.isEdgeOnOneSide(j) || !boxP.overlaps(Box(q0, q1))) continue;
+      if (excludedEdges & bit || b.isEdgeOnOneSide(j) || !boxP.overlaps(DoubleBox(q0, q1)))
+        continue;
       bool touch = coplanar || orient3d(p0, p1, q0, q1, counts) == 0;
       for (int axis = axes.first; touch && axis <= axes.last; ++axis)
         touch = !sidesOfA.separate(axis, i, j, next(j)) && !sidesOfB.separate(axis, j, i, next(i));
@@ -208,7 +209,7 @@ TriangleIntersection intersectTouching(const ClassifiedTriangle& a, const Classi
 
 TriangleIntersection intersectTriangles(const Corners& cornersOfA, const Corners& cornersOfB,
                                         SignCounts& counts, const ExcludedFeatures& excluded) {
-  const Box boxA(cornersOfA), boxB(cornersOfB);
+  const DoubleBox boxA(cornersOfA), boxB(cornersOfB);
   if (!boxA.overlaps(boxB)) return {};
   ClassifiedTriangle a{cornersOfA, boxA, excluded.cornersOfA},
       b{cornersOfB, boxB, excluded.cornersOfB};

@@ -20,13 +20,13 @@ namespace {
 using Eigen::Vector3d;
 
 /// The vertices of a feature or an element, with their positions and free motions.
-struct Corners {
+struct FeatureCorners {
   RoundPoints points;
   std::array<std::uint32_t, 3> vertices;
   std::span<double> motions;
 
   template <class Vertices>
-  Corners(const TriangleMesh& mesh, std::span<double> ofMesh, const Vertices& ids)
+  FeatureCorners(const TriangleMesh& mesh, std::span<double> ofMesh, const Vertices& ids)
       : motions(ofMesh) {
     for (const std::uint32_t v : ids) {
       vertices[points.count] = v;
@@ -108,7 +108,7 @@ class FreeMotionFinder {
       return;
     const std::uint32_t tests = m_tests.of(candidate);
     if (tests == 0) return;
-    const Corners s(m_pair.a, m_motions.a, m_pair.a.topology.elements[candidate.a]),
+    const FeatureCorners s(m_pair.a, m_motions.a, m_pair.a.topology.elements[candidate.a]),
         t(m_pair.b, m_motions.b, m_pair.b.topology.elements[candidate.b]);
     const Limits limits(*this, s, t);
     if (limits.lowersNone(s, t)) return;
@@ -125,12 +125,12 @@ class FreeMotionFinder {
 
   /// What the boxes of two features, or of two elements, prove.
   struct Limits {
-    Limits(const FreeMotionFinder& finder, const Corners& p, const Corners& q)
+    Limits(const FreeMotionFinder& finder, const FeatureCorners& p, const FeatureCorners& q)
         : box(gapOfBoxes(p.points, q.points, finder.m_range.thickness())),
           free(finder.m_range.freeGap(box.gap, box.size)) {}
 
     /// Whether all vertices are known to be no freer than along the axis.
-    bool lowersNone(const Corners& p, const Corners& q) const {
+    bool lowersNone(const FeatureCorners& p, const FeatureCorners& q) const {
       return free > 0.0 && std::max(p.mostFree(), q.mostFree()) <= 0.5 * free;
     }
 
@@ -152,7 +152,7 @@ class FreeMotionFinder {
                        &others = swapped ? m_pair.a : m_pair.b;
     if (m_pair.excludesVertex(vertex, triangle)) return;
     const Triangle& ids = others.topology.elements[triangle];
-    const Corners p(vertices, swapped ? m_motions.b : m_motions.a, std::array{vertex}),
+    const FeatureCorners p(vertices, swapped ? m_motions.b : m_motions.a, std::array{vertex}),
         q(others, swapped ? m_motions.a : m_motions.b, ids);
     bound(
         p, q, [&] { return shortestTo(p.points.positions[0], q.points.positions); },
@@ -169,7 +169,7 @@ class FreeMotionFinder {
   void edges(std::uint32_t edgeA, std::uint32_t edgeB) {
     if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
     const Segment &ofA = m_pair.a.topology.edges[edgeA], &ofB = m_pair.b.topology.edges[edgeB];
-    const Corners p(m_pair.a, m_motions.a, ofA), q(m_pair.b, m_motions.b, ofB);
+    const FeatureCorners p(m_pair.a, m_motions.a, ofA), q(m_pair.b, m_motions.b, ofB);
     bound(
         p, q, [&] { return shortestBetween(p.points.positions, q.points.positions); },
         [&] { return rejectsEdges(m_pair, edgeA, edgeB); },
@@ -184,8 +184,8 @@ class FreeMotionFinder {
   /// Lowers the free motions of two features. nearly(): about the shortest vector from q to p.
   /// isRejected(): by a filter. measured(): along the closest points.
   template <class Nearly, class IsRejected, class Measure>
-  void bound(const Corners& p, const Corners& q, Nearly&& nearly, IsRejected&& isRejected,
-             Measure&& measured) {
+  void bound(const FeatureCorners& p, const FeatureCorners& q, Nearly&& nearly,
+             IsRejected&& isRejected, Measure&& measured) {
     const Limits limits(*this, p, q);
     if (limits.lowersNone(p, q) || isRejected()) return;
     const Vector3d shortest = nearly();

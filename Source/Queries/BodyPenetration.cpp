@@ -24,9 +24,9 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr std::size_t kMostRays = 8;      ///< of vertices that bound one translation
-constexpr std::size_t kMostNormals = 32;  ///< directions from faces
-constexpr int kMostSteps = 256;           ///< of one translation
+constexpr std::size_t kMostRays = 8;          ///< of vertices that bound one translation
+constexpr std::size_t kMostFaceNormals = 32;  ///< directions from faces
+constexpr int kMostSteps = 256;               ///< of one translation
 constexpr int kMostDescents = 10;
 /// A direction whose translation is longer than the best one by more than this starts no descent.
 constexpr double kWorthDescent = 1.15;
@@ -264,7 +264,7 @@ class Search {
   }
   void addNormals() {
     const auto add = [&](bool ofA, std::uint32_t element) {
-      if (m_scratch.seeds.size() < kMostNormals)
+      if (m_scratch.seeds.size() < kMostFaceNormals)
         addSeed(ofA ? Vector3d(-normalOf(true, element)) : normalOf(false, element));
     };
     addSeed(directionOfVolume());

@@ -17,9 +17,9 @@ namespace {
 
 constexpr std::size_t kMaxPoints = 512;
 
-class Difference {
+class SupportDifference {
  public:
-  Difference(const Support& a, const Support& b) : m_a(a), m_b(b) {}
+  SupportDifference(const Support& a, const Support& b) : m_a(a), m_b(b) {}
 
   Vector3d furthest(const Vector3d& direction) const { return m_a(direction) - m_b(-direction); }
 
@@ -62,7 +62,7 @@ class Difference {
 HullSeparation separateHulls(const Support& a, const Support& b, double wanted,
                              Polytope& polytope) {
   PALPATE_ASSERT(wanted >= 0.0);
-  const Difference difference(a, b);
+  const SupportDifference difference(a, b);
   std::array<Vector3d, 4> first;
   if (!difference.start(first)) return {Vector3d::Zero(), 0.0, 0.0};
   polytope.start(first);

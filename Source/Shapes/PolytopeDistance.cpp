@@ -13,7 +13,7 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kInfiniteDistance = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -76,7 +76,7 @@ Polytope::Minimum Polytope::minimizeOnSegment(const Vector3d& p, const Vector3d&
 
 std::uint32_t Polytope::highestPlane(const Vector3d& x, double tie) const {
   std::uint32_t best = 0;
-  double height = -kInfinity;
+  double height = -kInfiniteDistance;
   for (std::uint32_t i = 0; i < m_planes.size(); ++i) {
     const double value = m_planes[i].height(x);
     if (value > height + tie) best = i, height = value;
@@ -144,7 +144,7 @@ Polytope::OnFace Polytope::nearest(const Vector3d& x, double tie) const {
 Polytope::OnFace Polytope::nearestFaceWithin(const Vector3d& x, double slack) const {
   const double top = m_planes[highestPlane(x, 0)].height(x);
   OnFace best{};
-  best.from.distance = kInfinity;
+  best.from.distance = kInfiniteDistance;
   for (const Plane& plane : m_planes) {
     if (!(plane.height(x) >= top - slack)) continue;
     const OnFace on = onFace(x, plane.face);
@@ -179,7 +179,7 @@ PointShapeDistance Polytope::leastDistance(const Vector3d& x, std::span<const Ve
   const PointShapeDistance any = signedDistance(x, tie);
   if (any.distance > tie) return any;
   const Plane* flattest = nullptr;
-  double least = kInfinity;
+  double least = kInfiniteDistance;
   for (const Plane& plane : m_planes) {
     if (!(plane.height(x) >= any.distance - tie)) continue;
     const double rise = riseOf(sides, plane.normal);
@@ -190,7 +190,7 @@ PointShapeDistance Polytope::leastDistance(const Vector3d& x, std::span<const Ve
 
 Vector3d Polytope::support(const Vector3d& direction, double tie) const {
   PALPATE_ASSERT(!m_points.empty() && tie >= 0.0);
-  double most = -kInfinity;
+  double most = -kInfiniteDistance;
   for (const Vector3d& p : m_points) most = std::max(most, dot(direction, p));
   Vector3d sum = Vector3d::Zero();
   double count = 0;
@@ -222,7 +222,7 @@ double Polytope::leastOnEdge(const Vector3d& p, const Vector3d& q, double tie) c
   // Alternates between the face nearest to a point of the edge and the edge's point nearest to that
   // face, until neither changes.
   OnFace on = nearest(p + t * along, tie);
-  for (double least = kInfinity;;) {
+  for (double least = kInfiniteDistance;;) {
     const Vector3d &a = corner(on.face, 0), &b = corner(on.face, 1), &c = corner(on.face, 2);
     const double start = finiteVertexTriangleDistance(p, a, b, c).distance,
                  end = finiteVertexTriangleDistance(q, a, b, c).distance;

@@ -16,7 +16,7 @@ namespace {
 
 /// Of the longest side: how far from a triangle its sides are looked at.
 constexpr double kSideStep = 1e-7;
-constexpr std::uint32_t kNone = 0xffffffff;
+constexpr std::uint32_t kNoTriangle = 0xffffffff;
 
 }  // namespace
 
@@ -45,7 +45,7 @@ Shells shellsOf(const Body& body, const SimplifyCertificate& certificate) {
   Shells shells{componentsOf(positions.size(), triangles),
                 std::vector<std::int8_t>(positions.size(), 0),
                 std::vector<Vector3d>(positions.size(), Vector3d::Zero())};
-  std::vector<std::uint32_t> largest(positions.size(), kNone);  // triangle of each component
+  std::vector<std::uint32_t> largest(positions.size(), kNoTriangle);  // triangle of each component
   std::vector<double> areas(positions.size(), 0.0);
   Eigen::AlignedBox3d box;
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
@@ -57,13 +57,13 @@ Shells shellsOf(const Body& body, const SimplifyCertificate& certificate) {
     }
     const double area = (positions[b] - positions[a]).cross(positions[c] - positions[a]).norm();
     const std::uint32_t component = shells.componentOf[a];
-    if (largest[component] != kNone && !(area > areas[component])) continue;
+    if (largest[component] != kNoTriangle && !(area > areas[component])) continue;
     largest[component] = t;
     areas[component] = area;
   }
   PointQueryStack stack;
   for (const std::uint32_t t : largest) {
-    if (t == kNone) continue;
+    if (t == kNoTriangle) continue;
     const auto& [a, b, c] = triangles[t];
     const Vector3d centre = (positions[a] + positions[b] + positions[c]) / 3.0,
                    step = kSideStep * box.sizes().maxCoeff() * unitNormal(positions, triangles[t]);

@@ -81,7 +81,7 @@ struct Protrusions {
 };
 
 /// Where the vertices of a collapsed mesh move.
-struct Moved {
+struct MovedOutward {
   std::vector<OutwardWay> ways;
   std::vector<double> offsets;  ///< L
   std::vector<Vector3d> positions;
@@ -239,7 +239,7 @@ Protrusions findProtrusions(const Source& source, const Collapsed& collapsed, Lo
 
 /// Moves a vertex by its offset.
 void moveVertex(const Source& source, const Collapsed& collapsed, std::uint32_t vertex,
-                Moved& moved) {
+                MovedOutward& moved) {
   const OutwardWay& way = moved.ways[vertex];
   const double length =
       std::min(moved.offsets[vertex] * way.lengthPerOffset, kLongestWay * source.maxDistance);
@@ -247,10 +247,10 @@ void moveVertex(const Source& source, const Collapsed& collapsed, std::uint32_t 
   moved.positions[vertex] = collapsed.positions[vertex] + length * way.direction;
 }
 
-Moved moveOutward(const Source& source, const Collapsed& collapsed,
-                  std::span<const double> heights) {
-  Moved moved{outwardWays(collapsed.positions, collapsed.triangles, collapsed.sides),
-              std::vector<double>(collapsed.positions.size(), 0.0), collapsed.positions};
+MovedOutward moveOutward(const Source& source, const Collapsed& collapsed,
+                         std::span<const double> heights) {
+  MovedOutward moved{outwardWays(collapsed.positions, collapsed.triangles, collapsed.sides),
+                     std::vector<double>(collapsed.positions.size(), 0.0), collapsed.positions};
   for (std::size_t t = 0; t < collapsed.triangles.size(); ++t)
     for (const std::uint32_t v : collapsed.triangles[t])
       moved.offsets[v] =
@@ -276,7 +276,8 @@ double liftOf(const Source& source, const Corners& corners, const Vector3d& norm
 }
 
 /// Moves triangles further that touch the mesh. Returns marks of those that still do.
-Marks liftTouching(const Source& source, const Collapsed& collapsed, Loops& loops, Moved& moved) {
+Marks liftTouching(const Source& source, const Collapsed& collapsed, Loops& loops,
+                   MovedOutward& moved) {
   const std::size_t size = collapsed.triangles.size();
   std::vector<double> lifts(size, 0.0);
   Marks isTouching(size, 0), isOld(size, 0);
@@ -312,7 +313,7 @@ Marks liftTouching(const Source& source, const Collapsed& collapsed, Loops& loop
 
 /// L, per triangle: its distance from the mesh; infinite if it has failed or there is no proof.
 std::vector<double> distanceBounds(const Source& source, std::span<const Triangle> triangles,
-                                   const Moved& moved, const Marks& failed, Loops& loops) {
+                                   const MovedOutward& moved, const Marks& failed, Loops& loops) {
   std::vector<double> bounds(triangles.size(), kInfinity);
   loops.forEach(triangles.size(), [&](std::size_t t, PointQueryStack& stack) {
     if (failed[t]) return;
@@ -327,7 +328,7 @@ bool hasFailed(double bound) { return bound == kInfinity; }
 /// Marks components of the mesh that are not in the result, per lowest vertex. Each component of
 /// the mesh must be inside the result, and each one of the result outside the mesh. Where no
 /// triangles meet, one vertex of each decides.
-Marks failedComponents(const Source& source, const Collapsed& collapsed, const Moved& moved,
+Marks failedComponents(const Source& source, const Collapsed& collapsed, const MovedOutward& moved,
                        std::span<const double> bounds, const Threads& threads) {
   const std::vector<std::uint32_t>& componentOf = source.shells.componentOf;
   Marks failed(componentOf.size(), 0);
@@ -357,7 +358,8 @@ Marks failedComponents(const Source& source, const Collapsed& collapsed, const M
 /// Gives the triangles of the mesh near failed ones of the result, and those of failed components,
 /// the next level. Returns the last failure, or the first at the finest level.
 std::optional<Failure> refineFailed(const Source& source, const Collapsed& collapsed,
-                                    const Moved& moved, std::span<const std::uint32_t> owners,
+                                    const MovedOutward& moved,
+                                    std::span<const std::uint32_t> owners,
                                     std::span<const double> bounds, const Marks& failedComponents,
                                     Levels& levels) {
   std::optional<Failure> failure;
@@ -470,7 +472,7 @@ SimplifiedMesh simplifyInRounds(CollapseEdges collapseEdges, const Body& body,
       firstCount = collapsed.triangles.size();
     }
     const Protrusions protrusions = findProtrusions(source, collapsed, loops);
-    Moved moved = moveOutward(source, collapsed, protrusions.heights);
+    MovedOutward moved = moveOutward(source, collapsed, protrusions.heights);
     Marks failed = trianglesAtOpenEdges(collapsed.triangles);
     const Marks touching = liftTouching(source, collapsed, loops, moved);
     for (std::size_t t = 0; t < failed.size(); ++t) failed[t] |= touching[t];

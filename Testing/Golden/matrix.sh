@@ -16,7 +16,7 @@ declare -A options=(
   [clang-O3-lto]="-DCMAKE_C_COMPILER=clang-14 -DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_CXX_FLAGS_RELEASE=-O3
     -DCMAKE_INTERPROCEDURAL_OPTIMIZATION=ON -DCMAKE_EXE_LINKER_FLAGS=-fuse-ld=lld-14"
   [clang-libcxx]="-DCMAKE_CXX_COMPILER=clang++-14 -DCMAKE_CXX_FLAGS=-stdlib=libc++"
-  [arm64]="-DCMAKE_TOOLCHAIN_FILE=CMake/Arm64.cmake -DCMAKE_CXX_FLAGS_RELEASE=-O1"
+  [arm64]="-DCMAKE_TOOLCHAIN_FILE=CMake/Arm64.cmake -DCMAKE_CXX_FLAGS_RELEASE=-O1 -DPALPATE_UNITY=ON"
 )
 (($#)) || set -- $(printf '%s\n' "${!options[@]}" | sort)
 

@@ -25,7 +25,7 @@ double decode(const char* bytes) {
 template <class T>
 constexpr NumberType kType{sizeof(T), decode<T>};
 
-constexpr std::pair<std::string_view, NumberType> kTypes[]{
+constexpr std::pair<std::string_view, NumberType> kNumberTypes[]{
     {" Int8 int8 char signed_char ", kType<std::int8_t>},
     {" UInt8 uint8 uchar unsigned_char ", kType<std::uint8_t>},
     {" Int16 int16 short ", kType<std::int16_t>},
@@ -145,7 +145,7 @@ void FileText::expectWord(std::string_view expected) {
 
 NumberType FileText::typeNamed(std::string_view name) const {
   const std::string word = std::string(1, ' ').append(name).append(1, ' ');
-  for (const auto& [names, type] : kTypes)
+  for (const auto& [names, type] : kNumberTypes)
     if (word.size() > 2 && names.find(word) != names.npos) return type;
   refuseWord("the type of numbers", name);
 }

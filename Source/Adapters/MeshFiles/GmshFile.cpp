@@ -20,30 +20,31 @@ struct ElementType {
   int nodes;  ///< 0: refused
   Cell cell = Cell::Points;
 };
-constexpr ElementType kTypes[]{{15, "point", 1, Cell::Points},
-                               {1, "line", 2, Cell::Polyline},
-                               {2, "triangle", 3, Cell::Polygon},
-                               {3, "quadrangle", 4, Cell::Polygon},
-                               {4, "tetrahedron", 4, Cell::Tetrahedron},
-                               {5, "hexahedron", 0},
-                               {6, "prism", 0},
-                               {7, "pyramid", 0},
-                               {8, "line of second order", 0},
-                               {9, "triangle of second order", 0},
-                               {10, "quadrangle of second order", 0},
-                               {11, "tetrahedron of second order", 0},
-                               {12, "hexahedron of second order", 0},
-                               {13, "prism of second order", 0},
-                               {14, "pyramid of second order", 0},
-                               {16, "quadrangle of second order", 0},
-                               {17, "hexahedron of second order", 0},
-                               {18, "prism of second order", 0},
-                               {19, "pyramid of second order", 0}};
+constexpr ElementType kElementTypes[]{{15, "point", 1, Cell::Points},
+                                      {1, "line", 2, Cell::Polyline},
+                                      {2, "triangle", 3, Cell::Polygon},
+                                      {3, "quadrangle", 4, Cell::Polygon},
+                                      {4, "tetrahedron", 4, Cell::Tetrahedron},
+                                      {5, "hexahedron", 0},
+                                      {6, "prism", 0},
+                                      {7, "pyramid", 0},
+                                      {8, "line of second order", 0},
+                                      {9, "triangle of second order", 0},
+                                      {10, "quadrangle of second order", 0},
+                                      {11, "tetrahedron of second order", 0},
+                                      {12, "hexahedron of second order", 0},
+                                      {13, "prism of second order", 0},
+                                      {14, "pyramid of second order", 0},
+                                      {16, "quadrangle of second order", 0},
+                                      {17, "hexahedron of second order", 0},
+                                      {18, "prism of second order", 0},
+                                      {19, "pyramid of second order", 0}};
 
 const ElementType& elementType(std::int64_t type, const FileText& at) {
-  const auto found = std::ranges::find(kTypes, type, &ElementType::type);
-  if (found != std::end(kTypes) && found->nodes > 0) return *found;
-  const std::string name = found != std::end(kTypes) ? std::string(" (") + found->name + ")" : "";
+  const auto found = std::ranges::find(kElementTypes, type, &ElementType::type);
+  if (found != std::end(kElementTypes) && found->nodes > 0) return *found;
+  const std::string name =
+      found != std::end(kElementTypes) ? std::string(" (") + found->name + ")" : "";
   at.refuse(
       "expected points, lines, triangles, quadrangles or tetrahedra of first order, not element "
       "type " +
@@ -89,9 +90,9 @@ class NodeTags {
   bool m_areIndices = true;
 };
 
-class Reader {
+class GmshReader {
  public:
-  Reader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
+  GmshReader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
 
   void read() {
     readFormat();
@@ -338,7 +339,7 @@ void writeSections(const MeshArrays& mesh, Output& out) {
 
 }  // namespace
 
-void readGmsh(FileText text, MeshBuilder& mesh) { Reader(text, mesh).read(); }
+void readGmsh(FileText text, MeshBuilder& mesh) { GmshReader(text, mesh).read(); }
 
 std::string writeGmsh(const MeshArrays& mesh, const MeshWriteSettings& settings) {
   Output out(settings.binary ? Encoding::LittleEndian : Encoding::Text);

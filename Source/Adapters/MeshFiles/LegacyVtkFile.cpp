@@ -23,9 +23,9 @@ constexpr CellSection kCells[]{{"VERTICES", Cell::Points},
                                {"POLYGONS", Cell::Polygon},
                                {"TRIANGLE_STRIPS", Cell::Strip}};
 
-class Reader {
+class LegacyVtkReader {
  public:
-  Reader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
+  LegacyVtkReader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
 
   void read() {
     readHeader();
@@ -167,7 +167,7 @@ class Reader {
 
 }  // namespace
 
-void readLegacyVtk(FileText text, MeshBuilder& mesh) { Reader(text, mesh).read(); }
+void readLegacyVtk(FileText text, MeshBuilder& mesh) { LegacyVtkReader(text, mesh).read(); }
 
 std::string writeLegacyVtk(const MeshArrays& mesh, const MeshWriteSettings& settings) {
   Output out(settings.binary ? Encoding::BigEndian : Encoding::Text);

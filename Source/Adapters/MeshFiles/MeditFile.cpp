@@ -48,9 +48,9 @@ auto* named(const Entries& entries, std::string_view name) {
   return found == std::end(entries) ? nullptr : &*found;
 }
 
-class Reader {
+class MeditReader {
  public:
-  Reader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
+  MeditReader(const FileText& text, MeshBuilder& mesh) : m_text(text), m_mesh(mesh) {}
 
   void read() {
     m_text.expectWord("MeshVersionFormatted");
@@ -114,7 +114,7 @@ std::string withoutComments(std::string_view content) {
 
 void readMedit(FileText text, MeshBuilder& mesh) {
   const std::string content = withoutComments(text.rest());
-  Reader(FileText(content), mesh).read();
+  MeditReader(FileText(content), mesh).read();
 }
 
 std::string writeMedit(const MeshArrays& mesh, const MeshWriteSettings&) {

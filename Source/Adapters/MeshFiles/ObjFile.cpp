@@ -13,10 +13,10 @@ namespace palpate::files {
 namespace {
 
 /// Statements that say nothing about positions and elements.
-constexpr std::string_view kAttributes[]{"",       "g",          "s",        "mg",       "o",
-                                         "vt",     "vn",         "vp",       "usemtl",   "mtllib",
-                                         "usemap", "maplib",     "bevel",    "c_interp", "d_interp",
-                                         "lod",    "shadow_obj", "trace_obj"};
+constexpr std::string_view kIgnoredKeywords[]{
+    "",      "g",        "s",        "mg",     "o",          "vt",
+    "vn",    "vp",       "usemtl",   "mtllib", "usemap",     "maplib",
+    "bevel", "c_interp", "d_interp", "lod",    "shadow_obj", "trace_obj"};
 
 /// Reads the vertex of "7", "7/1", "7//2" or "7/1/2". Positive indices begin at 1; negative indices
 /// count back from the newest vertex.
@@ -48,7 +48,7 @@ void readStatement(FileText statement, MeshBuilder& mesh) {
     readCell(statement, mesh, Cell::Polyline);
   } else if (keyword == "p") {
     readCell(statement, mesh, Cell::Points);
-  } else if (std::ranges::find(kAttributes, keyword) == std::end(kAttributes)) {
+  } else if (std::ranges::find(kIgnoredKeywords, keyword) == std::end(kIgnoredKeywords)) {
     statement.refuseWord("a statement v, p, l or f, or an attribute", keyword);
   }
 }

@@ -13,39 +13,40 @@ struct CellType {
   Cell cell = Cell::Points;
   std::size_t corners = 0;  ///< 0: any number
 };
-constexpr CellType kTypes[]{{1, "vertex", true, Cell::Points, 1},
-                            {2, "poly-vertex", true, Cell::Points},
-                            {3, "line", true, Cell::Polyline, 2},
-                            {4, "polyline", true, Cell::Polyline},
-                            {5, "triangle", true, Cell::Polygon, 3},
-                            {6, "triangle strip", true, Cell::Strip},
-                            {7, "polygon", true, Cell::Polygon},
-                            {9, "quad", true, Cell::Polygon, 4},
-                            {10, "tetrahedron", true, Cell::Tetrahedron, 4},
-                            {0, "empty cell", false},
-                            {8, "pixel", false},
-                            {11, "voxel", false},
-                            {12, "hexahedron", false},
-                            {13, "wedge", false},
-                            {14, "pyramid", false},
-                            {15, "pentagonal prism", false},
-                            {16, "hexagonal prism", false},
-                            {21, "quadratic edge", false},
-                            {22, "quadratic triangle", false},
-                            {23, "quadratic quad", false},
-                            {24, "quadratic tetrahedron", false},
-                            {25, "quadratic hexahedron", false},
-                            {26, "quadratic wedge", false},
-                            {27, "quadratic pyramid", false},
-                            {42, "polyhedron", false},
-                            {71, "Lagrange tetrahedron", false},
-                            {78, "Bezier tetrahedron", false}};
+constexpr CellType kCellTypes[]{{1, "vertex", true, Cell::Points, 1},
+                                {2, "poly-vertex", true, Cell::Points},
+                                {3, "line", true, Cell::Polyline, 2},
+                                {4, "polyline", true, Cell::Polyline},
+                                {5, "triangle", true, Cell::Polygon, 3},
+                                {6, "triangle strip", true, Cell::Strip},
+                                {7, "polygon", true, Cell::Polygon},
+                                {9, "quad", true, Cell::Polygon, 4},
+                                {10, "tetrahedron", true, Cell::Tetrahedron, 4},
+                                {0, "empty cell", false},
+                                {8, "pixel", false},
+                                {11, "voxel", false},
+                                {12, "hexahedron", false},
+                                {13, "wedge", false},
+                                {14, "pyramid", false},
+                                {15, "pentagonal prism", false},
+                                {16, "hexagonal prism", false},
+                                {21, "quadratic edge", false},
+                                {22, "quadratic triangle", false},
+                                {23, "quadratic quad", false},
+                                {24, "quadratic tetrahedron", false},
+                                {25, "quadratic hexahedron", false},
+                                {26, "quadratic wedge", false},
+                                {27, "quadratic pyramid", false},
+                                {42, "polyhedron", false},
+                                {71, "Lagrange tetrahedron", false},
+                                {78, "Bezier tetrahedron", false}};
 
 const CellType& cellType(double type, const FileText& at) {
   const auto found =
-      std::ranges::find_if(kTypes, [&](const CellType& t) { return t.type == type; });
-  if (found != std::end(kTypes) && found->isRead) return *found;
-  const std::string name = found != std::end(kTypes) ? std::string(" (") + found->name + ")" : "";
+      std::ranges::find_if(kCellTypes, [&](const CellType& t) { return t.type == type; });
+  if (found != std::end(kCellTypes) && found->isRead) return *found;
+  const std::string name =
+      found != std::end(kCellTypes) ? std::string(" (") + found->name + ")" : "";
   at.refuse("expected vertices, lines, triangles, polygons or tetrahedra, not cell type " +
             shortest(type) + name);
 }

@@ -20,7 +20,7 @@ constexpr Group kGroups[]{{"Verts", Cell::Points},
                           {"Polys", Cell::Polygon},
                           {"Strips", Cell::Strip}};
 
-void readPiece(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
+void readPolyData(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
   const std::size_t first = mesh.positionCount(), points = file.count(piece, "NumberOfPoints");
   if (points > 0) {
     NumberArray array = file.array(piece, "Points", "");
@@ -41,7 +41,7 @@ void readPiece(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
 
 void readVtp(FileText text, MeshBuilder& mesh) {
   XmlArrays file(text);
-  file.forPieces("PolyData", [&](std::string_view piece) { readPiece(file, piece, mesh); });
+  file.forPieces("PolyData", [&](std::string_view piece) { readPolyData(file, piece, mesh); });
 }
 
 std::string writeVtp(const MeshArrays& mesh, const MeshWriteSettings& settings) {

@@ -9,7 +9,7 @@ namespace palpate::files {
 
 namespace {
 
-void readPiece(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
+void readGrid(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
   const std::size_t first = mesh.positionCount(), points = file.count(piece, "NumberOfPoints");
   if (points > 0) {
     NumberArray array = file.array(piece, "Points", "");
@@ -26,7 +26,7 @@ void readPiece(XmlArrays& file, std::string_view piece, MeshBuilder& mesh) {
 
 void readVtu(FileText text, MeshBuilder& mesh) {
   XmlArrays file(text);
-  file.forPieces("UnstructuredGrid", [&](std::string_view piece) { readPiece(file, piece, mesh); });
+  file.forPieces("UnstructuredGrid", [&](std::string_view piece) { readGrid(file, piece, mesh); });
 }
 
 std::string writeVtu(const MeshArrays& mesh, const MeshWriteSettings& settings) {

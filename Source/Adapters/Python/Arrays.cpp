@@ -6,13 +6,14 @@
 namespace palpate::python {
 namespace {
 
-std::string shapeOf(const py::array& array) {
+std::string dimensionsOf(const py::array& array) {
   return py::str(py::tuple(array.attr("shape"))).cast<std::string>();
 }
 
 [[noreturn]] void refuseShape(const py::array& array, const char* name, const std::string& wanted) {
-  throw Error(ErrorCode::WrongPositionCount, std::string(name) + " has the shape " +
-                                                 shapeOf(array) + "; it must be " + wanted + ".");
+  throw Error(
+      ErrorCode::WrongPositionCount,
+      std::string(name) + " has the shape " + dimensionsOf(array) + "; it must be " + wanted + ".");
 }
 
 /// Any array of numbers as C-contiguous, aligned doubles. It is the same array if it is that.

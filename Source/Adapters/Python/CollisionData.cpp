@@ -155,7 +155,7 @@ bool equal(const CollisionData& a, const CollisionData& b) {
          a.validity() == b.validity();
 }
 
-std::string describe(const CollisionData& data) {
+std::string describeData(const CollisionData& data) {
   std::string text = "<palpate.CollisionData:";
   const auto add = [&](std::size_t count, const char* name) {
     if (count > 0) text += " " + std::to_string(count) + " " + name + ",";
@@ -273,7 +273,7 @@ constraint_rows(). a, b: ContactSide.)")
           },
           py::arg("other"))
       .def("__hash__", &CollisionData::hash)
-      .def("__repr__", &describe)
+      .def("__repr__", &describeData)
       .def(py::pickle(&state, &ofState));
 }
 

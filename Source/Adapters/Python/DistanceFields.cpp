@@ -63,7 +63,7 @@ py::object gradient(const DistanceField& self, Object points) {
   return copyOf(gradients);
 }
 
-std::string describe(const DistanceField& self) {
+std::string describeField(const DistanceField& self) {
   return "<palpate.DistanceField: error bound " +
          py::repr(py::float_(self.errorBound())).cast<std::string>() + ", band " +
          py::repr(py::float_(self.band())).cast<std::string>() + ", " +
@@ -142,7 +142,7 @@ progress      progress(fraction): called from time to time; returning False rais
       .def_static("load", &DistanceField::load, py::arg("path"),
                   py::call_guard<py::gil_scoped_release>(),
                   "load(path) -> DistanceField\n\nReads a file of save().")
-      .def("__repr__", &describe);
+      .def("__repr__", &describeField);
   module.def(
       "simplify", &simplified, py::arg("positions"), py::arg("triangles"), py::arg("max_distance"),
       py::arg("threads") = 0, py::arg("progress") = py::none(),
