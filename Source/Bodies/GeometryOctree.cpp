@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace palpate {
 
@@ -15,6 +16,7 @@ namespace {
 constexpr std::size_t kGrain = 1024;
 constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds(), before there are nodes
 constexpr std::size_t kGroupGrain = 128;
+constexpr std::size_t kElementsPerSlice = 64, kMostSlices = 4096;
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
@@ -33,22 +35,19 @@ GeometryOctree::State GeometryOctree::stateOf(const TriangleMesh& mesh, Revision
 }
 
 bool GeometryOctree::isCurrent(const TriangleMesh& mesh, Revision topology, double scale) const {
-  return m_treeVersion.isCurrent(stateOf(mesh, topology)) && m_frame.scale == scale;
+  return !m_isLagging && m_treeVersion.isCurrent(stateOf(mesh, topology)) && m_frame.scale == scale;
 }
 
 bool GeometryOctree::encloses(const TriangleMesh& mesh, Revision topology) const {
-  return m_treeVersion.isValid() && m_isBuilt && m_treeVersion.state().topology == topology &&
+  return !m_isLagging && m_treeVersion.isValid() && m_isBuilt &&
+         m_treeVersion.state().topology == topology &&
          m_treeVersion.state().now == mesh.now.bodyRevision();
 }
 
 double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) {
-  if (!m_treeVersion.isCurrent(stateOf(mesh, topology))) {
-    m_treeVersion.invalidate();
-    const SampledExtent extent = sampleExtent(mesh.now.body());
-    m_frame.origin = extent.median;
-    m_spread = extent.spread;
-  }
-  return m_spread;
+  if (m_isLagging || !m_treeVersion.isCurrent(stateOf(mesh, topology)))
+    m_sample = sampleExtent(mesh.now.body());
+  return m_sample.spread;
 }
 
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
@@ -58,8 +57,9 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   const bool isSameTopology = m_treeVersion.state().topology == topology;
   const bool canRefit = m_isBuilt && isSameTopology;
   m_treeVersion.invalidate();
-  m_isBuilt = false;
-  m_frame.scale = scale;
+  m_isBuilt = m_isLagging = false;
+  m_frame = m_floatsFrame = {m_sample.median, scale};
+  m_spread = m_sample.spread;
   m_treeSwept = m_swept && !mesh.now.hasSameBody(mesh.before);
   Stopwatch watch;
   computeFloats(mesh.now.body(), m_frame, m_floats, threads);
@@ -86,8 +86,110 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     }
     m_isBuilt = true;
   }
+  m_lag = 0.0;
+  m_isLoose = false;
+  for (Slice& slice : m_slices) slice.moved = 0.0;
+  m_lastPositions = mesh.now.bodyRevision();
   ++m_updates;
   m_treeVersion.commit(now);
+}
+
+bool GeometryOctree::canLag(const TriangleMesh& mesh, Revision topology, double scale,
+                            const OctreeSettings& settings, const PieceMotion& motion) const {
+  return settings.update == OctreeUpdate::Auto && isValid() && m_isBuilt && !m_isLoose &&
+         !m_swept && !m_treeSwept && !mesh.now.isPlaced() &&
+         m_treeVersion.state().topology == topology && m_frame.scale == scale &&
+         m_lastPositions == motion.from() && mesh.now.bodyRevision() == motion.to();
+}
+
+void GeometryOctree::makeSlices(const TriangleMesh& mesh) {
+  const auto groups = m_octree.groups();
+  const std::size_t wanted =
+      std::max(kElementsPerSlice, (m_ordered.size() + kMostSlices - 1) / kMostSlices);
+  m_slicesLayout = 0;
+  m_slices.clear();
+  m_nextSlice = 0;
+  CountedVector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  for (std::uint32_t group = 0; group + 1 < groups.size();) {
+    const std::uint32_t first = group;
+    while (group + 1 < groups.size() && groups[group] - groups[first] < wanted) ++group;
+    m_slices.push_back({first, group, 0.0});
+    ranges.push_back({groups[first], groups[group]});
+  }
+  m_slicePieces = piecesOf(m_ordered, ranges, mesh.topology.vertexCount);
+  m_slicesLayout = m_octree.layout();
+}
+
+void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& motion, double lag,
+                                const Threads& threads) {
+  PALPATE_ASSERT(isValid() && m_isBuilt && !m_treeSwept && lag >= 0.0);
+  const State state = m_treeVersion.state();
+  m_treeVersion.invalidate();
+  m_isLagging = true;
+  Stopwatch watch;
+  m_floatsFrame = {m_sample.median, m_frame.scale};
+  computeFloats(mesh.now.body(), m_floatsFrame, m_floats, threads);
+  if (m_slicesLayout != m_octree.layout()) makeSlices(mesh);
+  double share = 0.0;  // of the slices that should be fitted now
+  for (std::size_t i = 0; i < m_slices.size(); ++i) {
+    const MotionRange range = motion.of(m_slicePieces[i]);
+    const double step = range.lower.cwiseAbs().cwiseMax(range.upper.cwiseAbs()).maxCoeff();
+    // The rounding of the displacements, and of this sum.
+    m_slices[i].moved = (m_slices[i].moved + step) * (1.0 + 0x1p-50);
+    share += step;
+  }
+  const std::size_t size = m_slices.size(),
+                    wanted = lag > 0.0 && share < lag * static_cast<double>(size)
+                                 ? static_cast<std::size_t>(share / lag) + 1
+                                 : size;
+  std::size_t fitted = 0;
+  for (std::size_t i = 0; i < size && fitted < wanted; ++i) {
+    fitted += m_slices[m_nextSlice].moved > 0.0;
+    refit(mesh, m_nextSlice);
+    if (++m_nextSlice == size) {
+      m_nextSlice = 0;
+      m_octree.addAreas();
+      m_octree.measureLooseness();
+      m_isLoose = !m_octree.isTight();
+    }
+  }
+  m_lag = 0.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (m_slices[i].moved > lag) {
+      refit(mesh, i);
+      ++fitted;
+    }
+    m_lag = std::max(m_lag, m_slices[i].moved);
+  }
+  if (fitted > 0) {
+    lastUpdate = LooseOctree::Update::Refitted;
+    ++m_updates;
+  }
+  boxMilliseconds += watch.lap();
+  m_lastPositions = mesh.now.bodyRevision();
+  m_treeVersion.commit(state);
+}
+
+/// Fits the boxes of a slice, unless its elements did not move.
+void GeometryOctree::refit(const TriangleMesh& mesh, std::size_t index) {
+  Slice& slice = m_slices[index];
+  if (slice.moved == 0.0) return;
+  const auto groups =
+      m_octree.groups().subspan(slice.firstGroup, slice.endGroup - slice.firstGroup + 1);
+  const std::uint32_t begin = groups.front(), count = groups.back() - begin;
+  m_corners.resize(3 * std::size_t{count});
+  m_cornerFloats.resize(3 * std::size_t{count});
+  m_cornerTriangles.resize(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    for (std::uint32_t c = 0; c < 3; ++c)
+      m_corners[3 * i + c] = mesh.now.body()[m_ordered[begin + i][c]];
+    m_cornerTriangles[i] = {3 * i, 3 * i + 1, 3 * i + 2};
+  }
+  toFloats(m_corners, m_frame, m_cornerFloats.data());
+  triangleBoxes(m_cornerFloats.data(), nullptr, m_cornerTriangles.data(), groups, m_octree.boxes(),
+                m_octree.groupBoxes() + slice.firstGroup);
+  m_octree.refit(slice.firstGroup, slice.endGroup);
+  slice.moved = 0.0;
 }
 
 double GeometryOctree::reach() const {
@@ -141,7 +243,7 @@ void GeometryOctree::copy(const GeometryOctree& other) {
   const bool isSameLayout = isValid() && m_octree.layout() == other.m_octree.layout();
   m_treeVersion.invalidate();
   m_isBuilt = false;
-  m_frame = other.m_frame;
+  m_frame = m_floatsFrame = other.m_frame;
   m_spread = other.m_spread;
   resizeSparingly(m_floats, other.m_floats.size());
   std::copy(other.m_floats.begin(), other.m_floats.end(), m_floats.begin());
@@ -156,6 +258,9 @@ void GeometryOctree::copy(const GeometryOctree& other) {
 
 void GeometryOctree::releaseMemory() {
   m_stars = {};
+  m_corners = {};
+  m_cornerFloats = {};
+  m_cornerTriangles = {};
   m_boundsGroups = Buffer<std::uint32_t>();
   m_boundsBoxes = Buffer<FloatBox>();
   if (!m_treeSwept) m_floatsBefore.clear();
@@ -180,8 +285,9 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
   threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = groups[from]; reordered && i < groups[to]; ++i)
       m_ordered[i] = triangles[m_octree.order()[i]];
-    triangleBoxes(m_floats.data(), m_treeSwept ? m_floatsBefore.data() : nullptr, m_ordered.data(),
-                  groups.subspan(from, to - from + 1), m_octree.boxes(), groupBoxes + from);
+    triangleBoxes(m_floats.data(), m_treeSwept ? m_floatsBefore.data() : nullptr,
+                  m_ordered.data() + groups[from], groups.subspan(from, to - from + 1),
+                  m_octree.boxes(), groupBoxes + from);
   });
 }
 
@@ -240,7 +346,8 @@ const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
 
 std::size_t GeometryOctree::bytesBesidesOctree() const {
   return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) +
-         m_orderedMemory.bytes();
+         m_orderedMemory.bytes() + m_slices.capacity() * sizeof(Slice) +
+         m_slicePieces.items.capacity() * sizeof(std::uint32_t);
 }
 
 }  // namespace palpate

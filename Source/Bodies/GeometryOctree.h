@@ -5,6 +5,7 @@
 
 #include "Octree/Octree.h"
 #include "Mesh/FloatPositions.h"
+#include "Mesh/PieceMotion.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
 #include "Mesh/UnfoldedStars.h"
@@ -19,6 +20,9 @@ namespace palpate {
 
 /// The octree over one geometry's elements, with the float positions that its boxes come from.
 ///
+/// Its boxes may lag behind the positions: updateSome() fits those of some elements only. All
+/// positions are then within lag() of their boxes.
+///
 /// If an update throws, there is no valid tree, and the next update builds it anew.
 class GeometryOctree {
  public:
@@ -26,12 +30,27 @@ class GeometryOctree {
   void setSwept(bool swept) { m_swept = swept; }
   bool isSwept() const { return m_swept; }
   /// Call before update(). Chooses the float frame's origin for the positions now, if the tree is
-  /// outdated. Returns spread().
+  /// outdated. Returns the spread of the positions.
   double sampleFrame(const TriangleMesh&, Revision topology);
   bool isCurrent(const TriangleMesh&, Revision topology, double scale) const;
   /// scale: the scale of the float frames, common to all geometries.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
               const Threads&);
+  /// Whether updateSome() is possible: the tree was updated to the positions from which the motion
+  /// was measured, without sweeping the step, is tight, and is in the body's frame, the world.
+  bool canLag(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
+              const PieceMotion&) const;
+  /// Instead of update(): brings the floats up to date, and the boxes of so many elements that
+  /// lag() is at most `lag`. While the motion does not change, these are in turn all elements,
+  /// about as many in each call. The octree isCurrent() only after the next update().
+  void updateSome(const TriangleMesh&, const PieceMotion&, double lag, const Threads&);
+  /// Whether the last update was updateSome() to the positions now.
+  bool laggedTo(const TriangleMesh& mesh, double scale) const {
+    return m_isLagging && isValid() && m_frame.scale == scale &&
+           m_lastPositions == mesh.now.bodyRevision();
+  }
+  /// L: no coordinate of a position is further outside of the boxes of its elements.
+  double lag() const { return m_lag; }
   /// Whether the octree lacks the further bounds of these settings. Only a placed body has them,
   /// and only if it does not deform in the step.
   bool needsDops(const TriangleMesh&, OctreeBounds) const;
@@ -51,9 +70,11 @@ class GeometryOctree {
   bool encloses(const TriangleMesh&, Revision topology) const;
   std::uint64_t updates() const { return m_updates; }       ///< counts update()
   bool isValid() const { return m_treeVersion.isValid(); }  ///< no update has failed since
+  bool isLagging() const { return m_isLagging; }            ///< the last update was updateSome()
   const Octree& octree() const { return m_octree; }
-  const FloatFrame& frame() const { return m_frame; }
-  double spread() const { return m_spread; }  ///< L: extent of most positions
+  const FloatFrame& frame() const { return m_frame; }              ///< of the boxes
+  const FloatFrame& floatsFrame() const { return m_floatsFrame; }  ///< of floats()
+  double spread() const { return m_spread; }                       ///< L: extent of most positions
   double reach() const;  ///< L: the largest coordinate of the octree's boxes about frame().origin
   /// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
   /// that no position is clamped to the range of floats.
@@ -81,10 +102,19 @@ class GeometryOctree {
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
+  void makeSlices(const TriangleMesh&);
+  void refit(const TriangleMesh&, std::size_t slice);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
-  FloatFrame m_frame;
+  /// Consecutive groups, whose boxes updateSome() fits together.
+  struct Slice {
+    std::uint32_t firstGroup, endGroup;
+    double moved;  ///< L: of a coordinate, at most, since the boxes were fitted
+  };
+
+  FloatFrame m_frame, m_floatsFrame;
+  SampledExtent m_sample;  ///< of the positions of the next update
   double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
@@ -95,6 +125,18 @@ class GeometryOctree {
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
   DerivedFrom<State> m_treeVersion;
+  // Of updateSome():
+  CountedVector<Slice> m_slices;
+  IndexLists m_slicePieces;          ///< of PieceMotion, for each slice
+  std::uint64_t m_slicesLayout = 0;  ///< Octree::layout() of the slices
+  std::size_t m_nextSlice = 0;
+  double m_lag = 0;
+  bool m_isLagging = false, m_isLoose = false;
+  Revision m_lastPositions;  ///< of the last update of either kind
+  Buffer<Eigen::Vector3d> m_corners;
+  Buffer<FloatPoint> m_cornerFloats;
+  Buffer<Triangle> m_cornerTriangles;
+
   std::uint64_t m_updates = 0;
   bool m_isBuilt = false;  ///< for the topology of m_treeVersion; the tree can be refitted
 };

@@ -33,30 +33,33 @@ void checkIndices(const GeometryLabel& label, const std::string& element, std::s
 
 }  // namespace
 
-void checkPositions(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
-                    Eigen::Vector3d* out, const char* which, const Threads& threads,
-                    const Eigen::Vector3d* before, MotionRange* moved) {
+Eigen::AlignedBox3d checkPositions(const GeometryLabel& label,
+                                   std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
+                                   const char* which, const Threads& threads,
+                                   const Eigen::Vector3d* before, MotionRange* moved) {
   std::atomic<std::size_t> first = positions.size();
+  Eigen::AlignedBox3d all;
   std::mutex mutex;
   threads.forChunks(positions.size(), kCopyGrain,
                     [&](std::size_t, std::size_t from, std::size_t to) {
                       MotionRange range;
+                      Eigen::AlignedBox3d bounds;
                       std::size_t bad = to;
                       for (std::size_t i = from; i < to && bad == to; i += kPiece) {
                         const auto part = positions.subspan(i, std::min(kPiece, to - i));
-                        const std::size_t good = copyFinite(part, out + i);
+                        const std::size_t good = copyFinite(part, out + i, bounds);
                         if (good < part.size()) bad = i + good;
                         if (before) range.add(motionRange({before + i, good}, {out + i, good}));
                       }
                       std::size_t known = first;
                       while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
                       }
-                      if (!before) return;
                       const std::lock_guard lock(mutex);
-                      moved->add(range);
+                      all.extend(bounds);
+                      if (before) moved->add(range);
                     });
   const std::size_t bad = first;
-  if (bad == positions.size()) return;
+  if (bad == positions.size()) return all;
   throw Error(ErrorCode::NonFinitePosition,
               nameOf(label) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
                   textOf(positions[bad]) + "; positions must be " + kRangeRule,

@@ -7,18 +7,21 @@
 #include "Mesh/TetrahedralTopology.h"
 #include "Core/Threads.h"
 
+#include <Eigen/Geometry>
+
 #include <span>
 
 namespace palpate {
 
 // Checks of the user's input. Each function throws an Error that describes the fault.
 
-/// Copies the positions to `out` while checking them. which: " before", " now" or nothing, for the
-/// message. If `before` is given, `moved` receives the motion from there; this costs half as much
-/// as reading both arrays again.
-void checkPositions(const GeometryLabel&, std::span<const Eigen::Vector3d>, Eigen::Vector3d* out,
-                    const char* which, const Threads&, const Eigen::Vector3d* before = nullptr,
-                    MotionRange* moved = nullptr);
+/// Copies the positions to `out` while checking them, and returns their bounds. which: " before",
+/// " now" or nothing, for the message. If `before` is given, `moved` receives the motion from
+/// there; this costs half as much as reading both arrays again.
+Eigen::AlignedBox3d checkPositions(const GeometryLabel&, std::span<const Eigen::Vector3d>,
+                                   Eigen::Vector3d* out, const char* which, const Threads&,
+                                   const Eigen::Vector3d* before = nullptr,
+                                   MotionRange* moved = nullptr);
 /// Returns a copy of the positions of a new topology.
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
 void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,

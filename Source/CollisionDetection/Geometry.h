@@ -10,6 +10,7 @@
 #include "Bodies/Body.h"
 #include "Octree/PointQueries.h"
 #include "Mesh/Motion.h"
+#include "Mesh/PieceMotion.h"
 #include "Mesh/Revision.h"
 #include "Core/Buffer.h"
 
@@ -57,7 +58,10 @@ struct Geometry : CountedObject {
   CollisionFilter filter;
   GeometryStep step;          ///< writes the positions of both ends
   double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
+  double shortEdge = 0;  ///< L: one edge in 16 is shorter in the shape at rest; 0 without edges
   GeometryMotion motion;
+  PieceMotion pieces;   ///< from one detection to the next, for KeptPairs
+  bool mayLag = false;  ///< the update that runs, or ran last, may be GeometryOctree::updateSome()
   std::shared_ptr<const SurfaceProxy> proxy;  ///< attached, or null
   SurfaceProxySettings proxySettings;         ///< if there is one
   /// L: OctreeBasedCD::freeMotion(), of the last detection and of the one that runs. Empty before
@@ -66,7 +70,7 @@ struct Geometry : CountedObject {
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
   operator GeometryLabel() const { return body; }
-  /// The data for the choice of a method. extent is 0 before the first update of the octree.
+  /// The data for the choice of a method.
   GeometryInStep inStep() const;
   /// One for each vertex; one for what has no elements.
   std::size_t freeMotionCount() const {

@@ -13,25 +13,13 @@ std::array<PositionsState, 2> ends(const Positions& from, const Positions& to) {
   return {from.state(), to.state()};
 }
 
-/// L: the longest side of the box of both ends, in the body's frame.
-double extentOfPositions(const TriangleMesh& mesh) {
-  Eigen::AlignedBox3d box;
-  for (const Positions* end : {&mesh.now, &mesh.before})
-    for (const Eigen::Vector3d& p : end->body()) box.extend(p);
-  return box.sizes().maxCoeff();
-}
-
-/// L: an upper bound of the extent along any axis of the world. A placed body may be turned, so the
-/// longest side of its box is doubled.
-double extentOf(const Geometry& geometry) {
-  if (geometry.body.tree.octree().size() == 0) return 0.0;
-  const FloatBox box = geometry.body.tree.octree().blocks()[0].box(0);
-  const double turned = geometry.body.isPlaced() ? 2.0 : 1.0;
-  if (box.mayBeClamped()) return turned * extentOfPositions(geometry.body.mesh);
-  double longest = 0.0;
-  for (int k = 0; k < 3; ++k)
-    longest = std::max(longest, double{box.upper[k]} - double{box.lower[k]});
-  return turned * longest / geometry.body.tree.frame().scale;
+/// L: an upper bound of the extent along any axis of the world, at both ends of the step. A placed
+/// body may be turned, so the longest side of its box is doubled.
+double extentOf(const Body& body) {
+  const TriangleMesh& mesh = body.mesh;
+  if (mesh.topology.elements.empty()) return 0.0;
+  const Eigen::AlignedBox3d bounds = mesh.now.bounds().merged(mesh.before.bounds());
+  return (body.isPlaced() ? 2.0 : 1.0) * bounds.sizes().maxCoeff();
 }
 
 }  // namespace
@@ -42,7 +30,7 @@ GeometryInStep Geometry::inStep() const {
           motion.range(),
           motion.correction(),
           motion.arcDeviation(),
-          body.tree.isValid() ? extentOf(*this) : 0.0,
+          extentOf(body),
           body.revisions.elements,
           step.detected(),
           body.field.get()};

@@ -32,20 +32,23 @@ void GeometryStep::releaseMemory() {
 
 void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = shape; }
 
-Positions::Body GeometryStep::checkedBody(const GeometryLabel& label,
-                                          std::span<const Eigen::Vector3d> positions,
-                                          const char* which, const Threads& threads,
-                                          const Eigen::Vector3d* from, MotionRange* moved) {
+GeometryStep::CheckedBody GeometryStep::checkedBody(const GeometryLabel& label,
+                                                    std::span<const Eigen::Vector3d> positions,
+                                                    const char* which, const Threads& threads,
+                                                    const Eigen::Vector3d* from,
+                                                    MotionRange* moved) {
   auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
                            [](const auto& body) { return body.use_count() == 1; });
   if (free == m_bodies.end())
     free = m_bodies.insert(free, std::make_shared<CountedVector<Eigen::Vector3d>>());
   (*free)->resize(positions.size());
-  checkPositions(label, positions, (*free)->data(), which, threads, from, moved);
-  return *free;
+  const auto bounds =
+      checkPositions(label, positions, (*free)->data(), which, threads, from, moved);
+  return {*free, bounds};
 }
 
-void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, Positions::Body body) noexcept {
+void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, CheckedBody checked) noexcept {
+  const Positions::Body& body = checked.positions;
   // The ends often share one body; it is compared only once.
   const Positions* last = nullptr;
   for (const Positions* other : {&std::as_const(end), &std::as_const(mesh.now),
@@ -57,7 +60,7 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, Positions::Body b
                                       body->size() * sizeof(Eigen::Vector3d)) == 0))
       return end.setBodyOf(*other);
   }
-  end.setBody(std::move(body), m_revisions.next());
+  end.setBody(body, checked.bounds, m_revisions.next());
 }
 
 void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
@@ -65,15 +68,15 @@ void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
                                 std::span<const Eigen::Vector3d> now, const Threads& threads,
                                 std::optional<MotionRange>* moved) {
   const bool isPlaced = mesh.now.isPlaced() || mesh.before.isPlaced();
-  const auto start = before ? checkedBody(label, *before, " before", threads) : nullptr;
+  const auto start = before ? checkedBody(label, *before, " before", threads) : CheckedBody();
   const bool followsNow = m_isNew && !m_bodyGiven && !before;
   const bool measures = moved && !isPlaced && !followsNow && !now.empty();
   const Eigen::Vector3d* const from =
-      !measures ? nullptr : (start ? *start : mesh.before.body()).data();
+      !measures ? nullptr : (before ? *start.positions : mesh.before.body()).data();
   MotionRange motion;
   auto end = checkedBody(label, now, before ? " now" : "", threads, from, &motion);
   // Nothing below throws.
-  if (start) {
+  if (before) {
     m_bodyGiven = true;
     setBody(mesh, mesh.before, start);
   }

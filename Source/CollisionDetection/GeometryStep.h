@@ -59,10 +59,14 @@ class GeometryStep {
   bool isNew() const { return m_isNew; }
 
  private:
-  Positions::Body checkedBody(const GeometryLabel&, std::span<const Eigen::Vector3d>,
-                              const char* which, const Threads&,
-                              const Eigen::Vector3d* from = nullptr, MotionRange* moved = nullptr);
-  void setBody(TriangleMesh&, Positions& end, Positions::Body) noexcept;
+  struct CheckedBody {
+    Positions::Body positions;
+    Eigen::AlignedBox3d bounds;
+  };
+  CheckedBody checkedBody(const GeometryLabel&, std::span<const Eigen::Vector3d>, const char* which,
+                          const Threads&, const Eigen::Vector3d* from = nullptr,
+                          MotionRange* moved = nullptr);
+  void setBody(TriangleMesh&, Positions& end, CheckedBody) noexcept;
   void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
 
   Positions m_detected;

@@ -1,5 +1,6 @@
 #include "CollisionDetection/GeometryTable.h"
 
+#include "CollisionDetection/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
 #include "Core/Assert.h"
@@ -35,7 +36,31 @@ double smallestHeight(const TriangleMesh& mesh) {
   return smallest;
 }
 
+void measureRest(Geometry& geometry) {
+  const TriangleMesh& mesh = geometry.body.mesh;
+  geometry.smallestHeight = smallestHeight(mesh);
+  std::vector<double> lengths;
+  lengths.reserve(mesh.topology.edges.size());
+  for (const auto& [i, j] : mesh.topology.edges)
+    lengths.push_back((mesh.rest[j] - mesh.rest[i]).norm());
+  geometry.shortEdge = 0.0;
+  if (lengths.empty()) return;
+  const auto shortest = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 16);
+  std::nth_element(lengths.begin(), shortest, lengths.end());
+  geometry.shortEdge = *shortest;
+}
+
 }  // namespace
+
+/// L: how far the octree's boxes may lag behind the positions; 0: not at all.
+static double lagFor(const Geometry& geometry) {
+  if (!geometry.mayLag || geometry.shortEdge == 0.0) return 0.0;
+  MotionRange all;
+  for (const MotionRange& range : geometry.pieces.ranges()) all.add(range);
+  const double speed = all.lower.cwiseAbs().cwiseMax(all.upper.cwiseAbs()).maxCoeff();
+  if (!(speed <= KeptPairs::kMostSpeed * geometry.shortEdge)) return 0.0;
+  return 0.5 * KeptPairs::reachFor(0.0, speed, geometry.shortEdge).lists;
+}
 
 GeometryId GeometryTable::nextId() const {
   if (m_nextId == 0xffffffffu)
@@ -51,7 +76,7 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
   geometry->step.start(mesh, std::move(body));
-  geometry->smallestHeight = smallestHeight(mesh);
+  measureRest(*geometry);
   BodyRevisions& revisions = geometry->body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
@@ -254,7 +279,7 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.body.mesh.topology = std::move(topology);
   geometry.body.solid = std::move(solid);
   geometry.step.start(geometry.body.mesh, std::move(body));
-  geometry.smallestHeight = smallestHeight(geometry.body.mesh);
+  measureRest(geometry);
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
   geometry.freeMotion.clear();
@@ -310,12 +335,13 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
                                   geometry->body.mesh, geometry->body.revisions.elements.topology));
   const double scale = frameScale(spread);
   m_changed.clear();
-  for (const auto& geometry : m_geometries)
-    if (!geometry->skipsOctree &&
-        (!geometry->body.tree.isCurrent(geometry->body.mesh,
-                                        geometry->body.revisions.elements.topology, scale) ||
-         geometry->body.tree.needsDops(geometry->body.mesh, settings.bounds)))
+  for (const auto& geometry : m_geometries) {
+    const Body& body = geometry->body;
+    if (!geometry->skipsOctree && !(geometry->mayLag && body.tree.laggedTo(body.mesh, scale)) &&
+        (!body.tree.isCurrent(body.mesh, body.revisions.elements.topology, scale) ||
+         body.tree.needsDops(body.mesh, settings.bounds)))
       m_changed.push_back(geometry.get());
+  }
   // Geometries are updated in parallel, the largest first, and large ones use several threads each.
   // The serial parts of one update thus run beside the work on other geometries.
   const auto size = [](const Geometry* geometry) {
@@ -334,6 +360,11 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     Geometry& geometry = *m_changed[i];
     const TraceSpan span(trace, firstEvent + i, {.name = "octree", .a = geometry.body.id});
     const Threads& shared = size(&geometry) < kSmall ? one : threads;
+    if (const double lag = lagFor(geometry);
+        lag > 0.0 &&
+        geometry.body.tree.canLag(geometry.body.mesh, geometry.body.revisions.elements.topology,
+                                  scale, settings, geometry.pieces))
+      return geometry.body.tree.updateSome(geometry.body.mesh, geometry.pieces, lag, shared);
     if (!geometry.body.tree.isCurrent(geometry.body.mesh, geometry.body.revisions.elements.topology,
                                       scale))
       geometry.body.tree.update(geometry.body.mesh, geometry.body.revisions.elements.topology,

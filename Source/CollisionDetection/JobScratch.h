@@ -31,6 +31,10 @@ struct JobScratch : CountedObject {
   PairSink sink;
   Buffer<std::uint32_t> elements;
   Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
+  // Of KeptPairs:
+  Buffer<ElementPair> near;
+  Buffer<float> bounds;
+  Buffer<std::uint8_t> classes;
 
   void clear() {
     contacts.clear();

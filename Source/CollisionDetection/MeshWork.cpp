@@ -1,6 +1,7 @@
 #include "CollisionDetection/MeshWork.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/Planning.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/Intersection.h"
@@ -56,7 +57,47 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
 }  // namespace
 
 std::size_t MeshWork::start(const FrameStart& frame) {
+  if (m_record->keeps) return startKept(frame);
   return startTraversal(frame, true, BoxFrame::Body);
+}
+
+std::size_t MeshWork::startKept(const FrameStart& frame) {
+  PairRecord& record = *m_record;
+  const Body &a = record.a->body, &b = record.b->body;
+  if (a.tree.octree().size() == 0 || b.tree.octree().size() == 0) return 0;
+  const std::size_t jobs =
+      record.kept.start(a, b, reachOfKept(record), frame.threads.count() > 1 ? kJobsPerPair : 1);
+  m_thickness = record.meshes().maxFeatureDistance();
+  m_floats = record.kept.floats();
+  record.countIsPending = true;
+  return jobs;
+}
+
+void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
+  const MeshPair meshes = m_record->meshes(&m_floats);
+  scratch.near.clear();
+  m_record->kept.run(job, meshes, scratch, scratch.near);
+  const MemoryScope memory(MemoryStage::NarrowPhase);
+  Stopwatch watch;
+  const auto enabled = [&](std::span<const ElementPair> pairs, Buffer<ElementPair>& kept) {
+    const MeshTopology &a = meshes.a.topology, &b = meshes.b.topology;
+    kept.assign(pairs.begin(), pairs.end());
+    std::erase_if(kept,
+                  [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
+    return std::span<const ElementPair>(kept);
+  };
+  const bool anyDisabled = m_record->anyDisabled();
+  // Those that meet at the step's start have boxes within the motion at its end, and are listed.
+  if (meshes.step.checksStart)
+    m_record->kept.forEachList(job, [&](std::span<const ElementPair> pairs) {
+      checkStart(meshes, anyDisabled ? enabled(pairs, scratch.kept) : pairs, scratch);
+    });
+  if (anyDisabled) {
+    enabled(scratch.near, scratch.kept);
+    scratch.near.swap(scratch.kept);
+  }
+  findContacts(meshes, scratch.near, scratch.contacts);
+  scratch.narrowMilliseconds += watch.lap();
 }
 
 std::size_t MeshWork::startCandidates(const FrameStart& frame) {
@@ -164,7 +205,9 @@ bool MeshWork::hasRound(int round, Jobs jobs) const {
 }
 
 void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
-  if (round == 0) {
+  if (round == 0 && m_record->keeps) {
+    runKept(job, scratch);
+  } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) { detect(pairs, scratch); });
     scratch.candidateCount = scratch.sink.total();
   } else if (repeats(scratch)) {
@@ -180,10 +223,8 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
   {
     const MemoryScope memory(MemoryStage::NarrowPhase);
     Stopwatch watch;
-    StepFacts& facts = scratch.contacts.facts;
-    if (meshes.step.checksStart && !facts.startsPiercing())
-      facts.atStart =
-          std::max(facts.atStart, meetingOf(meshes, true, pairs, scratch.intersections).meeting);
+    const StepFacts& facts = scratch.contacts.facts;
+    if (meshes.step.checksStart) checkStart(meshes, pairs, scratch);
     if (m_record->plan.runsIntersection &&
         (facts.startsPiercing() || m_record->plan.startsIntersecting))
       detectIntersections(pairs, scratch);
@@ -195,6 +236,15 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
       findContacts(meshes, pairs, scratch.contacts);
     scratch.narrowMilliseconds += watch.lap();
   }
+}
+
+/// The initial intersection check.
+void MeshWork::checkStart(const MeshPair& meshes, std::span<const ElementPair> pairs,
+                          JobScratch& scratch) const {
+  StepFacts& facts = scratch.contacts.facts;
+  if (!facts.startsPiercing())
+    facts.atStart =
+        std::max(facts.atStart, meetingOf(meshes, true, pairs, scratch.intersections).meeting);
 }
 
 /// Auto: finds intersections at the step's end.

@@ -59,6 +59,9 @@ class MeshWork {
                                                JobScratch&) const;
   bool hasWiderBoxes() const;
   void keepInWorld(double distance, JobScratch&) const;
+  std::size_t startKept(const FrameStart&);
+  void runKept(std::size_t job, JobScratch&) const;
+  void checkStart(const MeshPair&, std::span<const ElementPair>, JobScratch&) const;
   void detect(std::span<const ElementPair>, JobScratch&) const;
   void findEarliest(const MeshPair&, std::span<const ElementPair>, JobScratch&) const;
   void detectIntersections(std::span<const ElementPair>, JobScratch&) const;

@@ -126,6 +126,7 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
   const Implementation::ChangeGuard all(m_implementation);
   all->geometries.at(geometry);
   // Nothing below throws.
+  all->countCandidates();
   all->pairs.removeAllOf(geometry);
   all->geometries.remove(geometry);
   all->updateOctreeView();
@@ -164,6 +165,7 @@ void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vec
   const Implementation::ChangeGuard all(m_implementation);
   IndexLists near;
   all->withinLimit([&] {
+    all->countCandidates();
     all->geometries.setTriangles(
         geometry, positions, triangles, [&](const MeshTopology& topology, auto rest) {
           near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
@@ -177,6 +179,7 @@ void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Ve
   const Implementation::ChangeGuard all(m_implementation);
   IndexLists near;
   all->withinLimit([&] {
+    all->countCandidates();
     all->geometries.setTetrahedra(
         geometry, positions, tetrahedra, [&](const MeshTopology& topology, auto rest) {
           near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
@@ -238,6 +241,7 @@ void OctreeBasedCD::setPairSettings(GeometryId a, GeometryId b, const PairSettin
 
 void OctreeBasedCD::removeCollisionPair(GeometryId a, GeometryId b) {
   const Implementation::ChangeGuard all(m_implementation);
+  all->countCandidates();
   all->pairs.remove(all->geometries, a, b);
 }
 
@@ -250,6 +254,7 @@ const PairSettings& OctreeBasedCD::pairSettings(GeometryId a, GeometryId b) cons
 
 PairStatistics OctreeBasedCD::pairStatistics(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
+  m_implementation->countCandidates();
   return all.pairs.at(all.geometries, a, b).statistics;
 }
 
@@ -357,15 +362,24 @@ std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {
         (record->a == &geometry || record->b == &geometry))
       throw Error(ErrorCode::NotAvailable,
                   nameOf(geometry) + " has no free motion yet: call detectCollision() first", id);
-  const std::lock_guard lock(all.fillingUnlimited);
+  const std::lock_guard lock(all.filling);
   const MemoryScope memory(all.budget, MemoryStage::Results);
   geometry.unlimited.assign(geometry.freeMotionCount(), std::numeric_limits<double>::infinity());
   return geometry.unlimited;
 }
 
-const LooseOctree& OctreeBasedCD::octree() const { return read().shownOctrees.view; }
+const LooseOctree& OctreeBasedCD::octree() const {
+  read();
+  const StandardFloatingPoint standard;
+  m_implementation->querySource->updateLagging();
+  return m_implementation->shownOctrees.view;
+}
 
-const FrameStatistics& OctreeBasedCD::statistics() const { return read().statistics; }
+const FrameStatistics& OctreeBasedCD::statistics() const {
+  read();
+  m_implementation->countCandidates();
+  return m_implementation->statistics;
+}
 
 MemoryUse OctreeBasedCD::memoryUse() const {
   if (!m_implementation) throwMovedFrom();

@@ -5,6 +5,7 @@
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace palpate {
 
@@ -34,7 +35,19 @@ OctreeBasedCD::Implementation::~Implementation() {
   if (guardSource) guardSource->close();
 }
 
+void OctreeBasedCD::Implementation::countCandidates() {
+  const std::lock_guard lock(filling);
+  for (const auto& record : pairs.records()) {
+    if (!std::exchange(record->countIsPending, false)) continue;
+    const std::size_t count =
+        record->kept.countCandidates(record->a->body.mesh.topology, record->b->body.mesh.topology);
+    record->statistics.candidatePairs += count;
+    statistics.candidatePairs += count;
+  }
+}
+
 void OctreeBasedCD::Implementation::releaseMemory() {
+  countCandidates();
   frame = Frame();
   freeMotions = FreeMotionSearch();
   for (const auto& geometry : geometries.all()) {
@@ -67,6 +80,8 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
                                            Trace* traced) {
   const MemoryScope memory(MemoryStage::Octrees);
   using Update = LooseOctree::Update;
+  const bool isFrame = detecting && records.data() == pairs.records().data();
+  if (!isFrame) countCandidates();
   octreesState = 0;
   shownOctrees.trees.clear();  // they are invalid until the update is complete
   if (!hasUpdates) updates = {};
@@ -83,6 +98,10 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
     if (record->plan.swept())
       for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
   }
+  if (isFrame)
+    planKeptPairs(geometries, records, settings);
+  else
+    for (const auto& geometry : geometries.all()) geometry->mayLag = false;
   updates.milliseconds.boxes += watch.lap();
   geometries.updateOctrees(settings.octree, threads, traced);
   const double wall = watch.lap();
@@ -102,7 +121,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   updates.milliseconds.boxes += wall * share;
   updates.milliseconds.octree += wall * (1 - share);
   updateOctreeView();
-  if (!skips) octreesState = geometries.state();
+  if (!skips && !anyOctreeLags()) octreesState = geometries.state();
 #ifdef PALPATE_VALIDATE
   PALPATE_ASSERT(shownOctrees.view.validate().empty());
 #endif
@@ -122,11 +141,17 @@ bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
                      [](const auto& geometry) { return geometry->skipsOctree; });
 }
 
+bool OctreeBasedCD::Implementation::anyOctreeLags() const {
+  return std::any_of(geometries.all().begin(), geometries.all().end(),
+                     [](const auto& geometry) { return geometry->body.tree.isLagging(); });
+}
+
 void OctreeBasedCD::Implementation::updateOctreeView() {
   shownOctrees.trees.clear();
   for (const auto& geometry : geometries.all()) {
     const GeometryOctree& tree = geometry->body.tree;
-    if (geometry->skipsOctree || !tree.isValid() || tree.octree().size() == 0) continue;
+    if (geometry->skipsOctree || !tree.isValid() || tree.isLagging() || tree.octree().size() == 0)
+      continue;
     shownOctrees.trees.push_back({geometry->body.id, &tree.octree(), tree.frame().origin,
                                   tree.frame().scale, tree.lastUpdate, tree.bytesBesidesOctree()});
   }
@@ -177,6 +202,7 @@ void OctreeBasedCD::Implementation::detect() {
   Trace* const traced = trace ? &*trace : nullptr;
   if (traced) traced->startFrame();
   const TraceSpan span(traced, "detectCollision");
+  for (const auto& record : pairs.records()) record->countIsPending = false;
   update(false, true, traced);
   for (const auto& record : pairs.records()) planByFieldIfProven(*record, settings.engine);
   FrameStatistics next = updates;
@@ -185,6 +211,9 @@ void OctreeBasedCD::Implementation::detect() {
   for (PairRecord* record : records)
     record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
                         record->plan);
+  bool mustUpdate = false;
+  for (PairRecord* record : records) mustUpdate |= reviewKeptPairs(*record);
+  if (mustUpdate) geometries.updateOctrees(settings.octree, threads, traced);
   Stopwatch watch;
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();

@@ -56,13 +56,16 @@ struct OctreeBasedCD::Implementation {
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
-  std::mutex fillingUnlimited;       ///< locked while freeMotion(), a const call, fills
+  std::mutex filling;                ///< locked while a const call fills what it returns
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
 
   /// Adds the counts of geometries to the statistics, and makes them visible.
   void setStatistics(FrameStatistics next);
 
+  /// Counts the candidates that the last detection kept, which takes longer than to keep them. Call
+  /// before the elements or floats of a geometry, or the pairs, change.
+  void countCandidates();
   void releaseMemory();
 
   /// Calls a function that changes nothing if it throws. If it exceeds Settings::memoryLimit while
@@ -103,6 +106,7 @@ struct OctreeBasedCD::Implementation {
   bool markSkippedOctrees(bool maySkip);
 
   void updateOctreeView();
+  bool anyOctreeLags() const;
 
   /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
   /// empty.
@@ -158,6 +162,12 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
     const auto lock = lockOctrees();
     const MemoryScope memory(budget(), MemoryStage::Octrees);
     if (m_all->octreesState != m_all->geometries.state()) m_all->update();
+  }
+  /// The same if the boxes of an octree lag behind the positions.
+  void updateLagging() {
+    const auto lock = lockOctrees();
+    const MemoryScope memory(budget(), MemoryStage::Octrees);
+    if (m_all->anyOctreeLags()) m_all->update();
   }
   std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_octreesMutex); }
 

@@ -63,10 +63,11 @@ void PairRecord::commit() noexcept {
 
 void PairRecord::releaseMemory() {
   next = {};
+  kept.releaseMemory();
   fieldScratch.reset();
-  CollisionData::Contents& kept = CollisionData::Contents::of(data);
-  forEachTimed(kept, [](auto& list) { releaseSpare(list); });
-  releaseSpare(kept.intersectingTriangles);
+  CollisionData::Contents& contents = CollisionData::Contents::of(data);
+  forEachTimed(contents, [](auto& list) { releaseSpare(list); });
+  releaseSpare(contents.intersectingTriangles);
 }
 
 void PairRecord::commitEmpty() noexcept {

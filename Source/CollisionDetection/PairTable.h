@@ -4,6 +4,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/KeptPairs.h"
 #include "Validity/Trust.h"
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/SurfaceProxy.h"
@@ -31,6 +32,11 @@ struct PairRecord : CountedObject {
   Geometry* b;
   const SupportedPairs* support = nullptr;  ///< the row of the table that answers the settings
   PairPlan plan;  ///< of this frame; only Auto's may be of another kind than `support`
+  KeptPairs kept;
+  bool keeps = false;           ///< this frame's candidates are those of `kept`
+  bool countIsPending = false;  ///< the candidates of `kept` were not counted yet
+  int slowFrames = 0;           ///< consecutive detections in which candidates could be kept
+  double recentSpeed = 0;       ///< L: PairPlan::motion, recently the largest
   Trust trust;
 
   struct State {

@@ -1,5 +1,8 @@
 #include "CollisionDetection/Planning.h"
 
+#include "Core/Assert.h"
+
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -28,6 +31,82 @@ void planStep(PairRecord& record, bool detecting) {
     for (Geometry* geometry : {record.a, record.b}) geometry->motion.update(*geometry);
   record.plan = planOf(*record.support, settings, record.a->inStep(), record.b->inStep(), moves);
   if (detecting && mayUseProxy(record)) record.plan = planByProxy(settings, record.plan);
+}
+
+/// L: the length on which the motion of a step is measured.
+static double edgeOf(const PairRecord& record) {
+  double edge = 0.0;
+  for (const Geometry* geometry : {record.a, record.b})
+    if (geometry->shortEdge > 0.0 && (edge == 0.0 || geometry->shortEdge < edge))
+      edge = geometry->shortEdge;
+  return edge;
+}
+
+/// Whether a search of the two octrees for pairs at one distance, at the step's end, answers the
+/// pair.
+static bool canKeep(const PairRecord& record) {
+  constexpr std::size_t kFewElements = 256;
+  const Body &a = record.a->body, &b = record.b->body;
+  const auto fits = [](const Geometry& geometry) {
+    return !geometry.body.isPlaced() && !geometry.body.tree.isSwept() && !geometry.body.field &&
+           !geometry.proxy;
+  };
+  return record.plan.kind == PairKind::Meshes && record.plan.method == Method::Proximity &&
+         record.collides() && fits(*record.a) && fits(*record.b) &&
+         a.mesh.topology.elements.size() + b.mesh.topology.elements.size() >= kFewElements;
+}
+
+/// Whether what follows the search needs no octree.
+static bool canLag(const PairRecord& record) {
+  return !record.collides() ||
+         (record.keeps && record.pair.settings.freeMotionReach == 0.0 &&
+          !(record.pair.settings.method == Method::Auto &&
+            record.a->body.mesh.topology.hasFaces() && record.b->body.mesh.topology.hasFaces()));
+}
+
+void planKeptPairs(const GeometryTable& geometries,
+                   std::span<const std::unique_ptr<PairRecord>> records, const Settings& settings) {
+  constexpr int kSlowFrames = 3;        // before lists are made
+  constexpr double kSpeedDecay = 0.95;  // in each detection
+  for (const auto& geometry : geometries.all()) geometry->mayLag = false;
+  const auto forBoth = [](PairRecord& record, auto&& f) {
+    f(*record.a);
+    if (record.b != record.a) f(*record.b);
+  };
+  for (const auto& record : records) {
+    const double edge = edgeOf(*record), motion = record->plan.motion;
+    record->recentSpeed = std::max(motion, kSpeedDecay * record->recentSpeed);
+    const bool isSlow = settings.octree.keepsPairs && settings.engine == Engine::Octree &&
+                        edge > 0.0 && motion <= KeptPairs::kMostSpeed * edge && canKeep(*record);
+    record->slowFrames = isSlow ? std::min(record->slowFrames + 1, kSlowFrames) : 0;
+    record->keeps = record->slowFrames == kSlowFrames;
+    if (!record->keeps) record->kept.deactivate();
+    if (record->keeps) forBoth(*record, [](Geometry& geometry) { geometry.mayLag = true; });
+  }
+  for (const auto& geometry : geometries.all())
+    if (geometry->mayLag)
+      geometry->pieces.advanceTo(geometry->body.mesh.now);
+    else
+      geometry->pieces.forget();
+  for (const auto& record : records)
+    if (record->kept.isActive()) record->kept.addMotion(record->a->pieces, record->b->pieces);
+  for (const auto& record : records)
+    if (!canLag(*record)) forBoth(*record, [](Geometry& geometry) { geometry.mayLag = false; });
+}
+
+bool reviewKeptPairs(PairRecord& record) {
+  const PairPlan& plan = record.plan;
+  if (!record.keeps || (canKeep(record) && !plan.runsIntersection && !plan.startsIntersecting))
+    return false;
+  record.keeps = false;
+  record.a->mayLag = record.b->mayLag = false;
+  return record.a->body.tree.isLagging() || record.b->body.tree.isLagging();
+}
+
+KeptPairs::Reach reachOfKept(const PairRecord& record) {
+  PALPATE_ASSERT(record.keeps);
+  return KeptPairs::reachFor(record.meshes().maxFeatureDistance(), record.recentSpeed,
+                             edgeOf(record));
 }
 
 void planByFieldIfProven(PairRecord& record, Engine engine) {

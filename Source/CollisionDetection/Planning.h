@@ -21,6 +21,15 @@ bool mayUseProxy(const PairRecord&);
 /// to enclose the step is then PairPlan::swept().
 void planStep(PairRecord&, bool detecting);
 
+/// Decides for which of the planned pairs the candidates of KeptPairs are used, and which octrees
+/// may lag behind the positions. Measures the motion that these need.
+void planKeptPairs(const GeometryTable&, std::span<const std::unique_ptr<PairRecord>>,
+                   const Settings&);
+/// A plan was completed: decides again. Returns whether an octree that lags must be updated.
+bool reviewKeptPairs(PairRecord&);
+/// How far the lists of a pair that keeps its candidates reach.
+KeptPairs::Reach reachOfKept(const PairRecord&);
+
 /// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
 /// nothing touched in the step. The octrees must be updated.
 void planByFieldIfProven(PairRecord&, Engine);

@@ -38,27 +38,44 @@ HWY_ATTR void toFloatsKernel(const Eigen::Vector3d* positions, std::size_t size,
   for (; i < size; ++i) out[i] = frame(positions[i]);
 }
 
-/// Copies the values. Returns whether all are in range.
-HWY_ATTR bool copyInRangeKernel(const double* from, std::size_t size, double* to) {
-  const hn::ScalableTag<double> d;
+/// Copies the coordinates of positions, and extends bounds. Returns whether all are in range.
+HWY_ATTR bool copyInRangeKernel(const double* from, std::size_t size, double* to, double* lower,
+                                double* upper) {
+  const hn::CappedTag<double, 8> d;
   const std::size_t lanes = hn::Lanes(d);
-  // NaN is not at most anything. Four independent masks avoid waiting for each other.
-  const auto most = hn::Set(d, kLargestMeasure);
+  // Three vectors hold whole positions, so that a lane always has the same axis. NaN is not at most
+  // anything.
+  const auto most = hn::Set(d, kLargestMeasure), none = hn::Inf(d);
   const auto all = hn::Eq(most, most);
-  hn::Mask<decltype(d)> good[4] = {all, all, all, all};
+  hn::Mask<decltype(d)> good[3] = {all, all, all};
+  hn::Vec<decltype(d)> least[3] = {none, none, none},
+                       largest[3] = {hn::Neg(none), hn::Neg(none), hn::Neg(none)};
   std::size_t i = 0;
-  for (; i + 4 * lanes <= size; i += 4 * lanes)
-    for (std::size_t k = 0; k < 4; ++k) {
+  for (; i + 3 * lanes <= size; i += 3 * lanes)
+    for (std::size_t k = 0; k < 3; ++k) {
       const auto v = hn::LoadU(d, from + i + k * lanes);
       hn::StoreU(v, d, to + i + k * lanes);
       good[k] = hn::And(good[k], hn::Le(hn::Abs(v), most));
+      least[k] = hn::Min(least[k], v);
+      largest[k] = hn::Max(largest[k], v);
     }
-  bool rest = hn::AllTrue(d, hn::And(hn::And(good[0], good[1]), hn::And(good[2], good[3])));
+  bool isGood = hn::AllTrue(d, hn::And(hn::And(good[0], good[1]), good[2]));
+  double lowest[24], highest[24];
+  for (std::size_t k = 0; k < 3; ++k) {
+    hn::StoreU(least[k], d, lowest + k * lanes);
+    hn::StoreU(largest[k], d, highest + k * lanes);
+  }
+  const auto add = [&](std::size_t axis, double low, double high) {
+    lower[axis] = std::min(lower[axis], low);
+    upper[axis] = std::max(upper[axis], high);
+  };
+  for (std::size_t lane = 0; lane < 3 * lanes; ++lane) add(lane % 3, lowest[lane], highest[lane]);
   for (; i < size; ++i) {
     to[i] = from[i];
-    rest &= isWithinRange(from[i]);
+    isGood &= isWithinRange(from[i]);
+    add(i % 3, from[i], from[i]);
   }
-  return rest;
+  return isGood;
 }
 
 /// Writes each value at its rank. Infinities must fill the last vector.
@@ -121,9 +138,11 @@ void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& fram
 
 HWY_EXPORT(copyInRangeKernel);
 
-std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out) {
+std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
+                       Eigen::AlignedBox3d& bounds) {
   if (positions.empty() || HWY_DYNAMIC_DISPATCH(copyInRangeKernel)(
-                               positions[0].data(), 3 * positions.size(), out->data()))
+                               positions[0].data(), 3 * positions.size(), out->data(),
+                               bounds.min().data(), bounds.max().data()))
     return positions.size();
   std::size_t i = 0;
   while (isWithinRange(positions[i])) ++i;

@@ -76,8 +76,9 @@ double frameScale(double spread);
 /// Converts positions to floats of the frame. `out` is as long as `positions`.
 void toFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame&, FloatPoint* out);
 
-/// Copies positions. Returns the index of the first vertex that is not finite or has a coordinate
-/// beyond kLargestMeasure, or the size if there is none.
-std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out);
+/// Copies positions, and extends bounds by them. Returns the index of the first vertex that is not
+/// finite or has a coordinate beyond kLargestMeasure, or the size if there is none.
+std::size_t copyFinite(std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
+                       Eigen::AlignedBox3d& bounds);
 
 }  // namespace palpate

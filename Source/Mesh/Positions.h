@@ -7,6 +7,7 @@
 #include "Core/CountedVector.h"
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <cstddef>
 #include <cstring>
@@ -52,13 +53,23 @@ class Positions {
   /// In the body's frame, which is the world unless isPlaced().
   std::span<const Eigen::Vector3d> body() const { return *m_body; }
   bool hasSameBody(const Positions& other) const { return m_body == other.m_body; }
-  void setBody(Body body, Revision revision = {}) noexcept {
-    PALPATE_ASSERT(body != nullptr);
+  /// bounds: of the positions.
+  void setBody(Body body, const Eigen::AlignedBox3d& bounds, Revision revision) noexcept {
+    PALPATE_ASSERT(body != nullptr && bounds.isEmpty() == body->empty());
     m_body = std::move(body);
     m_data = m_body->data();
+    m_bounds = bounds;
     m_bodyRevision = revision;
   }
-  void setBodyOf(const Positions& other) noexcept { setBody(other.m_body, other.m_bodyRevision); }
+  void setBody(Body body, Revision revision = {}) noexcept {
+    Eigen::AlignedBox3d bounds;
+    for (const Eigen::Vector3d& p : *body) bounds.extend(p);
+    setBody(std::move(body), bounds, revision);
+  }
+  void setBodyOf(const Positions& other) noexcept {
+    setBody(other.m_body, other.m_bounds, other.m_bodyRevision);
+  }
+  const Eigen::AlignedBox3d& bounds() const { return m_bounds; }  ///< of body()
   bool isPlaced() const { return m_placed; }
   const Pose& transform() const { return m_transform; }
   void place(const Pose& transform, Revision revision) noexcept {
@@ -82,6 +93,7 @@ class Positions {
  private:
   Body m_body;
   const Eigen::Vector3d* m_data;
+  Eigen::AlignedBox3d m_bounds;
   Pose m_transform;
   bool m_placed = false;
   Revision m_bodyRevision, m_transformRevision;

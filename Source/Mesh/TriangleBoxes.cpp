@@ -51,7 +51,7 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
       groupUpper[k] = hn::Neg(empty);
     }
     for (std::size_t t = groups[g]; t < groups[g + 1]; ++t) {
-      const Triangle& corners = triangles[t];
+      const Triangle& corners = triangles[t - groups.front()];
       for (std::size_t k = 0; k < kVectors; ++k) {
         const V a = hn::Load(d4, &vertices[corners[0]].x + k * kLanes);
         const V b = hn::Load(d4, &vertices[corners[1]].x + k * kLanes);

@@ -15,6 +15,7 @@ namespace palpate {
 ///
 /// Shapes   vertices: the mesh's positions now. before: those at the step's start, in which case
 ///          boxes enclose the motion over the step; or null.
+///          triangles: from `begin` on. boxes: of all triangles.
 ///          groups: group g is triangles [groups[g], groups[g + 1]); the first starts at `begin`,
 ///          the last ends at `end`. groupBoxes: one per group.
 /// Cost     about 20 instructions a triangle.

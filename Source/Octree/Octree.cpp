@@ -123,6 +123,49 @@ void Octree::fit(const Threads& threads) {
   m_stage = Stage::Built;
 }
 
+void Octree::refit(std::size_t first, std::size_t last) {
+  PALPATE_ASSERT(isBuilt() && first <= last && last <= m_nodes.groupNodes.size());
+  BlockPool& pool = m_nodes.pool;
+  m_dops.directions = 3;
+  m_blockHeap.clear();
+  const auto push = [&](std::uint32_t block) {
+    m_blockHeap.push_back(block);
+    std::push_heap(m_blockHeap.begin(), m_blockHeap.end());
+  };
+  std::uint32_t pushed = 0;  // the root's block, which has no parent
+  for (std::size_t g = first; g < last; ++g) {
+    const OctreeNode node = m_nodes.groupNodes[g];
+    const std::uint32_t block = blockOf(node);
+    pool[block].setBox(slotOf(node), m_groupBoxes[g]);
+    if (!pool[block].isLeaf(slotOf(node))) push(pool[block].child[slotOf(node)]);
+    if (block != pushed) push(pushed = block);
+  }
+  // Parents have lower numbers than their children.
+  for (std::uint32_t done = 0; !m_blockHeap.empty();) {
+    std::pop_heap(m_blockHeap.begin(), m_blockHeap.end());
+    const std::uint32_t block = m_blockHeap.back();
+    m_blockHeap.pop_back();
+    if (block == 0 || block == done) continue;
+    done = block;
+    const OctreeNode parent = m_nodes.parents[block];
+    const std::uint32_t begin = pool[blockOf(parent)].begin[slotOf(parent)];
+    if (begin != pool[block].begin[0]) {  // fitBlocks() widens the box of the parent's own elements
+      const auto own = std::lower_bound(m_nodes.groups.begin(), m_nodes.groups.end(), begin);
+      PALPATE_ASSERT(*own == begin);
+      pool[blockOf(parent)].setBox(
+          slotOf(parent), m_groupBoxes[static_cast<std::size_t>(own - m_nodes.groups.begin())]);
+    }
+    fitBlocks(pool.data(), m_nodes.parents.data(), block, block + 1);
+    push(blockOf(parent));
+  }
+}
+
+void Octree::addAreas() {
+  m_groupAreas.assign(1, 0.0);
+  for (std::size_t g = 0; g < m_nodes.groupNodes.size(); ++g)
+    m_groupAreas[0] += halfArea(m_groupBoxes[g]);
+}
+
 OctreeDops& Octree::startDops(int directions) {
   PALPATE_ASSERT(isBuilt());
   m_dops.directions = 3;

@@ -162,7 +162,11 @@ class Octree {
              std::span<std::uint64_t> keys, const Threads&);
   /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
+  /// Of a built octree: the same for groups [first, last), whose boxes in groupBoxes() are new.
+  /// Cost     their number, and that of the nodes above them.
+  void refit(std::size_t first, std::size_t last);
   void measureLooseness();  ///< of the fitted boxes
+  void addAreas();          ///< call before measureLooseness(), after refit()
   /// Of a built octree: makes room for the elements' bounds along the directions after the axes.
   /// The caller writes them in the order() and calls fitDops(), which computes those of all nodes.
   /// Until then, and after any change of the octree, there are none.
@@ -217,6 +221,15 @@ class Octree {
     return {begin, block.isLeaf(slot) ? begin + block.count(slot)
                                       : m_nodes.pool[block.child[slot]].begin[0]};
   }
+  /// The range of elements that a node and all nodes below it hold.
+  std::pair<std::uint32_t, std::uint32_t> range(OctreeNode node) const {
+    const std::uint32_t begin = ownRange(node).first;
+    while (const OctreeNode children = firstChild(node)) {
+      node = children + kChildren - 1;
+      while (isEmpty(node)) --node;
+    }
+    return {begin, ownRange(node).second};
+  }
 
  private:
   static constexpr double kMaxLoosening = 1.5;
@@ -231,7 +244,8 @@ class Octree {
   OctreeNodes m_nodes;
   std::unique_ptr<OctreeBuilder> m_builder;  ///< keeps its scratch; null before the first build
   Buffer<FloatBox> m_groupBoxes;
-  Buffer<double> m_groupAreas;  ///< one sum for each chunk of groups
+  Buffer<double> m_groupAreas;        ///< one sum for each chunk of groups
+  Buffer<std::uint32_t> m_blockHeap;  ///< of refit(): blocks to fit, the last one first
   double m_looseness = 0, m_leastLooseness = 0;
   bool m_isUnmeasured = false;  ///< looseness was not measured since the build
 };

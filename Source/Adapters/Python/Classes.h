@@ -60,7 +60,8 @@ template <>
 inline constexpr auto kFields<OctreeSettings> =
     std::tuple(field("max_depth", &OctreeSettings::maxDepth),
                field("max_elements_per_leaf", &OctreeSettings::maxElementsPerLeaf),
-               field("update", &OctreeSettings::update), field("bounds", &OctreeSettings::bounds));
+               field("update", &OctreeSettings::update), field("bounds", &OctreeSettings::bounds),
+               field("keeps_pairs", &OctreeSettings::keepsPairs));
 template <>
 inline constexpr const char* kClass<AuditSettings> = "AuditSettings";
 template <>

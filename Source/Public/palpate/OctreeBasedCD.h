@@ -213,8 +213,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// the next detection or change of the geometry.
   /// Errors   NotAvailable before a detection with these elements.
   std::span<const double> freeMotion(GeometryId) const;
-  const LooseOctree& octree() const;  ///< valid as long as this object; updates change it
-  MemoryUse memoryUse() const;        ///< now, with queries and snapshots
+  /// Valid as long as this object; updates change it. Updates octrees that lag.
+  const LooseOctree& octree() const;
+  MemoryUse memoryUse() const;  ///< now, with queries and snapshots
   /// Gives back what is only kept for next frames, but no result or held snapshot, and resets
   /// FrameStatistics::peakMemory. Lack of memory is no error.
   void releaseMemory();

@@ -68,8 +68,18 @@ class BoxOctree {
     octree.measureLooseness();
   }
   void fit(const Boxes& boxes, const Threads& threads) {
+    writeGroups(boxes, 0, octree.groups().size() - 1);
+    octree.fit(threads);
+  }
+  void refit(const Boxes& boxes, std::size_t first, std::size_t last) {
+    writeGroups(boxes, first, last);
+    octree.refit(first, last);
+  }
+
+ private:
+  void writeGroups(const Boxes& boxes, std::size_t first, std::size_t last) {
     const auto groups = octree.groups();
-    for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
+    for (std::size_t g = first; g < last; ++g) {
       FloatBox all;
       for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) {
         write(i, boxes[octree.order()[i]]);
@@ -77,10 +87,7 @@ class BoxOctree {
       }
       octree.groupBoxes()[g] = all;
     }
-    octree.fit(threads);
   }
-
- private:
   void write(std::size_t i, const FloatBox& box) {
     for (std::size_t k = 0; k < 3; ++k) {
       octree.boxes().lower[k][i] = box.lower[k];

@@ -98,6 +98,49 @@ TEST(OctreeBuild, ReleasesMemoryAndIsBuiltAgain) {
   }
 }
 
+TEST(Octree, PartsThatAreFittedOneByOneEqualAWholeFit) {
+  Random random(31);
+  OctreeSettings few;
+  few.maxElementsPerLeaf = 4;
+  for (const Boxes& boxes :
+       {testing::randomBoxes(random, 3, 0.1), testing::nestedBoxes(random, 30, 20, 300),
+        testing::randomBoxes(random, 3000, 0.05)}) {
+    testing::BoxOctree tree, fresh;
+    tree.build(boxes, few, Threads(1));
+    fresh.build(boxes, few, Threads(1));
+    Boxes moved = boxes;
+    for (FloatBox& box : moved)
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto by = static_cast<float>(testing::uniform(random, -0.1, 0.1));
+        box.lower[k] += by;
+        box.upper[k] += by;
+      }
+    fresh.fit(moved, Threads(1));
+    fresh.octree.measureLooseness();
+    const std::size_t groups = tree.octree.groups().size() - 1;
+    std::vector<std::pair<std::size_t, std::size_t>> parts;
+    for (std::size_t first = 0; first < groups;) {
+      const std::size_t last = std::min(groups, first + 1 + random() % 9);
+      parts.emplace_back(first, last);
+      first = last;
+    }
+    std::shuffle(parts.begin(), parts.end(), random);
+    for (const auto& [first, last] : parts) {
+      tree.refit(moved, first, last);
+      EXPECT_EQ(validate(tree.octree, false), std::vector<std::string>{});
+    }
+    tree.octree.addAreas();
+    tree.octree.measureLooseness();
+    EXPECT_NEAR(tree.octree.looseness(), fresh.octree.looseness(),
+                1e-12 * fresh.octree.looseness());
+    for (OctreeNode node = 0; node < 8 * tree.octree.pool().used(); ++node) {
+      if (tree.octree.isEmpty(node)) continue;
+      EXPECT_EQ(tree.octree.box(node).lower, fresh.octree.box(node).lower);
+      EXPECT_EQ(tree.octree.box(node).upper, fresh.octree.box(node).upper);
+    }
+  }
+}
+
 TEST(BoxMap, KeepsEmptyBoxesAndAllBoxesWithoutEnds) {
   const FloatBox box = boxAbout({1, 2, 3}, 0.5);
   BoxMap map;

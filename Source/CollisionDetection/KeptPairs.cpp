@@ -1,0 +1,358 @@
+#include "CollisionDetection/KeptPairs.h"
+
+#include "Bodies/OctreeFrame.h"
+#include "Octree/BoxMap.h"
+#include "Core/Assert.h"
+#include "Core/MemoryBudget.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+/// Elements of a part, at least, and the largest number of parts.
+constexpr std::size_t kElementsPerPart = 512, kMostParts = 512;
+/// Units are made for parts this many margins of the lists further apart.
+constexpr double kUnitMargins = 1.0;
+/// By how much more often than needed units are due, so that few have to be handled at once.
+constexpr double kDueEarly = 1.2;
+/// Margins in edges: these factors times the square root of the speed, in limits.
+constexpr double kListFactor = 2.0, kClassFactor = 1.6, kLeastMargin = 0.02, kMostMargin = 1.0;
+
+/// The largest coordinate about the origin of the floats, L.
+double reachOf(const Body& body) {
+  const Eigen::AlignedBox3d& bounds = body.mesh.now.bounds();
+  const Eigen::Vector3d& origin = body.tree.floatsFrame().origin;
+  return std::max((bounds.min() - origin).cwiseAbs().maxCoeff(),
+                  (bounds.max() - origin).cwiseAbs().maxCoeff());
+}
+
+Eigen::Vector3d offsetOf(const Body& a, const Body& b) {
+  const FloatFrame &from = b.tree.floatsFrame(), &to = a.tree.floatsFrame();
+  return from.scaled(from.origin, to.origin);
+}
+
+/// Appends the parts of a tree below a node.
+void addParts(const Octree& tree, OctreeNode node, std::size_t most,
+              CountedVector<OctreeNode>& parts) {
+  if (tree.isEmpty(node)) return;
+  const auto [begin, end] = tree.range(node);
+  const OctreeNode children = tree.firstChild(node);
+  if (end - begin <= most || children == 0) return parts.push_back(node);
+  const auto own = tree.ownRange(node);
+  if (own.first < own.second) parts.push_back(node | NodePair::kOwn);
+  for (std::uint32_t i = 0; i < kChildren; ++i) addParts(tree, children + i, most, parts);
+}
+
+}  // namespace
+
+KeptPairs::Reach KeptPairs::reachFor(double distance, double speed, double edge) {
+  PALPATE_ASSERT(distance >= 0.0 && speed >= 0.0 && edge > 0.0);
+  const auto margin = [&](double factor) {
+    return edge * std::clamp(factor * std::sqrt(speed / edge), kLeastMargin, kMostMargin);
+  };
+  return {distance, margin(kListFactor), margin(kClassFactor)};
+}
+
+void KeptPairs::Parts::make(const Body& body) {
+  const Octree& tree = body.tree.octree();
+  layout = 0;
+  nodes.clear();
+  addParts(tree, 0, std::max(kElementsPerPart, tree.size() / kMostParts), nodes);
+  CountedVector<std::pair<std::uint32_t, std::uint32_t>> ranges;
+  ranges.reserve(nodes.size());
+  for (const OctreeNode node : nodes)
+    ranges.push_back(node & NodePair::kOwn ? tree.ownRange(node & ~NodePair::kOwn)
+                                           : tree.range(node));
+  pieces = piecesOf(body.tree.ordered(), ranges, body.mesh.topology.vertexCount);
+  moved.resize(nodes.size());
+  layout = tree.layout();
+}
+
+/// Returns the motion of all vertices.
+MotionRange KeptPairs::Parts::addMotion(const PieceMotion& motion) {
+  for (std::size_t part = 0; part < moved.size(); ++part) moved[part] = motion.of(pieces[part]);
+  MotionRange all;
+  for (const MotionRange& range : motion.ranges()) all.add(range);
+  return all;
+}
+
+void KeptPairs::addMotion(const PieceMotion& a, const PieceMotion& b) {
+  PALPATE_ASSERT(m_isActive);
+  // A geometry with other elements has another octree, for which start() makes new parts.
+  if (a.ranges().size() != m_rangeCountA || b.ranges().size() != m_rangeCountB) return deactivate();
+  const bool self = &a == &b;
+  const MotionRange allA = m_partsA.addMotion(a), allB = self ? allA : m_partsB.addMotion(b);
+  if (allA.isZero() && allB.isZero()) return;
+  constexpr double kUp = 1.0 + 0x1p-50;  // the rounding of the sums
+  m_moved = (m_moved + largestMotion(allA, allB)) * kUp;
+  const auto& movedB = (self ? m_partsA : m_partsB).moved;
+  for (Unit& unit : m_units) {
+    const MotionRange &ofA = m_partsA.moved[unit.partA], &ofB = movedB[unit.partB];
+    if (ofA.isZero() && ofB.isZero()) continue;
+    const double motion = largestMotion(ofA, ofB);
+    for (double* moved : {&unit.movedSinceLists, &unit.movedSinceClasses})
+      *moved = (*moved + motion) * kUp;
+    m_lists.due += kDueEarly * unit.weight() * std::min(1.0, motion / unit.atLists.lists);
+    m_classes.due +=
+        kDueEarly * unit.weightOfClasses() * std::min(1.0, motion / unit.atClasses.classes);
+  }
+}
+
+std::size_t KeptPairs::start(const Body& a, const Body& b, const Reach& reach,
+                             std::size_t mostJobs) {
+  PALPATE_ASSERT(reach.distance >= 0.0 && reach.lists >= reach.classes && reach.classes > 0.0 &&
+                 mostJobs > 0);
+  const bool self = &a == &b, hasParts = m_isActive &&
+                                         m_partsA.layout == a.tree.octree().layout() &&
+                                         (self || m_partsB.layout == b.tree.octree().layout());
+  m_isActive = false;
+  m_reach = reach;
+  m_scale = a.tree.floatsFrame().scale;
+  const Eigen::Vector3d offset = offsetOf(a, b);
+  const double size = reachOf(a) + reachOf(b) + offset.cwiseAbs().maxCoeff() / m_scale;
+  // Each bound of a box is off by less than 2^-21 of it, and so is their difference. Distances of
+  // features have errors of doubles.
+  m_reach.error =
+      0x1p-19 * (size + reach.distance + reach.lists) + OutwardRounding::kAbsolute / m_scale;
+  m_floats = {a.tree.floats(), b.tree.floats(), nullptr, nullptr};
+  setShift(m_floats.shiftLower, m_floats.shiftUpper, {offset[0], offset[1], offset[2]},
+           reach.distance * m_scale);
+  // Floats, offset and two differences have errors of 2^-24 each.
+  m_floatError = static_cast<float>(3 * 0x1p-24 * size * m_scale) * (1.0f + 0x1p-20f);
+  for (int k = 0; k < 3; ++k) m_offset[k] = static_cast<float>(offset[k]);
+  if (!hasParts) makeParts(a, b);
+  if (!hasParts || reach.distance + reach.lists + m_moved > m_reached) makeUnits(a, b);
+  m_trees = treesOf(
+      a, b, reach.distance + reach.lists + m_reach.error + a.tree.lag() + b.tree.lag(), false);
+  chooseUnits();
+  divide(mostJobs);
+  m_isActive = true;
+  return m_jobs.size() - 1;
+}
+
+void KeptPairs::makeParts(const Body& a, const Body& b) {
+  m_units.clear();
+  m_partsA.make(a);
+  if (&a != &b) m_partsB.make(b);
+  m_rangeCountA = PieceMotion::pieceCount(a.mesh.now.size());
+  m_rangeCountB = PieceMotion::pieceCount(b.mesh.now.size());
+  m_lists = m_classes = {};
+}
+
+/// Makes the units of the parts that are near each other now. Those that there were before keep
+/// their lists.
+void KeptPairs::makeUnits(const Body& a, const Body& b) {
+  const bool self = &a == &b;
+  const double reached = m_reach.distance + (1.0 + kUnitMargins) * m_reach.lists;
+  const TreePair trees =
+      treesOf(a, b, reached + m_reach.error + a.tree.lag() + b.tree.lag(), false);
+  const auto &partsA = m_partsA.nodes, &partsB = self ? m_partsA.nodes : m_partsB.nodes;
+  CountedVector<Unit> units;
+  units.reserve(m_units.size());
+  auto old = m_units.begin();
+  for (std::uint32_t i = 0; i < partsA.size(); ++i) {
+    FloatBox box = trees.a->box(partsA[i] & ~NodePair::kOwn);
+    for (std::size_t k = 0; k < 3; ++k) {
+      box.lower[k] = OutwardRounding::down(box.lower[k] + trees.shiftLower[k]);
+      box.upper[k] = OutwardRounding::up(box.upper[k] + trees.shiftUpper[k]);
+    }
+    for (std::uint32_t j = self ? i : 0; j < partsB.size(); ++j) {
+      if (!box.overlaps(trees.b->box(partsB[j] & ~NodePair::kOwn))) continue;
+      const auto isBefore = [&](const Unit& unit) {
+        return unit.partA != i ? unit.partA < i : unit.partB < j;
+      };
+      while (old != m_units.end() && isBefore(*old)) ++old;
+      const bool isKept = old != m_units.end() && old->partA == i && old->partB == j;
+      units.push_back(isKept ? std::move(*old++) : Unit());
+      units.back().partA = i;
+      units.back().partB = j;
+    }
+  }
+  m_units = std::move(units);
+  m_reached = reached;
+  m_moved = 0.0;
+  for (Turn* turn : {&m_lists, &m_classes})
+    if (turn->next >= m_units.size()) turn->next = 0;
+}
+
+/// Units whose lists or classes no longer reach far enough, and those whose turn it is.
+void KeptPairs::chooseUnits() {
+  for (Unit& unit : m_units) {
+    const auto reaches = [&](double moved, const Reach& reach, double margin) {
+      return m_reach.distance + moved + m_reach.error + reach.error <= reach.distance + margin;
+    };
+    unit.isMade = reaches(unit.movedSinceLists, unit.atLists, unit.atLists.lists);
+    unit.isSorted =
+        unit.isMade && reaches(unit.movedSinceClasses, unit.atClasses, unit.atClasses.classes);
+  }
+  takeTurns(
+      m_lists, [](Unit& unit) -> bool& { return unit.isMade; },
+      [](const Unit& unit) { return unit.weight(); });
+  for (Unit& unit : m_units) unit.isSorted &= unit.isMade;
+  takeTurns(
+      m_classes, [](Unit& unit) -> bool& { return unit.isSorted; },
+      [](const Unit& unit) { return unit.weightOfClasses(); });
+}
+
+template <class IsDone, class Weight>
+void KeptPairs::takeTurns(Turn& turn, IsDone&& isDone, Weight&& weight) {
+  double all = 0.0;
+  for (const Unit& unit : m_units) all += weight(unit);
+  turn.due = std::min(turn.due, all);
+  for (std::size_t i = 0; i < m_units.size() && turn.due > 0.0; ++i) {
+    Unit& unit = m_units[turn.next];
+    turn.next = (turn.next + 1) % m_units.size();
+    if (!isDone(unit) || unit.movedSinceClasses == 0.0) continue;
+    isDone(unit) = false;
+    turn.due -= weight(unit);
+  }
+}
+
+/// Divides the units among jobs of about the same weight.
+void KeptPairs::divide(std::size_t mostJobs) {
+  double all = 0.0, sum = 0.0;
+  for (const Unit& unit : m_units) all += unit.weight();
+  m_jobs.assign(1, 0);
+  for (std::size_t i = 0; i < m_units.size(); ++i) {
+    sum += m_units[i].weight();
+    if (sum >= all * static_cast<double>(m_jobs.size()) / static_cast<double>(mostJobs) ||
+        i + 1 == m_units.size())
+      m_jobs.push_back(i + 1);
+  }
+}
+
+void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch,
+                    Buffer<ElementPair>& near) {
+  PALPATE_ASSERT(job + 1 < m_jobs.size());
+  for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i) {
+    Unit& unit = m_units[i];
+    if (!unit.isMade) make(unit, meshes, scratch);
+    if (!unit.isSorted) {
+      scratch.kept.assign(unit.near.begin(), unit.near.end());
+      sort(unit, meshes, scratch.kept, scratch);
+    }
+    const auto active = nearOf(unit);
+    near.insert(near.end(), active.begin(), active.end());
+  }
+}
+
+std::size_t KeptPairs::countCandidates(const MeshTopology& a, const MeshTopology& b) const {
+  // A search of one tree shifts the box that comes first in its order.
+  CountedVector<std::uint32_t> places;
+  if (m_trees.self()) {
+    const auto order = m_trees.a->order();
+    places.resize(order.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) places[order[i]] = i;
+  }
+  std::size_t count = 0;
+  for (const Unit& unit : m_units)
+    for (const auto& [first, second] : unit.boxes) {
+      const bool swaps = m_trees.self() && places[second] < places[first];
+      count += overlap(a.elements[swaps ? second : first], b.elements[swaps ? first : second]);
+    }
+  return count;
+}
+
+/// The comparison of PairWalk, with the boxes of triangleBoxes().
+bool KeptPairs::overlap(const Triangle& a, const Triangle& b) const {
+  using Lanes = Eigen::Array4f;
+  const auto down = [](const Lanes& v) -> Lanes {
+    return v - (v.abs() * OutwardRounding::kRelative + OutwardRounding::kAbsolute);
+  };
+  const auto up = [](const Lanes& v) -> Lanes {
+    return v + (v.abs() * OutwardRounding::kRelative + OutwardRounding::kAbsolute);
+  };
+  const auto at = [](const FloatPoint* floats, std::uint32_t vertex) {
+    return Lanes::MapAligned(&floats[vertex].x);
+  };
+  const auto lower = [&](const FloatPoint* floats, const Triangle& corners) -> Lanes {
+    return down(at(floats, corners[0]).min(at(floats, corners[1])).min(at(floats, corners[2])));
+  };
+  const auto upper = [&](const FloatPoint* floats, const Triangle& corners) -> Lanes {
+    return up(at(floats, corners[0]).max(at(floats, corners[1])).max(at(floats, corners[2])));
+  };
+  Lanes lowerA = lower(m_floats.a, a), upperA = upper(m_floats.a, a);
+  constexpr std::array<float, 4> kNone{};
+  if (m_floats.shiftLower != kNone || m_floats.shiftUpper != kNone) {
+    lowerA = down(lowerA + Lanes::Map(m_floats.shiftLower.data()));
+    upperA = up(upperA + Lanes::Map(m_floats.shiftUpper.data()));
+  }
+  const Lanes further = (lowerA - upper(m_floats.b, b)).max(lower(m_floats.b, b) - upperA);
+  return !(further.head<3>() > 0.0f).any();
+}
+
+/// Features of pairs of class i were further apart than i parts of the margin more than the
+/// distance asked for then.
+std::span<const ElementPair> KeptPairs::nearOf(const Unit& unit) const {
+  const Reach& then = unit.atClasses;
+  const double reached = m_reach.distance + unit.movedSinceClasses + m_reach.error + then.error;
+  int last = 0;
+  while (last + 1 < kClasses && !(reached < then.distance + (last + 1) * then.classes / kClasses))
+    ++last;
+  return std::span(unit.near).first(unit.ends[last]);
+}
+
+/// Makes the lists of a unit.
+void KeptPairs::make(Unit& unit, const MeshPair& meshes, JobScratch& scratch) {
+  const MemoryScope memory(MemoryStage::Pairs);
+  unit.movedSinceLists = std::numeric_limits<double>::infinity();
+  scratch.sink.start(nullptr, nullptr);
+  const NodePair nodes{m_partsA.nodes[unit.partA],
+                       (m_trees.self() ? m_partsA : m_partsB).nodes[unit.partB]};
+  traverse(m_trees, std::span(&nodes, 1), scratch.stack, scratch.sink);
+  const auto found = scratch.sink.kept();
+  unit.boxes.assign(found.begin(), found.end());
+  unit.atLists = m_reach;
+  sort(unit, meshes, unit.boxes, scratch);
+  unit.movedSinceLists = 0.0;
+  unit.isMade = true;
+}
+
+FloatMeshes KeptPairs::floatMeshes(const MeshTopology& a, const MeshTopology& b) const {
+  return {a, b, m_floats.a, m_floats.b, m_offset, m_floatError};
+}
+
+/// Sorts those of the pairs with near features into classes. Pairs beyond the margin of the lists
+/// are left out.
+void KeptPairs::sort(Unit& unit, const MeshPair& meshes, std::span<const ElementPair> pairs,
+                     JobScratch& scratch) {
+  const MemoryScope memory(MemoryStage::Pairs);
+  Buffer<float>& bounds = scratch.bounds;
+  bounds.resize(pairs.size());
+  featureBounds(floatMeshes(meshes.a.topology, meshes.b.topology), pairs, bounds.data());
+  const double limit = unit.atLists.distance + unit.atLists.lists + unit.atLists.error;
+  const auto distance = static_cast<float>((m_reach.distance + m_reach.error) * m_scale),
+             most = static_cast<float>(limit * m_scale) * (1.0f + 0x1p-20f),
+             parts = static_cast<float>(kClasses / (m_reach.classes * m_scale));
+  std::array<std::uint32_t, kClasses + 1> next{};  // the last one: further than all classes
+  Buffer<std::uint8_t>& classes = scratch.classes;
+  classes.resize(pairs.size());
+  const bool isNew = pairs.data() == unit.boxes.data();
+  constexpr std::uint8_t kNone = 255;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const float part = std::max((bounds[i] - distance) * parts, 0.0f);
+    classes[i] = isNew && bounds[i] > most
+                     ? kNone
+                     : static_cast<std::uint8_t>(std::min(part, static_cast<float>(kClasses)));
+    if (classes[i] != kNone) ++next[classes[i]];
+  }
+  std::uint32_t size = 0;
+  for (int c = 0; c <= kClasses; ++c) {
+    const std::uint32_t begin = size;
+    size += next[c];
+    if (c < kClasses) unit.ends[c] = size;
+    next[c] = begin;
+  }
+  unit.near.resize(size);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (classes[i] != kNone) unit.near[next[classes[i]]++] = pairs[i];
+  unit.atClasses = m_reach;
+  unit.movedSinceClasses = 0.0;
+  unit.isSorted = true;
+}
+
+}  // namespace palpate

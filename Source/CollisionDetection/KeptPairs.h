@@ -1,0 +1,135 @@
+#pragma once
+
+#include "CollisionDetection/JobScratch.h"
+#include "NarrowPhase/FeatureBounds.h"
+#include "NarrowPhase/FeaturePairs.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Bodies/Body.h"
+#include "Octree/Traversal.h"
+#include "Mesh/PieceMotion.h"
+#include "Core/Buffer.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+namespace palpate {
+
+/// The candidates of one pair of meshes, kept from one detection to the next.
+///
+/// Nodes of about the same size divide each octree into parts. The pairs of parts that are near
+/// each other divide the search into units. A unit lists the element pairs whose boxes are at most
+/// a margin further apart than the distance that is asked for, and those of them with features that
+/// may be. The lists stay complete while the elements move relative to each other by no more than
+/// the margin. Each detection makes some of the lists again, so that all are made again in turn
+/// before that happens.
+///
+/// Pairs with near features are in classes by a bound on the distance of their features. From the
+/// motion since they were sorted it follows which classes may hold contacts now; only these are
+/// tested. They are sorted again more often than the lists are made.
+///
+/// Docs/Algorithms/LooseOctree.md has the proof.
+class KeptPairs {
+ public:
+  /// How far the lists and classes reach.
+  struct Reach {
+    double distance = 0;  ///< L: of features, and of boxes, that may be in contact
+    double lists = 0;     ///< L: the margin of the lists
+    double classes = 0;   ///< L: the same of the classes
+    double error = 0;     ///< L: rounding of boxes and distances; set by start()
+  };
+  /// The margins at which making lists, sorting and testing cost least together. distance: L.
+  /// speed: the relative motion in a step, L. edge: length of a short edge, L.
+  static Reach reachFor(double distance, double speed, double edge);
+  /// Above this share of an edge, the motion of a step makes keeping cost more than it saves.
+  static constexpr double kMostSpeed = 0.04;
+
+  bool isActive() const { return m_isActive; }
+  /// The lists are not kept up to date any more. Their memory is kept.
+  void deactivate() { m_isActive = false; }
+  /// Call after each PieceMotion::advanceTo() of either body while the lists are active. The two
+  /// are one object in self-collision.
+  void addMotion(const PieceMotion& a, const PieceMotion& b);
+
+  /// Begins a detection, and activates the lists. Returns the number of jobs, at most `mostJobs`.
+  std::size_t start(const Body& a, const Body& b, const Reach&, std::size_t mostJobs);
+  /// The boxes of the elements now, with the distance between them.
+  const FloatPair& floats() const { return m_floats; }
+  /// Appends the element pairs of a job that may have features in contact to `near`.
+  void run(std::size_t job, const MeshPair&, JobScratch&, Buffer<ElementPair>& near);
+  /// Element pairs of a job, which has run: its candidates, and some whose boxes do not overlap.
+  template <class Use>
+  void forEachList(std::size_t job, Use&& use) const {
+    PALPATE_ASSERT(m_isActive && job + 1 < m_jobs.size());
+    for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
+      use(std::span<const ElementPair>(m_units[i].boxes));
+  }
+  /// The number of candidates of all jobs, while the floats are those of this detection.
+  std::size_t countCandidates(const MeshTopology& a, const MeshTopology& b) const;
+  void releaseMemory() { *this = KeptPairs(); }
+
+ private:
+  static constexpr int kClasses = 8;  ///< within Reach::classes
+
+  struct Unit {
+    std::uint32_t partA = 0, partB = 0;
+    /// L: how far elements of both parts have moved, relative to each other, since the lists were
+    /// made, and since they were sorted.
+    double movedSinceLists = std::numeric_limits<double>::infinity(), movedSinceClasses = 0;
+    Reach atLists{}, atClasses{};
+    Buffer<ElementPair> boxes, near;
+    std::array<std::uint32_t, kClasses> ends{};  ///< of the classes in `near`; the rest is further
+    bool isMade = false, isSorted = false;       ///< false: in this detection
+    double weight() const { return static_cast<double>(boxes.size()) + 16.0; }
+    double weightOfClasses() const { return static_cast<double>(near.size()) + 4.0; }
+  };
+  /// Whose turn it is.
+  struct Turn {
+    double due = 0;        ///< weight of the units that are due
+    std::size_t next = 0;  ///< the unit that is due next
+  };
+
+  void makeParts(const Body& a, const Body& b);
+  void makeUnits(const Body& a, const Body& b);
+  void chooseUnits();
+  template <class IsDone, class Weight>
+  void takeTurns(Turn&, IsDone&&, Weight&&);
+  void divide(std::size_t mostJobs);
+  void make(Unit&, const MeshPair&, JobScratch&);
+  void sort(Unit&, const MeshPair&, std::span<const ElementPair>, JobScratch&);
+  FloatMeshes floatMeshes(const MeshTopology& a, const MeshTopology& b) const;
+  std::span<const ElementPair> nearOf(const Unit&) const;
+  bool overlap(const Triangle& a, const Triangle& b) const;
+
+  /// The nodes of an octree that hold all of its elements, each once.
+  struct Parts {
+    CountedVector<OctreeNode> nodes;   ///< as NodePair has them
+    IndexLists pieces;                 ///< of PieceMotion, for each node
+    CountedVector<MotionRange> moved;  ///< of each node, since the last detection
+    std::uint64_t layout = 0;          ///< Octree::layout() of the nodes
+    void make(const Body&);
+    MotionRange addMotion(const PieceMotion&);
+  };
+
+  bool m_isActive = false;
+  CountedVector<Unit> m_units;                       ///< ascending parts
+  Parts m_partsA, m_partsB;                          ///< of one mesh with itself, m_partsA only
+  std::size_t m_rangeCountA = 0, m_rangeCountB = 0;  ///< PieceMotion::ranges()
+  std::uint64_t m_layoutA = 0, m_layoutB = 0;        ///< Octree::layout() of the nodes
+  double m_reached = 0;  ///< L: further apart, less m_moved, are all pairs of parts without a unit
+  double m_moved = 0;    ///< L: the relative motion of all since the units were made
+  Turn m_lists, m_classes;
+
+  // Of the detection that runs:
+  Reach m_reach{};
+  double m_scale = 1;               ///< of the floats
+  std::array<float, 3> m_offset{};  ///< brings a's floats into the frame of b's
+  float m_floatError = 0;           ///< of the difference of two coordinates
+  TreePair m_trees{};
+  FloatPair m_floats{};
+  Buffer<std::size_t> m_jobs;  ///< job i has units [m_jobs[i], m_jobs[i + 1])
+};
+
+}  // namespace palpate

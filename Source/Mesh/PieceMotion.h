@@ -1,0 +1,51 @@
+#pragma once
+
+#include "Mesh/Motion.h"
+#include "Mesh/Positions.h"
+#include "Mesh/Revision.h"
+#include "Mesh/TriangleMesh.h"
+#include "Core/CountedVector.h"
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+
+namespace palpate {
+
+/// How far the vertices of a geometry move from one detection to the next, by pieces of consecutive
+/// vertices. Where vertices that are near each other have near numbers, a part of a mesh that does
+/// not move has pieces that do not.
+class PieceMotion {
+ public:
+  static constexpr std::size_t kPiece = 128;  ///< vertices; any number will do
+  static std::size_t pieceCount(std::size_t vertices) { return (vertices + kPiece - 1) / kPiece; }
+
+  /// Measures the motion from the positions that were given last, which had as many vertices.
+  /// Without any, all is still.
+  /// Cost     reads both positions once; none where they are the same.
+  void advanceTo(const Positions& now);
+  /// Forgets the positions, so that their memory can be used again.
+  void forget() { m_to.reset(); }
+
+  Revision from() const { return m_from; }  ///< the bodies of the last advanceTo()
+  Revision to() const { return m_to ? m_to->bodyRevision() : Revision(); }
+  std::span<const MotionRange> ranges() const { return m_ranges; }  ///< of each piece
+  MotionRange of(std::span<const std::uint32_t> pieces) const {
+    MotionRange all;
+    for (const std::uint32_t piece : pieces) all.add(m_ranges[piece]);
+    return all;
+  }
+
+ private:
+  std::optional<Positions> m_to;
+  Revision m_from;
+  CountedVector<MotionRange> m_ranges;
+};
+
+/// The pieces of the vertices of each range of elements [first, second).
+IndexLists piecesOf(std::span<const Triangle> elements,
+                    std::span<const std::pair<std::uint32_t, std::uint32_t>> ranges,
+                    std::size_t vertexCount);
+
+}  // namespace palpate

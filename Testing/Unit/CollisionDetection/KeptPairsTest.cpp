@@ -1,0 +1,233 @@
+#include "Common/PairRun.h"
+#include "Common/TestGeometry.h"
+
+#include <gtest/gtest.h>
+
+// Candidates that are kept from one detection to the next change no answer.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+
+struct SlowScene {
+  std::string name;
+  std::vector<TestGeometry> bodies;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  double edge;  ///< L: about the length of an edge
+  PairSettings settings;
+};
+
+TestGeometry sheetAt(std::uint32_t n, double height, double phase) {
+  return testGeometry(sheet(n, height, phase));
+}
+
+std::vector<SlowScene> slowScenes() {
+  Random random(77);
+  const auto with = [](Method method, double thickness, Contacts contacts) {
+    PairSettings settings;
+    settings.method = method;
+    settings.thickness = thickness;
+    settings.contacts = contacts;
+    return settings;
+  };
+  const double edge = 1.0 / 16;
+  const TestGeometry lower = sheetAt(16, 0.5, 0.0), upper = sheetAt(16, 0.52, 1.0),
+                     above = sheetAt(16, 0.515, 0.0), soups = testGeometry(soup(random, 300, edge));
+  const Contacts distinct = Contacts::Distinct, all = Contacts::All;
+  PairSettings rest = with(Method::Proximity, 0.03, distinct);
+  rest.restDistance = 0.08;
+  return {{"sheets", {lower, upper}, {{0, 1}}, edge, with(Method::Proximity, 0.02, distinct)},
+          {"sheets, all", {lower, upper}, {{0, 1}}, edge, with(Method::Proximity, 0.02, all)},
+          {"sheets, Auto", {lower, above}, {{0, 1}}, edge, with(Method::Auto, 0.02, distinct)},
+          {"soup, itself", {soups}, {{0, 0}}, edge, with(Method::Proximity, 0.01, distinct)},
+          {"soup, rest distance", {soups}, {{0, 0}}, edge, rest},
+          {"three",
+           {lower, upper, soups},
+           {{0, 1}, {0, 2}, {2, 1}, {2, 2}},
+           edge,
+           with(Method::Proximity, 0.02, distinct)},
+          {"thread",
+           {thread(random, 300, 0.05, 0.005, false), lower},
+           {{0, 1}, {0, 0}},
+           0.02,
+           with(Method::Proximity, 0.02, distinct)},
+          {"tapered thread",
+           {tapered(random, thread(random, 300, 0.05, 0.0, true), 0.01), upper},
+           {{0, 1}},
+           0.02,
+           with(Method::Auto, 0.02, distinct)},
+          {"particles",
+           {particles(random, 400, 0.01), lower},
+           {{0, 1}},
+           edge,
+           with(Method::Proximity, 0.02, distinct)}};
+}
+
+/// An object that keeps its candidates, and one that searches from scratch.
+class KeptAndSearched {
+ public:
+  KeptAndSearched(const SlowScene& scene, int threads) : m_scene(scene) {
+    for (const bool keeps : {true, false}) {
+      Settings settings = settingsOf(Engine::Octree, keeps ? threads : 1);
+      settings.octree.keepsPairs = keeps;
+      m_objects.emplace_back(settings);
+    }
+    forBoth([&](OctreeBasedCD& object) {
+      m_ids.clear();
+      for (const TestGeometry& body : scene.bodies) m_ids.push_back(body.addTo(object));
+      for (const auto& [a, b] : scene.pairs)
+        object.addCollisionPair(m_ids[a], m_ids[b], scene.settings);
+    });
+    for (const TestGeometry& body : scene.bodies) m_positions.push_back(body.positions);
+  }
+  template <class F>
+  void forBoth(F&& f) {
+    for (OctreeBasedCD& object : m_objects) f(object);
+  }
+  /// Moves all vertices of a body together, and each a little by itself.
+  void move(Random& random, std::size_t body, double length) {
+    const Vector3d together = randomPoint(random, -length, length);
+    for (Vector3d& p : m_positions[body])
+      p += together + randomPoint(random, -0.2 * length, 0.2 * length);
+    forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
+  }
+  /// The same for a few vertices only.
+  void moveSome(Random& random, std::size_t body, double length) {
+    for (std::size_t v = 0; v < std::min<std::size_t>(20, m_positions[body].size()); ++v)
+      m_positions[body][v] += randomPoint(random, -length, length);
+    forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
+  }
+  void detect() {
+    forBoth([](OctreeBasedCD& object) { object.detectCollision(); });
+    const OctreeBasedCD &kept = m_objects[0], &searched = m_objects[1];
+    for (const CollisionPair& pair : searched.pairs()) {
+      const CollisionData &found = kept.collisionData(pair.a, pair.b),
+                          &truth = searched.collisionData(pair.a, pair.b);
+      expectSameContacts(found, truth);
+      EXPECT_EQ(found.hash(), truth.hash());
+      const Validity &of = found.validity(), &expected = truth.validity();
+      EXPECT_EQ(of.method, expected.method);
+      EXPECT_EQ(of.trusted, expected.trusted);
+      EXPECT_EQ(of.startedApart, expected.startedApart);
+      EXPECT_EQ(of.displacement, expected.displacement);
+      EXPECT_EQ(of.untrustedVerticesA, expected.untrustedVerticesA);
+      EXPECT_EQ(of.untrustedVerticesB, expected.untrustedVerticesB);
+      if (!m_asksStatistics) continue;
+      EXPECT_EQ(kept.pairStatistics(pair.a, pair.b).candidatePairs,
+                searched.pairStatistics(pair.a, pair.b).candidatePairs);
+    }
+    EXPECT_EQ(kept.statistics().contacts, searched.statistics().contacts);
+    m_tested[0] += kept.statistics().featurePairs;
+    m_tested[1] += searched.statistics().featurePairs;
+    m_contacts += searched.statistics().contacts;
+  }
+  void advance() {
+    forBoth([](OctreeBasedCD& object) { object.advance(); });
+  }
+  void setTopology(std::size_t body, const Mesh& mesh) {
+    m_positions[body] = mesh.positions;
+    forBoth([&](OctreeBasedCD& object) {
+      object.setTriangles(m_ids[body], mesh.positions, mesh.triangles);
+    });
+  }
+  OctreeBasedCD& kept() { return m_objects[0]; }
+  GeometryId id(std::size_t body) const { return m_ids[body]; }
+  std::size_t testedByKept() const { return m_tested[0]; }
+  std::size_t testedBySearched() const { return m_tested[1]; }
+  std::size_t contacts() const { return m_contacts; }
+  void setAsksStatistics(bool asks) { m_asksStatistics = asks; }
+
+ private:
+  const SlowScene& m_scene;
+  std::vector<OctreeBasedCD> m_objects;
+  std::vector<GeometryId> m_ids;
+  std::vector<Positions> m_positions;
+  std::array<std::size_t, 2> m_tested{};
+  std::size_t m_contacts = 0;
+  bool m_asksStatistics = true;
+};
+
+class KeptPairs : public ::testing::TestWithParam<SlowScene> {};
+
+TEST_P(KeptPairs, SlowFramesHaveTheAnswersOfASearch) {
+  for (const int threads : {1, 8})
+    for (const double speed : {0.0005, 0.004, 0.015}) {
+      SCOPED_TRACE(std::to_string(threads) + " threads, " + std::to_string(speed));
+      Random random(5);
+      KeptAndSearched both(GetParam(), threads);
+      for (int frame = 0; frame < casesOf(60); ++frame) {
+        both.setAsksStatistics(frame % 3 != 1);
+        both.advance();
+        for (std::size_t body = 0; body < GetParam().bodies.size(); ++body)
+          if (frame % 7 != 3 || body == 0) both.move(random, body, speed * GetParam().edge);
+        both.detect();
+        if (HasFailure()) return;
+      }
+      EXPECT_GT(both.contacts(), 0u);
+      if (kShareOfCases > 1 || speed > 0.001) continue;
+      EXPECT_LT(both.testedByKept(), 0.8 * both.testedBySearched());
+    }
+}
+
+TEST_P(KeptPairs, ChangesBetweenFramesHaveTheAnswersOfASearch) {
+  Random random(6);
+  KeptAndSearched both(GetParam(), 2);
+  const double edge = GetParam().edge;
+  PairSettings settings = GetParam().settings;
+  for (int frame = 0; frame < casesOf(240); ++frame) {
+    SCOPED_TRACE("frame " + std::to_string(frame));
+    if (frame % 4 != 1) both.advance();
+    for (std::size_t body = 0; body < GetParam().bodies.size(); ++body) {
+      if (frame % 9 == 4)
+        both.moveSome(random, body, 0.01 * edge);
+      else if (frame % 31 == 30)
+        both.move(random, body, 2.0 * edge);  // a jump
+      else
+        both.move(random, body, 0.002 * edge);
+    }
+    switch (frame % 40) {
+      case 11:  // octrees are updated to other positions, to which the body does not return
+        both.move(random, 0, 0.3 * edge);
+        both.kept().queries().closestPoint(both.id(0), {0.5, 0.5, 0.5});
+        both.move(random, 0, 0.3 * edge);
+        break;
+      case 17:
+        both.forBoth([&](OctreeBasedCD& object) {
+          object.setDisabledElements(both.id(0), std::vector<std::uint32_t>{1, 5, 7});
+        });
+        break;
+      case 23:
+        settings.thickness *= uniform(random, 0.8, 1.25);
+        both.forBoth([&](OctreeBasedCD& object) {
+          for (const auto& pair : std::vector(object.pairs().begin(), object.pairs().end()))
+            object.setPairSettings(pair.a, pair.b, settings);
+        });
+        break;
+      case 29:
+        both.kept().releaseMemory();
+        break;
+      case 33:
+        EXPECT_EQ(both.kept().octree().validate(), std::vector<std::string>{});
+        break;
+      case 37:
+        if (GetParam().bodies[0].type == GeometryType::Triangles)
+          both.setTopology(0, sheet(15 + static_cast<std::uint32_t>(frame / 40), 0.5, 0.3));
+        break;
+      default:
+        break;
+    }
+    both.detect();
+    if (HasFailure()) return;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, KeptPairs, ::testing::ValuesIn(slowScenes()),
+                         [](const auto& scene) {
+                           std::string name = scene.param.name;
+                           std::erase_if(name, [](char c) { return c == ' ' || c == ','; });
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace palpate
