@@ -138,16 +138,17 @@ void raceRows(Report& report, const Options& options) {
 int main(int count, char** arguments) {
   Options options;
   options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",     "stages",     "frame",      "far",     "rest",   "tool",
-                    "scale",    "steady",     "features",   "lines",   "shapes", "inside",
-                    "rigid",    "fieldframe", "proxy",      "coarse",  "bounds", "continuous",
-                    "validity", "resting",    "freemotion", "queries", "fields", "simd"};
+  options.tables = {"race",       "stages", "frame",      "far",        "rest",
+                    "tool",       "scale",  "steady",     "features",   "lines",
+                    "shapes",     "inside", "rigid",      "fieldframe", "proxy",
+                    "coarse",     "bounds", "continuous", "validity",   "resting",
+                    "freemotion", "kept",   "queries",    "fields",     "simd"};
   MeasureOptions& measure = options.rows.measure;
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
   app.add_option("--tables", options.tables,
                  "some of race, stages, frame, far, rest, tool, scale, "
                  "steady, features, lines, shapes, inside, rigid, fieldframe, proxy, coarse, "
-                 "bounds, continuous, validity, resting, freemotion, queries, fields, simd")
+                 "bounds, continuous, validity, resting, freemotion, kept, queries, fields, simd")
       ->delimiter(',')
       ->check(CLI::IsMember(options.tables));
   app.add_option(
@@ -173,29 +174,14 @@ int main(int count, char** arguments) {
 
   Report report(options.csv, options.commit, simdPath());
   const std::map<std::string, void (*)(Report&, const RowOptions&)> tables = {
-      {"stages", stageRows},
-      {"frame", wholeFrameRows},
-      {"far", farTriangleRows},
-      {"rest", atRestRows},
-      {"tool", smallToolRows},
-      {"scale", scaleRows},
-      {"steady", steadyRows},
-      {"features", featureRows},
-      {"lines", lineRows},
-      {"shapes", shapeRows},
-      {"inside", insideRows},
-      {"rigid", rigidRows},
-      {"fieldframe", fieldFrameRows},
-      {"proxy", proxyRows},
-      {"coarse", coarseRows},
-      {"bounds", boundsRows},
-      {"continuous", continuousRows},
-      {"validity", validityRows},
-      {"resting", restingRows},
-      {"freemotion", freeMotionRows},
-      {"queries", spatialRows},
-      {"fields", fieldRows},
-      {"simd", simdRows}};
+      {"stages", stageRows},          {"frame", wholeFrameRows},      {"far", farTriangleRows},
+      {"rest", atRestRows},           {"tool", smallToolRows},        {"scale", scaleRows},
+      {"steady", steadyRows},         {"features", featureRows},      {"lines", lineRows},
+      {"shapes", shapeRows},          {"inside", insideRows},         {"rigid", rigidRows},
+      {"fieldframe", fieldFrameRows}, {"proxy", proxyRows},           {"coarse", coarseRows},
+      {"bounds", boundsRows},         {"continuous", continuousRows}, {"validity", validityRows},
+      {"resting", restingRows},       {"freemotion", freeMotionRows}, {"kept", keptRows},
+      {"queries", spatialRows},       {"fields", fieldRows},          {"simd", simdRows}};
   for (const std::string& table : options.tables) {
     if (table == "race")
       raceRows(report, options);

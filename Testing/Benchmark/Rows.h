@@ -43,6 +43,7 @@ void continuousRows(Report&, const RowOptions&);  ///< times of impact of the pu
 void validityRows(Report&, const RowOptions&);    ///< the share of validity() in a frame
 void restingRows(Report&, const RowOptions&);     ///< a sheet on another, partly fast, or aligned
 void freeMotionRows(Report&, const RowOptions&);  ///< free motion beside Continuous, and its share
+void keptRows(Report&, const RowOptions&);        ///< slow frames with kept candidates
 void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries
 void fieldRows(Report&, const RowOptions&);       ///< distance fields beside OpenVDB
 void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
