@@ -10,10 +10,11 @@
 namespace palpate::testing {
 
 /// Expects that the call throws this error, that its message contains the words, and that it names
-/// the geometry, if one is given.
+/// the geometry and the element, if they are given.
 template <class Call>
 void expectRefused(ErrorCode code, const std::string& words, Call&& call,
-                   std::optional<GeometryId> geometry = std::nullopt) {
+                   std::optional<GeometryId> geometry = std::nullopt,
+                   std::optional<std::size_t> element = std::nullopt) {
   try {
     call();
     ADD_FAILURE() << "accepted; expected: " << words;
@@ -22,6 +23,9 @@ void expectRefused(ErrorCode code, const std::string& words, Call&& call,
     EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
     if (geometry) {
       EXPECT_EQ(error.geometry(), geometry);
+    }
+    if (element) {
+      EXPECT_EQ(error.element(), element);
     }
   }
 }

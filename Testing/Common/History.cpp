@@ -505,6 +505,16 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
   EXPECT_EQ(ask(m_collisions, a, b), ask(other, ids.at(a), ids.at(b)));
 }
 
+void RandomHistory::expectSameEnds(const OctreeBasedCD& other) const {
+  const CollisionProblem running = m_collisions.problem(), truth = other.problem();
+  ASSERT_EQ(running.geometries.size(), m_bodies.size());
+  ASSERT_EQ(truth.geometries.size(), m_bodies.size());
+  for (std::size_t i = 0; i < m_bodies.size(); ++i) {
+    EXPECT_EQ(running.geometries[i].before, truth.geometries[i].before);
+    EXPECT_EQ(running.geometries[i].now, truth.geometries[i].now);
+  }
+}
+
 /// Ends the step.
 void RandomHistory::compareWhatLasts() {
   for (const auto& [id, body] : m_bodies) {
@@ -518,13 +528,7 @@ void RandomHistory::compareWhatLasts() {
     else if (body.placed)
       m_committed.setTransform(id, {body.rotation, body.translation});
   }
-  const CollisionProblem running = m_collisions.problem(), committed = m_committed.problem();
-  ASSERT_EQ(running.geometries.size(), m_bodies.size());
-  ASSERT_EQ(committed.geometries.size(), m_bodies.size());
-  for (std::size_t i = 0; i < m_bodies.size(); ++i) {
-    EXPECT_EQ(running.geometries[i].before, committed.geometries[i].before);
-    EXPECT_EQ(running.geometries[i].now, committed.geometries[i].now);
-  }
+  expectSameEnds(m_committed);
   if (!m_tracked) return;
   const auto track = [&](PenetrationTracker& tracker, OctreeBasedCD& collisions) {
     return wordsOf([&](auto& out) {
@@ -560,6 +564,7 @@ void RandomHistory::frame() {
                   bruteForce = fresh(Engine::BruteForce, bruteIds);
     octree.detectCollision();
     bruteForce.detectCollision();
+    expectSameEnds(octree);
     compareContacts(octree, ids, false);
     compareContacts(bruteForce, bruteIds, true);
     compareCandidates(bruteForce, bruteIds);

@@ -98,6 +98,7 @@ class RandomHistory {
   bool startsApart(const Pair&) const;
   void compareCandidates(OctreeBasedCD& bruteForce, const std::map<GeometryId, GeometryId>&);
   void compareQueries(OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&);
+  void expectSameEnds(const OctreeBasedCD& other) const;
   void compareWhatLasts();
   void endStep();
 

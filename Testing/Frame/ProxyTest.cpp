@@ -1,5 +1,4 @@
 // Method::Proxy: its contacts beside exact distances, with the error that the result states.
-#include <palpate/Capture.h>
 #include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
 
@@ -13,7 +12,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <limits>
 
 namespace palpate::testing {
@@ -468,29 +466,6 @@ TEST(Proxy, IsRefusedWhereItHasNoMeaning) {
   detection.setTriangles(body, moved, ball.triangles);
   detection.detectCollision();
   EXPECT_FALSE(detection.collisionData(points, body).shape().empty());
-}
-
-TEST(Proxy, CapturesKeepTheSettings) {
-  Random random(10);
-  const Scene scene = scenes()[0];
-  const Points points = particlesAround(random, scene, 200);
-  const std::vector<double> radii(points.size(), 0.002);
-  Detection run(scene, points, radii, settingsOf(Engine::Octree));
-  run.detection.setPairSettings(run.smoke, run.body,
-                                {.method = Method::Proxy,
-                                 .thickness = 0.04,
-                                 .allowedError = 0.0123,
-                                 .proxy = {.widestNormalCone = 0.21}});
-  run.detection.detectCollision();
-  const auto path = std::filesystem::path(::testing::TempDir()) / "Proxy.capture";
-  capture(run.detection, path);
-  OctreeBasedCD again = setUp(readCapture(path));
-  std::filesystem::remove(path);
-  const CollisionPair pair = again.pairs()[0];
-  EXPECT_EQ(pair.settings.allowedError, 0.0123);
-  EXPECT_EQ(pair.settings.proxy.widestNormalCone, 0.21);
-  again.detectCollision();
-  EXPECT_EQ(again.collisionData(pair.a, pair.b).hash(), run.data().hash());
 }
 
 }  // namespace

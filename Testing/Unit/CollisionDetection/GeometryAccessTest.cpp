@@ -29,10 +29,13 @@ TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
   const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
                    b = collisions.addAnalyticalGeometry(Sphere{});
   EXPECT_TRUE(collisions.has(a) && collisions.has(b));
+  collisions.addCollisionPair(a, b);
   collisions.removeGeometry(a);
   EXPECT_FALSE(collisions.has(a));
   EXPECT_TRUE(collisions.has(b));
+  EXPECT_TRUE(collisions.pairs().empty());
   EXPECT_FALSE(collisions.has(GeometryId{7}));
+  EXPECT_GT(collisions.addTriangleMesh(mesh.positions, mesh.triangles), b);  // no id is reused
   expectRefused(ErrorCode::UnknownGeometry, "geometry 0 was removed",
                 [&] { (void)collisions.vertexCount(a); });
 }
@@ -138,6 +141,9 @@ TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
   EXPECT_EQ(collisions.pairSettings(a, b).thickness, 0.25);
   expectRefused(ErrorCode::UnknownPair, "was added as",
                 [&] { (void)collisions.pairSettings(b, a); });
+  EXPECT_EQ(collisions.candidatePairs(b, a), collisions.candidatePairs(a, b));
+  collisions.removeCollisionPair(b, a);
+  EXPECT_TRUE(collisions.pairs().empty());
 }
 
 /// Disabled elements do not collide, but vertices are found inside bodies anyway.

@@ -81,15 +81,6 @@ TEST(ExtremeSizes, TrianglesAtOnePointNeedNoExactArithmetic) {
   compare(atOnePoint(14), atOnePoint(9), 0.125);
 }
 
-TEST(ExtremeSizes, SizesAndDistancesInPowersOfTwo) {
-  for (const auto& [first, last] : {std::pair(-1074.0, 996.0), {-400.0, 0.0}, {-20.0, 0.0}}) {
-    const Mesh sizes = spaced(9, first, last, 1, 0), distances = spaced(12, first, last, 0.02, 1);
-    const double middle = std::exp2(0.5 * (first + last));
-    compare(sizes, distances, middle);
-    compare(distances, moved(distances, Vector3d::Zero(), -0.5), 0.5 * middle);
-  }
-}
-
 TEST(ExtremeSizes, TrianglesAroundOneVertex) {
   for (const double thickness : {1e-4, 0.05, 0.4})
     compare(star(kShareOfCases == 1 ? 80 : 20), star(7), thickness);

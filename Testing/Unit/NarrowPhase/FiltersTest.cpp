@@ -1,4 +1,3 @@
-#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
@@ -11,9 +10,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
-#include <functional>
-#include <limits>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -384,81 +380,6 @@ TEST(Filters, GroupsAndMasksSelectThePairs) {
 }
 
 // ---- From frame to frame, files, errors ----
-
-/// After any earlier filters, a frame gives the contacts of a new engine.
-TEST(Filters, LastFiltersCount) {
-  Random random(5);
-  for (const bool self : {false, true})
-    for (const PairSettings& pair : everyMethod(0.04)) {
-      Case c = sheetsInContact(random, self);
-      OctreeBasedCD detection(settingsOf(Engine::Octree, 2));
-      const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
-                       b = self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
-      detection.addCollisionPair(a, b, pair);
-      for (int frame = 0; frame < casesOf(8); ++frame) {
-        c.pair = pair;
-        c.pair.restDistance = self && random() % 2 ? 0.2 : 0.0;
-        c.disabledA =
-            random() % 2 ? some(random, c.a.triangles.size()) : std::vector<std::uint32_t>{};
-        c.predicate = random() % 2 ? ContactPredicate(hashed) : ContactPredicate();
-        detection.setPairSettings(a, b, c.pair);
-        detection.setDisabledElements(a, c.disabledA);
-        detection.setContactPredicate(a, b, c.predicate);
-        if (frame == 0 || random() % 2) {
-          detection.setPositions(a, c.a.positions, c.nowA);
-          if (!self) detection.setPositions(b, c.b.positions, c.nowB);
-        }
-        detection.detectCollision();
-        SCOPED_TRACE("frame " + std::to_string(frame));
-        expectSameRows(Rows(detection.collisionData(a, b)),
-                       answer(settingsOf(Engine::BruteForce), c).rows);
-      }
-    }
-}
-
-TEST(Filters, CapturesAndAuditIncludeThem) {
-  Random random(6);
-  const auto path = std::filesystem::temp_directory_path() / "palpate-filters.capture";
-  Settings audited = settingsOf(Engine::Octree);
-  audited.audit.features = kShareOfCases == 1 ? 1000000 : 60;
-  for (const PairSettings& pair : everyMethod(0.04)) {
-    Case c = sheetsInContact(random, true);
-    OctreeBasedCD detection(audited);
-    const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
-                     b = detection.addTriangleMesh(c.b.positions, c.b.triangles),
-                     ball = detection.addTriangleMesh(sphere(6, 8, {0.5, 0.5, 0.5}, 0.2).positions,
-                                                      sphere(6, 8, {0.5, 0.5, 0.5}, 0.2).triangles);
-    PairSettings self = pair;
-    self.restDistance = 0.3;
-    detection.addCollisionPair(a, a, self);
-    detection.addCollisionPair(b, a, pair);
-    detection.addCollisionPair(ball, b, pair);
-    detection.setCollisionFilter(ball, {3, 5, Sidedness::Outer});
-    detection.setPositions(a, c.a.positions, c.nowA);
-    detection.setPositions(b, c.b.positions, c.nowB);
-    detection.setDisabledElements(b, some(random, c.b.triangles.size()));
-    detection.detectCollision();
-    EXPECT_TRUE(detection.auditFailures().empty());
-    capture(detection, path);
-    OctreeBasedCD again = setUp(readCapture(path));
-    again.detectCollision();
-    for (const CollisionPair& p : detection.pairs())
-      expectSameRows(Rows(again.collisionData(p.a, p.b)), Rows(detection.collisionData(p.a, p.b)));
-    EXPECT_GT(detection.statistics().contacts + detection.statistics().intersectingTriangles +
-                  (pair.continuous.earliestTimeOnly),
-              0u);
-    // The file does not contain a predicate, but says that there was one. The audit calls it.
-    detection.setContactPredicate(b, a, hashed);
-    detection.detectCollision();
-    EXPECT_TRUE(detection.auditFailures().empty());
-    capture(detection, path);
-    const CollisionProblem problem = readCapture(path);
-    EXPECT_TRUE(problem.pairs[1].predicate && !problem.pairs[0].predicate);
-    EXPECT_EQ(problem.geometries[2].filter, (CollisionFilter{3, 5, Sidedness::Outer}));
-    EXPECT_FALSE(problem.geometries[1].disabled.empty());
-  }
-  std::filesystem::remove(path);
-}
 
 TEST(Filters, BadInputThrowsErrorsThatNameIt) {
   const Mesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};

@@ -337,49 +337,5 @@ TEST(Sidedness, EdgesOfOneOrThreeTrianglesAreBelowIfAllAre) {
   EXPECT_TRUE(kept[3] > 50 && suppressed[3] > 10);
 }
 
-TEST(Sidedness, ThinOrganIsTouchedFromOneSide) {
-  // A closed slab 0.1 thick. One probe is 0.05 above it, one below. The thickness is 1.
-  const Mesh slab{{{-4, -4, 0},
-                   {4, -4, 0},
-                   {4, 4, 0},
-                   {-4, 4, 0},
-                   {-4, -4, 0.1},
-                   {4, -4, 0.1},
-                   {4, 4, 0.1},
-                   {-4, 4, 0.1}},
-                  {{0, 2, 1},
-                   {0, 3, 2},
-                   {4, 5, 6},
-                   {4, 6, 7},
-                   {0, 1, 5},
-                   {0, 5, 4},
-                   {1, 2, 6},
-                   {1, 6, 5},
-                   {2, 3, 7},
-                   {2, 7, 6},
-                   {3, 0, 4},
-                   {3, 4, 7}}};
-  ASSERT_TRUE(findMeshDefects(slab.triangles).closed());
-  const auto triangles = [&](const Vector3d& probe, Sidedness sidedness, Contacts contacts) {
-    std::set<std::uint32_t> ids;
-    const CollisionData data = answer(settingsOf(Engine::Octree), slab, {{probe}, {probe}, {}},
-                                      {Method::Proximity, 1.0, contacts}, sidedness);
-    for (const auto& c : data.triangleVertex()) ids.insert(c.triangle);
-    return ids;
-  };
-  using Ids = std::set<std::uint32_t>;
-  for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
-    const Ids above = triangles({1, 0.5, 0.15}, Sidedness::Outer, contacts),
-              below = triangles({1, 0.5, -0.05}, Sidedness::Outer, contacts);
-    EXPECT_TRUE(!above.empty() && *above.begin() >= 2 && *above.rbegin() <= 3);
-    EXPECT_TRUE(!below.empty() && *below.rbegin() <= 1);
-    // Beside the sharp corner, where no face points straight at it.
-    EXPECT_FALSE(triangles({4.3, 4.3, 0.3}, Sidedness::Outer, contacts).empty());
-    // Touching features have no direction.
-    EXPECT_FALSE(triangles({1, 0.5, 0.1}, Sidedness::Outer, contacts).empty());
-  }
-  EXPECT_GT(triangles({1, 0.5, 0.15}, Sidedness::Both, Contacts::All).size(), 2u);
-}
-
 }  // namespace
 }  // namespace palpate::testing
