@@ -149,7 +149,7 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
   OctreeBasedCD& detection = scene.detection;
   detection.setPairSettings(scene.drops, scene.bone,
                             {.method = Method::Proxy,
-                             .thickness = 0.04,
+                             .thickness = 0.1,
                              .allowedError = 0.0123,
                              .proxy = {.widestNormalCone = 0.21}});
   detection.setCollisionFilter(scene.organ, {3, 5, Sidedness::Outer});
@@ -158,9 +158,11 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
   detection.detectCollision();
   detection.advance();
   scene.move(1);
-  detection.removeGeometry(scene.field);  // a capture cannot hold it
+  // A capture holds positions in the world, where leaves differ, and no field.
+  detection.setTransform(scene.bone, {});
+  detection.removeGeometry(scene.field);
   detection.detectCollision();
-  EXPECT_GT(detection.statistics().contacts, 100u);
+  EXPECT_GT(detection.statistics().contacts, 50u);
   EXPECT_TRUE(detection.auditFailures().empty());
   const CollisionProblem truth = detection.problem(),
                          found = testing::replayed(detection).problem();
