@@ -59,14 +59,7 @@ class Determinism : public ::testing::TestWithParam<MethodCase> {
   }
 };
 
-TEST_P(Determinism, ThreadsAndUpdatesDoNotChangeABit) {
-  const std::vector<std::uint64_t> first = hashes(settingsOf(Engine::Octree), settings());
-  for (const Settings& each : octreeSettings()) {
-    SCOPED_TRACE(nameOf(each));
-    for (int repeat = 0; repeat < 3; ++repeat) EXPECT_EQ(hashes(each, settings()), first);
-  }
-}
-
+/// Frame/OracleTest.cpp and Unit/Validity/SupportedPairsTest.cpp compare threads and updates.
 TEST_P(Determinism, SimdPathsDoNotChangeABit) {
   const std::vector<std::uint64_t> first = hashes(settingsOf(Engine::Octree), settings());
   for (const std::string& path : simdPaths()) {

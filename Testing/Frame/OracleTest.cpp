@@ -120,24 +120,6 @@ TEST_P(Oracle, AgreesOnSoupsBodiesSheetsSliversCoplanarAndFoldedMeshes) {
   }
 }
 
-TEST_P(Oracle, AgreesAtEveryOffsetAndScale) {
-  const std::vector<Settings> octrees{settingsOf(Engine::Octree)};
-  std::size_t number = 0;
-  for (const double offset : {1.0, 1e3, 1e6})
-    for (const double scale : {1e-3, 1.0, 1e3})
-      for (Pair pair : pairs()) {
-        if (pair.name != "coarse soups" && pair.name != "sheets" && pair.name != "coplanar")
-          continue;
-        if (isLeftOut(number++)) continue;
-        SCOPED_TRACE(pair.name + " at " + std::to_string(offset) + ", scale " +
-                     std::to_string(scale));
-        const Vector3d to = Vector3d(offset, -offset, 0.3 * offset) * scale;
-        pair.a = moved(pair.a, to, scale);
-        pair.b = moved(pair.b, to, scale);
-        EXPECT_GT(compare(pair, settingsFor(pair.thickness * scale), octrees, scale, 2), 0u);
-      }
-}
-
 // ---- Published meshes ----
 
 /// The triangles nearest to a position, with vertices of their own.

@@ -199,35 +199,6 @@ TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryGeometryTypeByEveryMethod) {
   EXPECT_GT(contacts, 1000u);
 }
 
-TEST(TetrahedralMesh, CollidesWithShapesAndItself) {
-  Random random(5);
-  Solid solid = cells(3, random);
-  for (Vector3d& p : solid.positions) p += randomPoint(random, -0.1, 0.1);
-  const Positions folded = moved(random, solid.positions, 0.8);
-  const auto answer = [&](bool asTriangles, bool itself, const PairSettings& pair) {
-    OctreeBasedCD detection(settingsOf(Engine::Octree));
-    const GeometryId body =
-        asTriangles ? detection.addTriangleMesh(solid.positions, surfaceOf(solid).triangles)
-                    : detection.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-    const GeometryId other =
-        itself ? body : detection.addAnalyticalGeometry(Capsule{{0, 0, 3}, {3, 1, 3}, 0.3});
-    detection.addCollisionPair(body, other, pair);
-    detection.setPositions(body, folded);
-    detection.detectCollision();
-    detection.advance();
-    return detection.collisionData(body, other);
-  };
-  int touching = 0;
-  for (const PairSettings& pair : settingsFor(0.05))
-    for (const bool itself : {false, true}) {
-      const CollisionData found = answer(false, itself, pair), truth = answer(true, itself, pair);
-      EXPECT_EQ(found.hash(), truth.hash());
-      EXPECT_EQ(found.validity(), truth.validity());
-      touching += found.earliestTimeOfImpact() <= 1.0;
-    }
-  EXPECT_GE(touching, 9);
-}
-
 TEST(TetrahedralMesh, BadInputThrowsErrorsThatNameIt) {
   const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {2, 1, 1}};
   using Tetrahedra = std::vector<Tetrahedron>;

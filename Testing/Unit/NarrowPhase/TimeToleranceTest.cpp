@@ -119,19 +119,6 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
 }
 
-/// Auto finds everything that Continuous finds. It may report more, earlier.
-TEST(TimeTolerance, AutoFindsWhatContinuousFinds) {
-  Random random(6);
-  const Moving a = movingSoup(random), b = movingSoup(random);
-  for (const double tolerance : {1e-10, 1e-3, 0.25}) {
-    const PairSettings settings{.thickness = 0.1,
-                                .continuous = {.timeTolerance = tolerance},
-                                .automatic = {.motionTolerance = 0.3}};
-    testing::expectSame(runOf({}, settings, a, b).answers(),
-                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
-  }
-}
-
 /// A thousand impacts at a fiftieth of the step, and one at a hundredth. Once the remaining time is
 /// short, boxes of features sweep the first part of the step only.
 TEST(EarliestTime, IsFoundAmongManyLaterImpacts) {
