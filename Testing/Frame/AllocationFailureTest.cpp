@@ -7,9 +7,8 @@
 #include "Common/QueryCalls.h"
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
 #include "Common/Sanitized.h"
+#include "Common/WholeScene.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -66,47 +65,10 @@ Words stateOf(const OctreeBasedCD& detection) {
   return words;
 }
 
-/// Geometries of every type, and pairs of every method but Proxy, which has a test of its own.
-struct Scene {
-  explicit Scene(const Settings& settings) : detection(settings) {
-    Random random(4);
-    const Mesh body = sphere(5, 6, {0.5, 0.5, 0.5}, 0.4), floor = sheet(4, 0.4, 0);
-    organ = detection.addTriangleMesh(body.positions, body.triangles);
-    sheetId = detection.addTriangleMesh(floor.positions, floor.triangles);
-    line = thread(random, 20, 0.1, 0.01, false).addTo(detection);
-    drops = particles(random, 20, 0.02).addTo(detection);
-    Solid cube = cells(1, random);
-    for (Vector3d& p : cube.positions) p = 0.5 * p + Vector3d(0.2, 0.2, 0.2);
-    solid = detection.addTetrahedralMesh(cube.positions, cube.tetrahedra);
-    tool = detection.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0, 1}, 0.1});
-    Positions corners;
-    for (int i = 0; i < 12; ++i) corners.push_back(randomPoint(random, 0.2, 0.8));
-    block = detection.addAnalyticalGeometry(ConvexHull{corners});
-    const Mesh stone = sphere(3, 4, {0.5, 0.5, 0.1}, 0.2);
-    static const auto built = std::make_shared<const DistanceField>(DistanceField::build(
-        {stone.positions, stone.triangles}, {.errorBound = 0.05, .band = 0.2, .threads = 1}));
-    field = detection.addDistanceField(built);
-    organRest = body.positions;
-    tracker.emplace(drops, organ);
-    detection.addCollisionPair(organ, sheetId, {Method::Auto, 0.05});
-    detection.addCollisionPair(organ, organ, {Method::Continuous, 0.0});
-    detection.addCollisionPair(line, organ, {Method::Proximity, 0.05});
-    detection.addCollisionPair(drops, organ, {Method::Continuous, 0.01});
-    detection.addCollisionPair(solid, sheetId, {Method::Intersection});
-    detection.addCollisionPair(organ, tool, {Method::Continuous, 0.0});
-    detection.addCollisionPair(tool, block, {Method::Proximity, 1.0});
-    detection.addCollisionPair(organ, field, {Method::DistanceField, 0.05});
-    PairSettings apart{Method::Proximity, 0.05};
-    apart.restDistance = 0.3;
-    detection.addCollisionPair(line, line, apart);
-    detection.addCollisionPair(sheetId, solid == sheetId ? organ : drops,
-                               {.method = Method::Proximity, .thickness = 0.05});
-  }
-  void move() {
-    Random random(5);
-    detection.setPositions(organ, moved(random, organRest, 0.05));
-    detection.setTransform(tool, {Eigen::AngleAxisd(0.1, Vector3d::UnitX()).matrix(), {0.4, 0, 0}});
-  }
+/// The whole scene but Method::Proxy, which has a test of its own.
+struct Scene : WholeScene {
+  explicit Scene(const Settings& settings) : WholeScene(input(), settings, false) {}
+  void move() { WholeScene::move(1); }
   /// A frame's contacts, candidates and queries.
   Words answer() {
     Words words;
@@ -115,11 +77,11 @@ struct Scene {
       for (const auto& each : found) append(words, depth(each));
     };
     add(testing::insideVertices(detection, drops, organ), [](const auto& v) { return v.depth; });
-    add(testing::insideVertices(detection, drops, sheetId, {.rule = InsideRule::WindingNumber}),
+    add(testing::insideVertices(detection, drops, floor, {.rule = InsideRule::WindingNumber}),
         [](const auto& v) { return v.depth; });
-    add(testing::embeddedVertices(detection, drops, solid),
+    add(testing::embeddedVertices(detection, drops, block),
         [](const auto& v) { return v.at.weights[0]; });
-    words.push_back(detection.queries().findTetrahedron(solid, {0.3, 0.3, 0.3}).has_value());
+    words.push_back(detection.queries().findTetrahedron(block, {0.3, 0.3, 0.3}).has_value());
     detection.detectCollision();
     for (const CollisionPair& pair : detection.pairs()) {
       words.push_back(detection.collisionData(pair.a, pair.b).hash());
@@ -127,15 +89,18 @@ struct Scene {
     }
     EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
     for (const CollisionPair& pair : detection.pairs())
-      if (pair.b != tool && pair.b != block && pair.b != field)
+      if (pair.b != tool && pair.b != hull && pair.b != field)
         words.push_back(detection.candidatePairs(pair.a, pair.b).size());
     return words;
   }
 
-  OctreeBasedCD detection;
-  GeometryId organ, sheetId, line, drops, solid, tool, block, field;
-  std::optional<PenetrationTracker> tracker;
-  Positions organRest;
+  PenetrationTracker tracker{drops, organ};
+
+ private:
+  static const WholeSceneInput& input() {
+    static const WholeSceneInput input(4);
+    return input;
+  }
 };
 
 struct Call {
@@ -151,7 +116,7 @@ std::vector<Call> calls() {
   const Positions four{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const std::vector<Tetrahedron> first{{0, 1, 2, 3}};
   const Eigen::Matrix3d unit = Eigen::Matrix3d::Identity();
-  const Positions body = sphere(5, 6, {0.5, 0.5, 0.5}, 0.4).positions;
+  const Positions body = sphere(4, 8, {0.5, 0.5, 0.4}, 0.35).positions;
   std::vector<Call> all{
       {"detectCollision, first", [](Scene& s) { s.detection.detectCollision(); }, false},
       {"forEachCandidate, first", [](Scene& s) { s.detection.forEachCandidate([](auto&&...) {}); },
@@ -164,17 +129,17 @@ std::vector<Call> calls() {
       {"publish", [](Scene& s) { s.detection.publish(); }},
       {"findInsideVertices",
        [](Scene& s) { testing::insideVertices(s.detection, s.drops, s.organ); }},
-      {"PenetrationTracker", [](Scene& s) { s.tracker->update(s.detection.queries()); }},
+      {"PenetrationTracker", [](Scene& s) { s.tracker.update(s.detection.queries()); }},
       {"findInsideVertices by winding number",
        [](Scene& s) {
-         testing::insideVertices(s.detection, s.drops, s.sheetId,
+         testing::insideVertices(s.detection, s.drops, s.floor,
                                  {.rule = InsideRule::WindingNumber});
        }},
       {"findEmbeddedVertices",
-       [](Scene& s) { testing::embeddedVertices(s.detection, s.drops, s.solid); }},
+       [](Scene& s) { testing::embeddedVertices(s.detection, s.drops, s.block); }},
       {"findTetrahedron",
        [](Scene& s) {
-         s.detection.queries().findTetrahedron(s.solid, {0.3, 0.3, 0.3});
+         s.detection.queries().findTetrahedron(s.block, {0.3, 0.3, 0.3});
        }},
       {"setPositions", [=](Scene& s) { s.detection.setPositions(s.organ, body); }},
       {"setPositions, both", [=](Scene& s) { s.detection.setPositions(s.organ, body, body); }},
@@ -184,39 +149,37 @@ std::vector<Call> calls() {
        }},
       {"setTransform of a shape",
        [=](Scene& s) {
-         s.detection.setTransform(s.block, {unit, {0.1, 0, 0}});
+         s.detection.setTransform(s.hull, {unit, {0.1, 0, 0}});
        }},
       {"setTransform, both",
        [=](Scene& s) {
-         s.detection.setTransform(s.block, {unit, {0, 0, 0}}, {unit, {0.1, 0, 0}});
+         s.detection.setTransform(s.hull, {unit, {0, 0, 0}}, {unit, {0.1, 0, 0}});
        }},
-      {"setTriangles", [=](Scene& s) { s.detection.setTriangles(s.sheetId, three, one); }},
-      {"setTetrahedra", [=](Scene& s) { s.detection.setTetrahedra(s.solid, four, first); }},
+      {"setTriangles", [=](Scene& s) { s.detection.setTriangles(s.floor, three, one); }},
+      {"setTetrahedra", [=](Scene& s) { s.detection.setTetrahedra(s.block, four, first); }},
       {"setCollisionFilter",
-       [](Scene& s) {
-         s.detection.setCollisionFilter(s.sheetId, {.sidedness = Sidedness::Outer});
-       }},
+       [](Scene& s) { s.detection.setCollisionFilter(s.floor, {.sidedness = Sidedness::Outer}); }},
       {"setDisabledElements",
        [](Scene& s) {
          s.detection.setDisabledElements(s.organ, std::vector<std::uint32_t>{3, 5});
        }},
       {"addCollisionPair",
        [](Scene& s) {
-         s.detection.addCollisionPair(s.line, s.solid, {Method::Proximity, 0.1});
+         s.detection.addCollisionPair(s.suture, s.block, {Method::Proximity, 0.1});
        }},
       {"setPairSettings",
        [](Scene& s) {
          PairSettings settings{Method::Proximity, 0.02};
          settings.restDistance = 0.2;
-         s.detection.setPairSettings(s.line, s.line, settings);
+         s.detection.setPairSettings(s.suture, s.suture, settings);
        }},
       {"setContactPredicate",
        [](Scene& s) {
-         s.detection.setContactPredicate(s.organ, s.sheetId,
+         s.detection.setContactPredicate(s.organ, s.floor,
                                          [](const ContactFeatures& f) { return f.a[0] % 2 == 0; });
        }},
       {"removeCollisionPair", [](Scene& s) { s.detection.removeCollisionPair(s.organ, s.organ); }},
-      {"removeGeometry", [](Scene& s) { s.detection.removeGeometry(s.block); }}};
+      {"removeGeometry", [](Scene& s) { s.detection.removeGeometry(s.hull); }}};
   const auto add = [&](std::string name, auto&& addOne) {
     all.push_back({std::move(name), [=](Scene& s) { addOne(s.detection); }});
   };
@@ -342,10 +305,10 @@ TEST_P(AllocationFailure, LastSnapshotStays) {
   Scene scene(settings());
   const auto answerOf = [&](const SpatialQueries& queries) {
     Words words;
-    for (const GeometryId id : {scene.organ, scene.sheetId, scene.solid, scene.tool})
+    for (const GeometryId id : {scene.organ, scene.floor, scene.block, scene.tool})
       append(words, queries.closestPoint(id, {0.1, 0.2, 2})->distance);
     append(words, queries.signedDistance(scene.organ, {0.4, 0.5, 0.6}).distance);
-    words.push_back(queries.findTetrahedron(scene.solid, {0.3, 0.3, 0.3}).has_value());
+    words.push_back(queries.findTetrahedron(scene.block, {0.3, 0.3, 0.3}).has_value());
     return words;
   };
   scene.detection.publish();

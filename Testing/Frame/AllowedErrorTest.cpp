@@ -331,40 +331,6 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
   EXPECT_GE(nearby, leastOf(100));
 }
 
-/// The same bits for brute force and any number of threads, and in a second detection of a step.
-TEST(AllowedError, FieldsAnswerTheSameStepsByBruteForceAndByThreads) {
-  std::size_t byField = 0, exactly = 0;
-  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(4)); ++seed)
-    for (const Kind kind : kKinds)
-      for (const bool isOpen : {false, true}) {
-        Walk walk(7000 + 10 * seed + static_cast<std::uint64_t>(kind), kind);
-        const bool isBodyFirst = seed % 2 == 1;
-        const auto sceneOf = [&](const Settings& settings) {
-          return BodyScene(kind, ring(isOpen), walk.now(), pairOf(kErrorBound), settings,
-                           isBodyFirst);
-        };
-        Settings audited = settingsOf(Engine::Octree);
-        audited.audit.features = 20;
-        BodyScene octree = sceneOf(audited), brute = sceneOf(settingsOf(Engine::BruteForce)),
-                  threads = sceneOf(settingsOf(Engine::Octree, 3, OctreeUpdate::Rebuild));
-        for (int i = 0; i < casesOf(12); ++i) {
-          walk.step();
-          const CollisionData& answer = octree.step(walk.before(), walk.now());
-          (answer.validity().reason == MethodReason::AllowedError ? byField : exactly) += 1;
-          EXPECT_TRUE(octree.detection().auditFailures().empty());
-          for (BodyScene* other : {&brute, &threads}) {
-            const CollisionData& same = other->step(walk.before(), walk.now());
-            EXPECT_EQ(same.hash(), answer.hash());
-            EXPECT_EQ(same.validity(), answer.validity());
-            EXPECT_EQ(same.errorBound(), answer.errorBound());
-          }
-          if (HasFailure()) FAIL() << "seed " << seed << ", step " << i;
-        }
-      }
-  EXPECT_GE(byField, leastOf(80));
-  EXPECT_GE(exactly, leastOf(80));
-}
-
 /// A triangle that slides at a height over a box, by a distance of about that height.
 TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
   const Body box = bodyOf(boxMesh({-1, -1, -1}, {1, 1, 1}));

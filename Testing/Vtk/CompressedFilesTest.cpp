@@ -1,8 +1,5 @@
 // Files that VTK compressed, and such that are made to take much memory.
-#include "Common/FailingAllocation.h"
-
-#include <palpate/Error.h>
-#include <palpate/MeshFiles.h>
+#include "Unit/MeshFiles/MeshFileFixture.h"
 
 #include <gtest/gtest.h>
 #include <vtkDataCompressor.h>
@@ -11,31 +8,12 @@
 #include <vtkSmartPointer.h>
 #include <vtkZLibDataCompressor.h>
 
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <random>
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::testing {
 namespace {
-
-namespace fs = std::filesystem;
-using testing::FailingAllocation;
-
-std::string repeated(const std::string& text, std::size_t bytes) {
-  std::string all;
-  while (all.size() < bytes) all += text;
-  return all;
-}
-
-template <class T>
-std::string bytes(T value) {
-  std::string text(sizeof value, '\0');
-  std::memcpy(text.data(), &value, sizeof value);
-  return text;
-}
 
 std::string vtp(const std::string& compressor, const std::string& pieces,
                 const std::string& appended) {
@@ -67,29 +45,6 @@ std::string piece(std::size_t points) {
          "format=\"ascii\">3</DataArray></Polys></Piece>";
 }
 
-struct Outcome {
-  std::size_t peak;     ///< bytes that reading it took at once
-  std::string refusal;  ///< empty if it was read
-  MeshArrays mesh;
-};
-
-Outcome readFile(const std::string& content) {
-  const fs::path path = fs::path(::testing::TempDir()) / "compressed.vtp";
-  std::ofstream(path, std::ios::binary) << content;
-  Outcome outcome{0, "", {}};
-  FailingAllocation::arm(0);
-  try {
-    outcome.mesh = readMeshFile(path);
-  } catch (const Error& error) {
-    FailingAllocation::disarm();
-    outcome.refusal = error.what();
-  }
-  FailingAllocation::disarm();
-  outcome.peak = FailingAllocation::peakBytes();
-  fs::remove(path);
-  return outcome;
-}
-
 /// Bytes that compress well, badly, and by references that overlap with what they give.
 std::vector<std::string> plainTexts() {
   std::mt19937 random(7);
@@ -113,8 +68,8 @@ void expectReadBack(const char* name, const std::vector<int>& levels) {
       vtkNew<Compressor> compressor;
       compressor->SetCompressionLevel(level);
       const std::string packed = compressed(*compressor, plain);
-      const Outcome outcome =
-          readFile(vtp(name, piece(plain.size() / 3), block(packed, plain.size())));
+      const ReadOutcome outcome = outcomeOf(
+          "compressed.vtp", vtp(name, piece(plain.size() / 3), block(packed, plain.size())));
       ASSERT_EQ(outcome.refusal, "") << level << " " << plain.size();
       for (std::size_t i = 0; i < plain.size(); ++i)
         ASSERT_EQ(outcome.mesh.positions[i / 3][static_cast<int>(i % 3)],
@@ -133,19 +88,19 @@ void expectDamageIsFound(const char* name, bool hasSum) {
   vtkNew<Compressor> compressor;
   const std::string packed = compressed(*compressor, plain);
   const auto read = [&](const std::string& bytes) {
-    return readFile(vtp(name, piece(300), block(bytes, 900)));
+    return outcomeOf("compressed.vtp", vtp(name, piece(300), block(bytes, 900)));
   };
   const MeshArrays whole = read(packed).mesh;
   std::mt19937 random(3);
   for (std::size_t at = 0; at < packed.size(); ++at) {
     std::string damaged = packed;
     damaged[at] = static_cast<char>(damaged[at] ^ (1 << random() % 8));
-    const Outcome one = read(damaged);
+    const ReadOutcome one = read(damaged);
     EXPECT_TRUE(!hasSum || one.refusal != "" || one.mesh.positions == whole.positions) << at;
     EXPECT_NE(read(packed.substr(0, at)).refusal, "") << at;
   }
-  EXPECT_NE(readFile(vtp(name, piece(300), block(packed, 899))).refusal, "");
-  EXPECT_NE(readFile(vtp(name, piece(300), block(packed, 901))).refusal, "");
+  EXPECT_NE(outcomeOf("compressed.vtp", vtp(name, piece(300), block(packed, 899))).refusal, "");
+  EXPECT_NE(outcomeOf("compressed.vtp", vtp(name, piece(300), block(packed, 901))).refusal, "");
 }
 
 TEST(CompressedFiles, DamagedAndTruncatedBlocksAreRefused) {
@@ -159,12 +114,12 @@ TEST(CompressedFiles, PiecesThatShareABlockAreRefused) {
   vtkNew<vtkZLibDataCompressor> compressor;
   const std::string shared = block(compressed(*compressor, std::string(kDecoded, '\1')), kDecoded);
   const std::string one = piece(1'000'000), zlib = "vtkZLibDataCompressor";
-  EXPECT_EQ(readFile(vtp(zlib, one, shared)).refusal, "");
+  EXPECT_EQ(outcomeOf("compressed.vtp", vtp(zlib, one, shared)).refusal, "");
   const std::string many = vtp(zlib, repeated(one, 60 * one.size()), shared);
-  const Outcome outcome = readFile(many);
+  const ReadOutcome outcome = outcomeOf("compressed.vtp", many);
   EXPECT_NE(outcome.refusal, "");
   EXPECT_LE(outcome.peak, 20 * 1032 * many.size() + 1'000'000);
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::testing

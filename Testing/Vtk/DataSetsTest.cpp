@@ -1,6 +1,8 @@
 #include <palpate/Error.h>
 #include <palpate/vtk/DataSets.h>
 
+#include "Common/ExpectRefused.h"
+
 #include <gtest/gtest.h>
 #include <vtkCellArray.h>
 #include <vtkCellType.h>
@@ -15,6 +17,8 @@
 
 namespace palpate::vtk {
 namespace {
+
+using palpate::testing::expectRefused;
 
 MeshArrays mesh() {
   MeshArrays mesh;
@@ -33,17 +37,6 @@ void expectEqual(const MeshArrays& a, const MeshArrays& b) {
   EXPECT_EQ(a.points, b.points);
 }
 
-template <class F>
-std::string refusal(ErrorCode code, F&& call) {
-  try {
-    call();
-    return "";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), code) << error.what();
-    return error.what();
-  }
-}
-
 TEST(DataSets, ComeBackAsTheyWere) {
   MeshArrays solid = mesh();
   expectEqual(toMeshArrays(*toPolyData(solid)), solid);
@@ -51,7 +44,7 @@ TEST(DataSets, ComeBackAsTheyWere) {
   expectEqual(toMeshArrays(*toUnstructuredGrid(solid)), solid);
   expectEqual(toMeshArrays(*toUnstructuredGrid({})), {});
   expectEqual(toMeshArrays(*toPolyData({})), {});
-  EXPECT_NE(refusal(ErrorCode::UnsupportedMethod, [&] { toPolyData(solid); }), "");
+  expectRefused(ErrorCode::UnsupportedMethod, "", [&] { toPolyData(solid); });
 }
 
 TEST(DataSets, PolygonsPolylinesAndStripsAreSplit) {
@@ -75,30 +68,26 @@ TEST(DataSets, OtherCellsAreRefusedByName) {
   const vtkSmartPointer<vtkUnstructuredGrid> grid = toUnstructuredGrid(mesh());
   const vtkIdType ids[]{0, 1, 2, 3, 4, 0, 1, 2, 3, 4};
   grid->InsertNextCell(VTK_HEXAHEDRON, 8, ids);
-  EXPECT_NE(refusal(ErrorCode::UnsupportedMethod, [&] { toMeshArrays(*grid); })
-                .find("Cell 5 of the data set is a vtkHexahedron of 8 points"),
-            std::string::npos);
+  expectRefused(ErrorCode::UnsupportedMethod,
+                "Cell 5 of the data set is a vtkHexahedron of 8 points",
+                [&] { toMeshArrays(*grid); });
   const vtkSmartPointer<vtkUnstructuredGrid> second = toUnstructuredGrid(mesh());
   second->InsertNextCell(VTK_QUADRATIC_TETRA, 10, ids);
-  EXPECT_NE(refusal(ErrorCode::UnsupportedMethod, [&] { toMeshArrays(*second); })
-                .find("vtkQuadraticTetra"),
-            std::string::npos);
+  expectRefused(ErrorCode::UnsupportedMethod, "vtkQuadraticTetra", [&] { toMeshArrays(*second); });
 }
 
 TEST(DataSets, InvalidPointsAreRefused) {
   const vtkSmartPointer<vtkPolyData> data = toPolyData(mesh());
   data->GetPoints()->SetPoint(2, 0, std::numeric_limits<double>::quiet_NaN(), 0);
-  EXPECT_NE(refusal(ErrorCode::NonFinitePosition, [&] { toMeshArrays(*data); }).find("Point 2"),
-            std::string::npos);
+  expectRefused(ErrorCode::NonFinitePosition, "Point 2", [&] { toMeshArrays(*data); });
   const vtkSmartPointer<vtkUnstructuredGrid> grid = toUnstructuredGrid(mesh());
   const vtkIdType ids[]{0, 1, 5};
   grid->InsertNextCell(VTK_TRIANGLE, 3, ids);
-  EXPECT_NE(refusal(ErrorCode::IndexOutOfRange, [&] { toMeshArrays(*grid); }).find("point 5"),
-            std::string::npos);
+  expectRefused(ErrorCode::IndexOutOfRange, "point 5", [&] { toMeshArrays(*grid); });
   MeshArrays bad = mesh();
   bad.segments[1][0] = 5;
-  EXPECT_NE(refusal(ErrorCode::IndexOutOfRange, [&] { toPolyData(bad); }), "");
-  EXPECT_NE(refusal(ErrorCode::IndexOutOfRange, [&] { toUnstructuredGrid(bad); }), "");
+  expectRefused(ErrorCode::IndexOutOfRange, "", [&] { toPolyData(bad); });
+  expectRefused(ErrorCode::IndexOutOfRange, "", [&] { toUnstructuredGrid(bad); });
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include <palpate/vtk/Window.h>
+#include "Common/ExpectRefused.h"
 #include "Scenes.h"
 
 #include <palpate/Palpate.h>
@@ -13,6 +14,7 @@ namespace palpate::vtk {
 namespace {
 
 using Eigen::Vector3d;
+using palpate::testing::expectRefused;
 
 struct Pixel {
   int red, green, blue;
@@ -167,22 +169,15 @@ TEST(Window, AppearanceAndViewAreHonoured) {
 TEST(Window, RefusesAppearancesAndViewsOutOfRange) {
   const OctreeBasedCD nothing;
   Window window(nothing, false, 20, 20);
-  const auto isRefused = [](auto&& call) {
-    try {
-      call();
-    } catch (const Error& error) {
-      return error.code() == ErrorCode::InvalidSettings;
-    }
-    return false;
-  };
+  const auto refuse = [](auto&& call) { expectRefused(ErrorCode::InvalidSettings, "", call); };
   const double nan = std::nan("");
   for (const double wrong : {-0.1, 1.1, nan}) {
-    EXPECT_TRUE(isRefused([&] { window.setAppearance({}, {.opacity = wrong}); }));
-    EXPECT_TRUE(isRefused([&] { window.setAppearance({}, {.colour = {0, wrong, 0}}); }));
+    refuse([&] { window.setAppearance({}, {.opacity = wrong}); });
+    refuse([&] { window.setAppearance({}, {.colour = {0, wrong, 0}}); });
   }
   for (const View& wrong : {View{.from = {0, 0, 0}}, View{.from = {0, 0, 2}},
                             View{.from = {nan, 0, 1}}, View{.height = -1}, View{.height = nan}})
-    EXPECT_TRUE(isRefused([&] { window.setView(wrong); }));
+    refuse([&] { window.setView(wrong); });
 }
 
 /// Where the middle of the picture looks: from the front, somewhat to the right and above.
@@ -297,12 +292,8 @@ TEST(Window, EmptySceneIsWhiteAndBadSizesAreRefused) {
   window.show();
   EXPECT_EQ(count(window.image(), &Pixel::isWhite), 200u * 100);
   for (const auto& [width, height] : {std::pair(0, 10), {10, 20'000}}) {
-    try {
-      Window(nothing, false, width, height);
-      ADD_FAILURE() << "not refused";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-    }
+    expectRefused(ErrorCode::InvalidSettings, "",
+                  [&, &w = width, &h = height] { Window(nothing, false, w, h); });
   }
 }
 
@@ -321,13 +312,7 @@ TEST(NoDisplay, ThrowsAndTheProgramGoesOn) {
   for (const char* name : {static_cast<const char*>(nullptr), "", ":no"}) {
     if (name != nullptr) setenv("DISPLAY", name, 1);
     const bool onScreen = name != nullptr;
-    try {
-      Window(nothing, onScreen);
-      ADD_FAILURE() << "drawn without a display";
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::NotAvailable);
-      EXPECT_NE(std::string(error.what()).find("xvfb-run"), std::string::npos);
-    }
+    expectRefused(ErrorCode::NotAvailable, "xvfb-run", [&] { Window(nothing, onScreen); });
   }
 }
 

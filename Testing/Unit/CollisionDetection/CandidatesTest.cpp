@@ -1,6 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
-#include "Common/RandomMeshes.h"
+#include "Common/PairRun.h"
 
 #include <gtest/gtest.h>
 
@@ -14,20 +14,6 @@ namespace {
 
 using testing::Mesh;
 using testing::Random;
-
-Settings settingsOf(Engine engine, int threads, OctreeUpdate update) {
-  Settings settings;
-  settings.engine = engine;
-  settings.threads = threads;
-  settings.octree.update = update;
-  return settings;
-}
-
-PairSettings proximity(double thickness) {
-  PairSettings settings;
-  settings.thickness = thickness;
-  return settings;
-}
 
 /// Compares with exact boxes in double: no false negatives, and false positives by outward rounding
 /// only.
@@ -64,8 +50,8 @@ void expectSameInBatches(OctreeBasedCD& octree,
 /// in which both move.
 void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector3d& offset,
              double scale, int threads, OctreeUpdate update) {
-  OctreeBasedCD octree(settingsOf(Engine::Octree, threads, update)),
-      oracle(settingsOf(Engine::BruteForce, 1, update));
+  OctreeBasedCD octree(testing::settingsOf(Engine::Octree, threads, update)),
+      oracle(testing::settingsOf(Engine::BruteForce, 1, update));
   Mesh first = a, second = b;
   const auto place = [&](Eigen::Vector3d& p) { p = p * scale + offset * scale; };
   std::for_each(first.positions.begin(), first.positions.end(), place);
@@ -75,8 +61,8 @@ void compare(const Mesh& a, const Mesh& b, double thickness, const Eigen::Vector
   for (int e = 0; e < 2; ++e) {
     ids[e][0] = engines[e]->addTriangleMesh(first.positions, first.triangles);
     ids[e][1] = engines[e]->addTriangleMesh(second.positions, second.triangles);
-    engines[e]->addCollisionPair(ids[e][0], ids[e][1], proximity(thickness * scale));
-    engines[e]->addCollisionPair(ids[e][0], ids[e][0], proximity(thickness * scale));
+    engines[e]->addCollisionPair(ids[e][0], ids[e][1], {.thickness = thickness * scale});
+    engines[e]->addCollisionPair(ids[e][0], ids[e][0], {.thickness = thickness * scale});
   }
   Random random(7);
   for (int frame = 0; frame < 4; ++frame) {
@@ -101,15 +87,6 @@ TEST(Candidates, MatchBruteForceOnSoups) {
     for (const int threads : {1, 2, 8})
       for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild})
         compare(a, b, 0.01, {0, 0, 0}, 1, threads, update);
-  }
-}
-
-TEST(Candidates, MatchBruteForceOnSheetsAndBodies) {
-  const Mesh a = testing::sheet(20, 0.0, 0.0), b = testing::sheet(17, 0.02, 1.0);
-  const Mesh ball = testing::sphere(12, 16, {0.5, 0.5, 0.1}, 0.2);
-  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
-    compare(a, b, 0.002, {0, 0, 0}, 1, 2, update);
-    compare(a, ball, 0.01, {0, 0, 0}, 1, 1, update);
   }
 }
 

@@ -422,36 +422,6 @@ TEST(FirstImpacts, TiesAreBrokenByOrder) {
   EXPECT_GT(dropped, 1000u);
 }
 
-TEST(FirstImpacts, CornerOnCornerIsOneContact) {
-  // The apexes of two pyramids of four triangles each meet at half time.
-  const std::vector<Triangle> sides{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-  const TestGeometry up{GeometryType::Triangles,
-                        {{0, 0, 0}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, -1}, {1, -1, -1}},
-                        sides,
-                        {}};
-  const TestGeometry down{GeometryType::Triangles,
-                          {{0, 0, 1}, {1, 0, 2}, {0, 1, 2}, {-1, 0, 2}, {0, -1, 2}},
-                          sides,
-                          {}};
-  Positions landed = down.positions;
-  for (Vector3d& p : landed) p[2] -= 1.5;
-  PairSettings pair{Method::Continuous, 0.25, Contacts::All};
-  const Settings settings = settingsOf(Engine::Octree);
-  const CollisionData all = answer(settings, up, down, pair, up.positions, landed);
-  std::size_t ofApexes = 0;
-  for (const Impact& impact : impactsOf(all)) ofApexes += impact.features == FeaturePair{{0}, {0}};
-  EXPECT_EQ(ofApexes, 24u);  // 4 + 4 vertices against triangles, 16 pairs of edges
-  pair.contacts = Contacts::Distinct;
-  const CollisionData distinct = answer(settings, up, down, pair, up.positions, landed);
-  ofApexes = 0;
-  for (const Impact& impact : impactsOf(distinct))
-    ofApexes += impact.features == FeaturePair{{0}, {0}};
-  EXPECT_EQ(ofApexes, 1u);
-  ASSERT_FALSE(distinct.vertexTriangle().empty());
-  EXPECT_EQ(distinct.vertexTriangle()[0].vertex, 0u);
-  EXPECT_EQ(distinct.vertexTriangle()[0].triangle, 0u);
-}
-
 /// A refused contact does not represent other contacts.
 TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
   Random random(3);
@@ -474,26 +444,6 @@ TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
   expectSameRows(Rows(answerOf(settingsOf(Engine::BruteForce), Contacts::Distinct)), expected);
   for (const Settings& settings : octreeSettings())
     expectSameRows(Rows(answerOf(settings, Contacts::Distinct)), expected);
-}
-
-/// A smooth body is pressed into another: how many contacts Distinct drops.
-TEST(FirstImpacts, AreFewOnSmoothBodies) {
-  const Mesh cloth = sheet(52, 0, 0);
-  const Mesh body = sphere(52, 50, {0.5, 0.5, 0.36}, 0.28);
-  Positions pressed = body.positions;
-  for (Vector3d& p : pressed) p += Vector3d(0, 0.02, -0.06);
-  const double thickness = 0.5 / 52;  // half an edge
-  const auto countOf = [&](Contacts contacts) {
-    PairRun run(settingsOf(Engine::Octree), body, cloth, {Method::Continuous, thickness, contacts},
-                false);
-    run.step(body.positions, pressed, cloth.positions, cloth.positions);
-    return Rows(run.data()).contacts();
-  };
-  const std::size_t all = countOf(Contacts::All), distinct = countOf(Contacts::Distinct);
-  RecordProperty("all", static_cast<int>(all));
-  RecordProperty("distinct", static_cast<int>(distinct));
-  EXPECT_GT(all, 9000u);
-  EXPECT_LT(3 * distinct, all);
 }
 
 /// Regular grids that fall onto each other touch where weights are 0 up to rounding.

@@ -586,29 +586,6 @@ TEST(Rigid, InsideVerticesMatchSetPositions) {
   }
 }
 
-/// Auto's contacts of two closed bodies deep in each other, and the translations that they come
-/// from.
-TEST(Rigid, DeepBodiesMatchSetPositions) {
-  Random random(21);
-  const Mesh box = boxMesh(Vector3d::Constant(-1.0), Vector3d::Constant(1.0));
-  const TestGeometry body{GeometryType::Triangles, box.positions, box.triangles, {}};
-  std::size_t deep = 0;
-  for (int i = 0; i < casesOf(200); ++i) {
-    const Place place =
-        Place().then(randomPoint(random, -1, 1), uniform(random, 0, 3), Vector3d::Zero(),
-                     Vector3d(uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3),
-                              uniform(random, 0.3, 1.7)));
-    const bool bodyFirst = i % 2 == 0;
-    const PairSettings pair{Method::Auto, 0.1};
-    RigidRun placed({.threads = 1}, body, body, pair, bodyFirst, true),
-        world({.threads = 1}, body, body, pair, bodyFirst, false);
-    for (RigidRun* run : {&placed, &world}) run->frame(place, nullptr, body.positions);
-    ASSERT_EQ(placed.data().hash(), world.data().hash());
-    deep += placed.data().edgeEdge().size() == 1;
-  }
-  EXPECT_GT(deep, 0u);
-}
-
 /// A zero's sign reaches positions, so that two transforms that differ in it are not the same.
 TEST(Rigid, SignsOfZerosMatchSetPositions) {
   const Vector3d minus = Vector3d::Constant(-0.0), plus = Vector3d::Zero();

@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 #endif
 
+#include <array>
 #include <atomic>
 #include <thread>
 
@@ -66,6 +67,33 @@ TEST(SeveralObjects, AnyNumberOfThreadsGivesTheSameBits) {
   const std::vector<std::uint64_t> truth = framesOf({.threads = 1}, 3, 1);
   for (int threads = 2; threads <= 64; threads += kShareOfCases)
     EXPECT_EQ(framesOf({.threads = threads}, 3, 1), truth) << threads << " threads";
+}
+
+TEST(SeveralObjects, AnswerConstFunctionsInManyThreads) {
+  Random random(3);
+  const Mesh a = soup(random, 300, 0.2), b = soup(random, 300, 0.2);
+  OctreeBasedCD engine(settingsOf(Engine::Octree, 2));
+  const GeometryId idA = engine.addTriangleMesh(a.positions, a.triangles);
+  const GeometryId idB = engine.addTriangleMesh(b.positions, b.triangles);
+  engine.addCollisionPair(idA, idB, {.thickness = 0.01});
+  std::vector<Eigen::Vector3d> now = b.positions;
+  for (int frame = 0; frame < 10; ++frame) {
+    for (Eigen::Vector3d& p : now) p.x() += 0.01;
+    engine.setPositions(idB, now);
+    engine.detectCollision();
+    std::array<std::size_t, 4> answers{};
+    std::vector<std::thread> threads;
+    for (std::size_t& answer : answers) {
+      threads.emplace_back([&] {
+        answer = engine.collisionData(idA, idB).hash() + engine.octree().nodes(idA).size() +
+                 engine.octree().validate().size() + engine.statistics().contacts +
+                 engine.pairs().size();
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (std::size_t answer : answers) EXPECT_EQ(answer, answers[0]);
+    engine.advance();
+  }
 }
 
 #ifdef PALPATE_TESTS_WITH_TBB

@@ -108,8 +108,8 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
                                MethodReason::Cheapest}));
 }
 
-/// Every two bodies that a row of the table of support answers, in one object. A row of Auto allows
-/// fields and proxies an error. Steps of two sizes take turns.
+/// Every two bodies that a row of the table of support answers, in one object. Steps of two sizes take
+/// turns.
 TEST(SteadyFrame, AllocatesNothingForAnyRowOfTheTable) {
   const IntegersApart apart;
   for (std::size_t number = 0; number < std::size(kSupport); ++number)
@@ -135,7 +135,6 @@ TEST(SteadyFrame, AllocatesNothingForAnyRowOfTheTable) {
             // Only a placed body is rigid.
             if (row.kind == PairKind::Proxy && steps[0][t].name != "placed triangles") continue;
             PairSettings settings = testing::caseOf(row, pairs);
-            if (row.method == Method::Auto) settings.allowedError = 0.02;
             settings.freeMotionReach = row.method == Method::Proximity ? 0.1 : 0.0;
             detection.addCollisionPair(ids[s], ids[t], settings);
             ++pairs;

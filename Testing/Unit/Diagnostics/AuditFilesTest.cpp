@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 
 #include <gtest/gtest.h>
@@ -157,15 +158,9 @@ TEST_F(AuditFiles, AtMostMaxFilesAreWrittenAndARemovedFolderIsNamed) {
 }
 
 TEST_F(AuditFiles, MissingFolderThrowsAnErrorThatNamesIt) {
-  for (const fs::path& folder : {m_folder / "missing", fs::path("/dev/null")}) {
-    try {
-      detection({.features = 1, .folder = folder});
-      FAIL();
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-      EXPECT_NE(std::string(error.what()).find(folder.string()), std::string::npos);
-    }
-  }
+  for (const fs::path& folder : {m_folder / "missing", fs::path("/dev/null")})
+    testing::expectRefused(ErrorCode::InvalidSettings, folder.string(),
+                           [&] { detection({.features = 1, .folder = folder}); });
   EXPECT_THROW(detection({.features = 1, .maxFiles = -1}), Error);
 }
 

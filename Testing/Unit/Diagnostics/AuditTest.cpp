@@ -2,6 +2,7 @@
 
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
@@ -386,13 +387,8 @@ TEST(Audit, FindsNoFaultInCorrectFrames) {
 }
 
 TEST(Audit, RefusesANegativeSample) {
-  try {
-    OctreeBasedCD({.audit = {.features = -1}});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-    EXPECT_NE(std::string(error.what()).find("audit.features is -1"), std::string::npos);
-  }
+  testing::expectRefused(ErrorCode::InvalidSettings, "audit.features is -1",
+                         [] { OctreeBasedCD({.audit = {.features = -1}}); });
 }
 
 /// Several triangle pairs may find the same contact of Intersection. One of them is in the sample,

@@ -1,61 +1,15 @@
 // Files that are made to take much memory or time.
-#include "Common/FailingAllocation.h"
-
-#include <palpate/Error.h>
-#include <palpate/MeshFiles.h>
-
-#include <gtest/gtest.h>
+#include "MeshFileFixture.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace palpate::testing {
 namespace {
-
-namespace fs = std::filesystem;
-
-std::string repeated(const std::string& text, std::size_t bytes) {
-  std::string all;
-  while (all.size() < bytes) all += text;
-  return all;
-}
-
-template <class T>
-std::string bytes(T value) {
-  std::string text(sizeof value, '\0');
-  std::memcpy(text.data(), &value, sizeof value);
-  return text;
-}
-
-struct Outcome {
-  std::size_t size;     ///< of the file
-  std::size_t peak;     ///< bytes that reading it took at once
-  std::string refusal;  ///< empty if it was read
-};
-
-Outcome readFile(const std::string& name, const std::string& content) {
-  const fs::path path = fs::path(::testing::TempDir()) / ("hostile-" + name);
-  std::ofstream(path, std::ios::binary) << content;
-  Outcome outcome{content.size(), 0, ""};
-  FailingAllocation::arm(0);
-  try {
-    readMeshFile(path);
-  } catch (const Error& error) {
-    FailingAllocation::disarm();
-    outcome.refusal = error.what();
-  }
-  FailingAllocation::disarm();
-  outcome.peak = FailingAllocation::peakBytes();
-  fs::remove(path);
-  return outcome;
-}
 
 constexpr std::size_t kSize = 400'000;
 
@@ -177,12 +131,12 @@ std::vector<std::pair<std::string, std::string>> hostileFiles() {
 
 TEST(HostileFiles, TakeAtMostTwentyTimesTheirSize) {
   for (const auto& [name, content] : hostileFiles()) {
-    const Outcome outcome = readFile(name, content);
-    EXPECT_LE(outcome.peak, 20 * outcome.size + 1'000'000) << name << " " << outcome.refusal;
+    const ReadOutcome outcome = outcomeOf("hostile-" + name, content);
+    EXPECT_LE(outcome.peak, 20 * content.size() + 1'000'000) << name << " " << outcome.refusal;
     EXPECT_LT(outcome.refusal.size(), 500u) << name;
     if (::testing::Test::HasFailure() || std::getenv("PALPATE_SHOW"))
       std::printf("%s: %.1f times, %s\n", name.c_str(),
-                  static_cast<double>(outcome.peak) / static_cast<double>(outcome.size),
+                  static_cast<double>(outcome.peak) / static_cast<double>(content.size()),
                   outcome.refusal.c_str());
   }
 }

@@ -3,6 +3,8 @@
 #include <palpate/Error.h>
 #include <palpate/MeshFiles.h>
 
+#include "Common/FailingAllocation.h"
+
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -27,6 +29,36 @@ inline std::string replaced(std::string text, const std::string& from, const std
   const std::size_t at = text.rfind(from);
   EXPECT_NE(at, std::string::npos) << from;
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+inline std::string repeated(const std::string& text, std::size_t bytes) {
+  std::string all;
+  while (all.size() < bytes) all += text;
+  return all;
+}
+
+/// What reading a file took.
+struct ReadOutcome {
+  MeshArrays mesh;
+  std::string refusal;   ///< empty if it was read
+  std::size_t peak = 0;  ///< bytes at once
+};
+
+inline ReadOutcome outcomeOf(const std::string& name, const std::string& content) {
+  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / name;
+  std::ofstream(path, std::ios::binary) << content;
+  ReadOutcome outcome;
+  FailingAllocation::arm(0);
+  try {
+    outcome.mesh = readMeshFile(path);
+  } catch (const Error& error) {
+    FailingAllocation::disarm();
+    outcome.refusal = error.what();
+  }
+  FailingAllocation::disarm();
+  outcome.peak = FailingAllocation::peakBytes();
+  std::filesystem::remove(path);
+  return outcome;
 }
 
 /// A folder for the files of one test.
