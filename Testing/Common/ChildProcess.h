@@ -3,7 +3,6 @@
 #include "Common/Sanitized.h"
 
 #include <csignal>
-#include <cstdlib>
 #include <functional>
 #include <string>
 #include <sys/wait.h>

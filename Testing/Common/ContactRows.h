@@ -16,6 +16,21 @@
 
 namespace palpate::testing {
 
+/// f(contact) for each contact of two geometries with vertices.
+template <class F>
+void forEachContact(const CollisionData& data, F&& f) {
+  for (const auto& c : data.vertexTriangle()) f(c);
+  for (const auto& c : data.triangleVertex()) f(c);
+  for (const auto& c : data.edgeEdge()) f(c);
+}
+
+/// L: the least distance of these contacts, or `least`.
+inline double leastDistance(const CollisionData& data,
+                            double least = std::numeric_limits<double>::infinity()) {
+  forEachContact(data, [&](const auto& c) { least = std::min(least, c.distance); });
+  return least;
+}
+
 /// A contact as words: its ids, then the bits of every number.
 using Row = std::vector<std::uint64_t>;
 

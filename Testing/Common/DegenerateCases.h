@@ -2,9 +2,7 @@
 
 #include "Common/RandomMeshes.h"
 
-#include <cmath>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace palpate::testing {

@@ -2,7 +2,6 @@
 
 #include "Common/RandomMeshes.h"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <string>

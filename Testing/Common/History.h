@@ -8,14 +8,10 @@
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 
-#include <Eigen/Geometry>
-
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <span>
-#include <string>
-#include <utility>
 #include <vector>
 
 namespace palpate::testing {

@@ -6,7 +6,6 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
-#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -37,14 +36,18 @@ inline std::string nameOf(const Settings& settings) {
          (settings.octree.update == OctreeUpdate::Auto ? "Auto" : "Rebuild");
 }
 
+/// Engine: OctreeBasedCD, or FCL behind the same calls. Any mesh with positions and triangles.
+template <class Engine, class AnyMesh>
+GeometryId addMesh(Engine& engine, const AnyMesh& mesh) {
+  return engine.addTriangleMesh(mesh.positions, mesh.triangles);
+}
+
 /// Two meshes in one engine: against each other and, unless they are large, each with itself.
 class PairRun {
  public:
   PairRun(const Settings& settings, const Mesh& a, const Mesh& b, const PairSettings& pair,
           bool withThemselves = true)
-      : m_detection(settings),
-        m_a(m_detection.addTriangleMesh(a.positions, a.triangles)),
-        m_b(m_detection.addTriangleMesh(b.positions, b.triangles)) {
+      : m_detection(settings), m_a(addMesh(m_detection, a)), m_b(addMesh(m_detection, b)) {
     m_detection.addCollisionPair(m_a, m_b, pair);
     if (!withThemselves) return;
     m_detection.addCollisionPair(m_a, m_a, pair);

@@ -84,7 +84,7 @@ TEST(FclEngine, ShapesMatchHandComputedValues) {
     FclEngine engine;
     const GeometryId first = engine.addAnalyticalGeometry(a),
                      second = engine.addAnalyticalGeometry(b);
-    engine.setTransform(second, {Matrix3d::Identity(), {0, 0, -1}});
+    engine.setTransform(second, {.translation = {0, 0, -1}});
     engine.addCollisionPair(first, second, {Method::Proximity, thickness});
     engine.detectCollision();
     const auto contacts = engine.collisionData(first, second).shapeShape();

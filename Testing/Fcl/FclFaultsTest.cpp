@@ -18,7 +18,6 @@
 #include <array>
 #include <cmath>
 #include <csignal>
-#include <limits>
 #include <set>
 #include <utility>
 

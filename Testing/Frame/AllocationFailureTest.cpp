@@ -10,7 +10,6 @@
 #include "Common/Sanitized.h"
 #include "Common/WholeScene.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -416,7 +415,7 @@ TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUncha
 TEST(AllocationFailureWhileAppendingOrCapturing, CaptureLeavesNoPartialFile) {
   const Mesh mesh = sheet(2, 0.0, 0.0);
   OctreeBasedCD collisions;
-  collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  addMesh(collisions, mesh);
   const auto folder = std::filesystem::temp_directory_path() / "palpate-capture-failures";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directory(folder);

@@ -96,7 +96,7 @@ class BodyScene {
       case Kind::Radii:
         other = m_detection.addLineMesh(start.other, segments, radii);
     }
-    m_body = m_detection.addTriangleMesh(body.mesh.positions, body.mesh.triangles);
+    m_body = addMesh(m_detection, body.mesh);
     m_detection.attachDistanceField(m_body, body.field);
     m_detection.setTransform(m_body, {start.rotation, start.translation});
     if (isBodyFirst)
@@ -212,10 +212,7 @@ void expectAllRepresented(const CollisionData& data, const CollisionData& truth)
 
 std::size_t impactsOf(const CollisionData& data) {
   std::size_t impacts = data.intersectingTriangles().size();
-  const auto count = [&](const auto& list) {
-    for (const auto& c : list) impacts += c.timeOfImpact < 1.0;
-  };
-  count(data.vertexTriangle()), count(data.triangleVertex()), count(data.edgeEdge());
+  forEachContact(data, [&](const auto& c) { impacts += c.timeOfImpact < 1.0; });
   return impacts;
 }
 
@@ -353,7 +350,7 @@ TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
         OctreeBasedCD detection(settingsOf(Engine::Octree));
         const GeometryId triangle =
                              detection.addTriangleMesh(now.other, std::vector<Triangle>{{0, 1, 2}}),
-                         body = detection.addTriangleMesh(box.mesh.positions, box.mesh.triangles);
+                         body = addMesh(detection, box.mesh);
         detection.attachDistanceField(body, box.field);
         PairSettings pair = pairOf(kErrorBound);
         pair.automatic.motionTolerance = 0.06;
@@ -385,8 +382,7 @@ TEST(AllowedError, FieldsDoNotAnswerInsideNorOneSidedGeometries) {
     Points before = small.positions, now = small.positions;
     for (Vector3d& p : before) p.x() += x;
     for (Vector3d& p : now) p.x() += x + 1e-3;
-    const GeometryId other = detection.addTriangleMesh(small.positions, small.triangles),
-                     body = detection.addTriangleMesh(box.mesh.positions, box.mesh.triangles);
+    const GeometryId other = addMesh(detection, small), body = addMesh(detection, box.mesh);
     detection.attachDistanceField(body, box.field);
     if (isOneSided) detection.setCollisionFilter(other, {.sidedness = Sidedness::Outer});
     detection.addCollisionPair(other, body, pairOf(kErrorBound));
@@ -525,7 +521,7 @@ struct CloudScene {
     if (hasRadii) radii[3] = 0.5 * kParticle;
     smoke = hasRadii ? detection.addPointSet(cloud.now().other, radii)
                      : detection.addPointSet(cloud.now().other, kParticle);
-    body = detection.addTriangleMesh(mesh.positions, mesh.triangles);
+    body = addMesh(detection, mesh);
     detection.attachSurfaceProxy(
         body,
         SurfaceProxySettings{.reach = 0.1, .errorBound = kProxyError, .widestNormalCone = 0.6});

@@ -45,7 +45,7 @@ class Simulation {
     m_x.insert(m_x.end(), bodies.b.positions.begin(), bodies.b.positions.end());
     for (const bool ofA : {true, false}) {
       const Mesh& mesh = ofA ? bodies.a : bodies.b;
-      (ofA ? m_a : m_b) = m_collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+      (ofA ? m_a : m_b) = addMesh(m_collisions, mesh);
     }
     PairSettings settings;
     settings.thickness = 0.05;
@@ -128,8 +128,7 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
     std::array<Rows, 2> rows;
     for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
       OctreeBasedCD collisions(settingsOf(engine));
-      const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
-                       b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
+      const GeometryId a = addMesh(collisions, bodies.a), b = addMesh(collisions, bodies.b);
       PairSettings settings;
       settings.thickness = 0.05;
       collisions.addCollisionPair(a, b, settings);
@@ -193,11 +192,8 @@ TEST(BodyContacts, TheDeepestFeatureHasAContact) {
       }
       collisions.addCollisionPair(ids[0], ids[1], {.thickness = 0.05});
       collisions.detectCollision();
-      const CollisionData& data = collisions.collisionData(ids[0], ids[1]);
-      double& least = (areTurned ? ofTurned : ofMoved) = 0;
-      for (const auto& c : data.vertexTriangle()) least = std::min(least, c.distance);
-      for (const auto& c : data.triangleVertex()) least = std::min(least, c.distance);
-      for (const auto& c : data.edgeEdge()) least = std::min(least, c.distance);
+      (areTurned ? ofTurned : ofMoved) =
+          leastDistance(collisions.collisionData(ids[0], ids[1]), 0.0);
     }
     EXPECT_NEAR(ofTurned, ofMoved, 1e-12 * far + 1e-9) << repeat;
     deep += ofMoved < -0.1;
@@ -212,8 +208,7 @@ TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
     Mesh unit = boxMesh({0, 0, 0}, {1, 1, 1});
     if (isOpen) unit.triangles.erase(unit.triangles.begin()), tip.positions.back()[2] -= 0.2;
     OctreeBasedCD collisions;
-    const GeometryId a = collisions.addTriangleMesh(tip.positions, tip.triangles),
-                     b = collisions.addTriangleMesh(unit.positions, unit.triangles);
+    const GeometryId a = addMesh(collisions, tip), b = addMesh(collisions, unit);
     PairSettings settings;
     settings.thickness = 0.05;
     collisions.addCollisionPair(a, b, settings);

@@ -11,7 +11,6 @@
 #include <limits>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 // The law of contacts: with the positions at a contact's timeOfImpact, the weighted sum of the

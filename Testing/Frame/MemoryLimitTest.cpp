@@ -241,7 +241,7 @@ TEST(MemoryUse, SpareMemoryIsGivenBackFirst) {
   const Mesh a = fan(100, 0), b = fan(100, 1);
   const auto frames = [&](std::size_t limit, std::size_t& least, std::size_t& most) {
     OctreeBasedCD detection(limited(1, limit));
-    const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles);
+    const GeometryId first = addMesh(detection, a);
     std::vector<GeometryId> others;
     Positions away = b.positions;
     for (Vector3d& p : away) p[2] += 100;

@@ -105,7 +105,7 @@ struct Detection {
             const Settings& settings)
       : detection(settings) {
     smoke = detection.addPointSet(points, radii);
-    body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+    body = addMesh(detection, scene.body);
     if (scene.isPlaced) detection.setTransform(body, {scene.rotation, scene.translation});
     detection.addCollisionPair(smoke, body, pairOf(scene));
     detection.detectCollision();
@@ -221,7 +221,7 @@ TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
   const Vector3d shift(3, 4, 5);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId smoke = detection.addPointSet(points, 0.01),
-                   body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+                   body = addMesh(detection, scene.body);
   const PairSettings pair{.method = Method::Proxy, .thickness = 0.05, .allowedError = 0.01};
   detection.addCollisionPair(smoke, body, pair);
   detection.detectCollision();
@@ -262,8 +262,7 @@ TEST(Proxy, AnOpenMeshWithAnOuterSideHasContactsInFrontOnly) {
   const Scene scene = scenes()[5];
   const Points points = particlesAround(random, scene, 1000);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId smoke = detection.addPointSet(points),
-                   body = detection.addTriangleMesh(scene.body.positions, scene.body.triangles);
+  const GeometryId smoke = detection.addPointSet(points), body = addMesh(detection, scene.body);
   detection.addCollisionPair(smoke, body,
                              {.method = Method::Proxy, .thickness = 0.03, .allowedError = 2e-3});
   const auto countBelow = [&] {
@@ -391,7 +390,7 @@ TEST(Proxy, IsRefusedWhereItHasNoMeaning) {
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const Mesh ball = sphere(8, 12, Vector3d::Zero(), 1.0);
   const std::vector<Segment> segments{{0, 1}};
-  const GeometryId body = detection.addTriangleMesh(ball.positions, ball.triangles),
+  const GeometryId body = addMesh(detection, ball),
                    points = detection.addPointSet(ball.positions, 0.01),
                    lines = detection.addLineMesh(ball.positions, segments, 0.01),
                    shape = detection.addAnalyticalGeometry(Sphere{});

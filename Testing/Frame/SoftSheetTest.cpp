@@ -4,12 +4,10 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/OctreeBasedCD.h>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <vector>
 
 // A tool that is pressed into a soft sheet and drawn over it. The sheet begins flat, where Distinct
@@ -37,8 +35,7 @@ class Press {
 
   /// L: the distance after the step. At most eight rounds meet all rows.
   double step(const Vector3d& at) {
-    const RigidMotion motion{{Eigen::Matrix3d::Identity(), m_at},
-                             {Eigen::Matrix3d::Identity(), at}};
+    const RigidMotion motion{{.translation = m_at}, {.translation = at}};
     m_at = at;
     for (int round = 0; round < 8; ++round) {
       set();
@@ -60,7 +57,7 @@ class Press {
     m_collisions.advance();
     m_before = m_sheet.positions;
     m_truth.setPositions(m_truthBody, m_sheet.positions);
-    m_truth.setTransform(m_truthTool, {Eigen::Matrix3d::Identity(), at});
+    m_truth.setTransform(m_truthTool, {.translation = at});
     m_truth.detectCollision();
     double least = 5 * kPressThickness;
     for (const ShapeContact& c : m_truth.collisionData(m_truthBody, m_truthTool).shape())
@@ -73,7 +70,7 @@ class Press {
 
   void set() {
     m_collisions.setPositions(m_body, m_sheet.positions);
-    m_collisions.setTransform(m_tool, {Eigen::Matrix3d::Identity(), m_at});
+    m_collisions.setTransform(m_tool, {.translation = m_at});
   }
   bool isFixed(std::uint32_t v) const {
     const Vector3d& p = m_rest[v];

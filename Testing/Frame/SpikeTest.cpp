@@ -1,10 +1,9 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/OctreeBasedCD.h>
 
-#include "Common/RandomMeshes.h"
+#include "Common/DegenerateCases.h"
 #include "Common/Sanitized.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -62,15 +61,8 @@ Mesh rings(std::uint32_t valence, Random& random, double bumps) {
 
 /// Vertex i + 5 j at (i, j), for 0 <= i, j <= 4.
 Mesh square(Random& random, double bumps) {
-  Mesh mesh;
-  for (std::uint32_t j = 0; j < 5; ++j)
-    for (std::uint32_t i = 0; i < 5; ++i) {
-      mesh.positions.emplace_back(i, j, uniform(random, -bumps, bumps));
-      const std::uint32_t v = 5 * j + i;
-      if (i == 4 || j == 4) continue;
-      mesh.triangles.push_back({v, v + 1, v + 6});
-      mesh.triangles.push_back({v, v + 6, v + 5});
-    }
+  Mesh mesh = moved(flat(4, 0), {0, 0, 0}, 4);
+  for (Vector3d& p : mesh.positions) p.z() = uniform(random, -bumps, bumps);
   return mesh;
 }
 

@@ -110,16 +110,11 @@ class Scene {
 };
 
 void expectGoodNumbers(const CollisionData& data) {
-  const auto expectGood = [](const auto& contacts) {
-    for (const auto& c : contacts) {
-      EXPECT_NEAR(c.normal.norm(), 1, 1e-14);
-      EXPECT_TRUE(std::isfinite(c.distance));
-      EXPECT_TRUE(c.timeOfImpact >= 0 && c.timeOfImpact <= 1);
-    }
-  };
-  expectGood(data.vertexTriangle());
-  expectGood(data.triangleVertex());
-  expectGood(data.edgeEdge());
+  forEachContact(data, [](const auto& c) {
+    EXPECT_NEAR(c.normal.norm(), 1, 1e-14);
+    EXPECT_TRUE(std::isfinite(c.distance));
+    EXPECT_TRUE(c.timeOfImpact >= 0 && c.timeOfImpact <= 1);
+  });
 }
 
 /// Returns the number of contacts.
@@ -139,8 +134,7 @@ std::size_t compare(std::uint64_t seed) {
                least = oracle.candidatePairs(pair.a, pair.b);
     EXPECT_TRUE(std::includes(candidates.begin(), candidates.end(), least.begin(), least.end()));
     expectGoodNumbers(truth);
-    contacts +=
-        truth.vertexTriangle().size() + truth.triangleVertex().size() + truth.edgeEdge().size();
+    contacts += Rows(truth).contacts();
   }
   return contacts;
 }
@@ -171,8 +165,7 @@ TEST(WholeRange, FeaturesThatAreTestedFollowTheAnswer) {
   }
   for (const Method method : {Method::Intersection, Method::Continuous}) {
     OctreeBasedCD collisions(settingsOf(Engine::Octree));
-    const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                     b = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+    const GeometryId a = addMesh(collisions, mesh), b = addMesh(collisions, mesh);
     collisions.addCollisionPair(a, b, {.method = method});
     collisions.addCollisionPair(a, a, {.method = method});
     collisions.detectCollision();

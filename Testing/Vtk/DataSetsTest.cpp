@@ -13,7 +13,6 @@
 #include <vtkUnstructuredGrid.h>
 
 #include <limits>
-#include <string>
 
 namespace palpate::vtk {
 namespace {

@@ -7,9 +7,7 @@
 
 #include <functional>
 #include <limits>
-#include <memory>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 

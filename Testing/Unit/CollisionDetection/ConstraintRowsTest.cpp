@@ -324,11 +324,7 @@ TEST(ConstraintRows, RowsOfImpactsHaveTheirGapWhereFeaturesTouch) {
       const Rowed found = rowed(triangles, sheets, {method, thickness, Contacts::All}, now);
       EXPECT_GT(found.rows.size(), 20u);
       std::vector<double> times;
-      const auto add = [&](const auto& contacts) {
-        for (const auto& contact : contacts) times.push_back(contact.timeOfImpact);
-      };
-      add(found.contacts.vertexTriangle()), add(found.contacts.triangleVertex());
-      add(found.contacts.edgeEdge());
+      forEachContact(found.contacts, [&](const auto& c) { times.push_back(c.timeOfImpact); });
       for (std::size_t r = 0; r < found.rows.size(); ++r) {
         Positions there = before;
         for (std::size_t i = 0; i < there.size(); ++i)

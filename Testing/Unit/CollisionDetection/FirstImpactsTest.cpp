@@ -458,7 +458,7 @@ TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
       for (Eigen::Vector3d& p : before) p += Eigen::Vector3d(along, 0, time);
       for (Eigen::Vector3d& p : now) p += Eigen::Vector3d(along, 0, time - 1);
       OctreeBasedCD collisions;
-      const GeometryId a = collisions.addTriangleMesh(floor.positions, floor.triangles),
+      const GeometryId a = addMesh(collisions, floor),
                        b = collisions.addTriangleMesh(before, above.triangles);
       collisions.addCollisionPair(a, b, {.method = Method::Continuous});
       collisions.setPositions(b, before, now);

@@ -421,8 +421,7 @@ TEST(FreeMotion, IsTheSameForAllEnginesAndThreads) {
 TEST(FreeMotion, FollowsPairsFiltersAndElements) {
   const Mesh low = flat(4, 0.0), high = flat(4, 0.5);
   OctreeBasedCD collisions;
-  const GeometryId a = collisions.addTriangleMesh(low.positions, low.triangles),
-                   b = collisions.addTriangleMesh(high.positions, high.triangles),
+  const GeometryId a = addMesh(collisions, low), b = addMesh(collisions, high),
                    alone = collisions.addPointSet(low.positions, 0.1),
                    sphere = collisions.addAnalyticalGeometry(Sphere{{0.5, 0.5, 0.8}, 0.1});
   int calls = 0;
@@ -485,8 +484,7 @@ TEST(FreeMotion, FollowsPairsFiltersAndElements) {
 TEST(FreeMotion, IsZeroWhereFeaturesTouchAndPositiveInContact) {
   Mesh low = flat(4, 0.0), high = low;
   OctreeBasedCD collisions;
-  const GeometryId a = collisions.addTriangleMesh(low.positions, low.triangles),
-                   b = collisions.addTriangleMesh(high.positions, high.triangles);
+  const GeometryId a = addMesh(collisions, low), b = addMesh(collisions, high);
   collisions.addCollisionPair(a, b, {.thickness = 0.1, .freeMotionReach = 1.0});
   collisions.detectCollision();
   for (const double free : collisions.freeMotion(a)) EXPECT_EQ(free, 0.0);
@@ -503,8 +501,7 @@ TEST(FreeMotion, IsZeroWhereFeaturesTouchAndPositiveInContact) {
 TEST(FreeMotion, RefusesWhatItCannotDo) {
   OctreeBasedCD collisions;
   const Mesh mesh = sheet(2, 0, 0);
-  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                   b = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const GeometryId a = addMesh(collisions, mesh), b = addMesh(collisions, mesh);
   for (const double bad : {-1.0, kInfinity, std::nan("")})
     expectRefused(ErrorCode::InvalidSettings, "freeMotionReach is",
                   [&] { collisions.addCollisionPair(a, b, {.freeMotionReach = bad}); });

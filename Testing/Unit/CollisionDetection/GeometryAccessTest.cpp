@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <string>
 #include <vector>
 
 // Functions that read the geometries and pairs of an OctreeBasedCD.
@@ -26,8 +25,7 @@ TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
   OctreeBasedCD collisions;
   EXPECT_FALSE(collisions.has(GeometryId{0}));
   const Mesh mesh = sheet(2, 0.5, 0.0);
-  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                   b = collisions.addAnalyticalGeometry(Sphere{});
+  const GeometryId a = addMesh(collisions, mesh), b = collisions.addAnalyticalGeometry(Sphere{});
   EXPECT_TRUE(collisions.has(a) && collisions.has(b));
   collisions.addCollisionPair(a, b);
   collisions.removeGeometry(a);
@@ -35,7 +33,7 @@ TEST(GeometryAccess, ContainsWhatWasAddedAndNotRemoved) {
   EXPECT_TRUE(collisions.has(b));
   EXPECT_TRUE(collisions.pairs().empty());
   EXPECT_FALSE(collisions.has(GeometryId{7}));
-  EXPECT_GT(collisions.addTriangleMesh(mesh.positions, mesh.triangles), b);  // no id is reused
+  EXPECT_GT(addMesh(collisions, mesh), b);  // no id is reused
   expectRefused(ErrorCode::UnknownGeometry, "geometry 0 was removed",
                 [&] { (void)collisions.vertexCount(a); });
 }
@@ -44,7 +42,7 @@ TEST(GeometryAccess, PositionsAreTheCurrentOnes) {
   Random random(1);
   OctreeBasedCD collisions;
   const Mesh mesh = sheet(3, 0.5, 0.1);
-  const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const GeometryId id = addMesh(collisions, mesh);
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   const Positions next = moved(random, mesh.positions, 0.1);
   collisions.setPositions(id, next);
@@ -52,7 +50,7 @@ TEST(GeometryAccess, PositionsAreTheCurrentOnes) {
   collisions.setPositions(id, next, mesh.positions);
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   // Positions of a placed body are in its own frame.
-  collisions.setTransform(id, {Eigen::Matrix3d::Identity(), {1, 2, 3}});
+  collisions.setTransform(id, {.translation = {1, 2, 3}});
   EXPECT_EQ(copyOf(collisions.positions(id)), mesh.positions);
   EXPECT_EQ(collisions.vertexCount(id), mesh.positions.size());
   const Positions two{{0, 0, 0}, {1, 0, 0}};
@@ -131,8 +129,7 @@ TEST(GeometryAccess, BoundsOfShapesAreTight) {
 TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
   OctreeBasedCD collisions;
   const Mesh mesh = sheet(2, 0.5, 0.0);
-  const GeometryId a = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                   b = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+  const GeometryId a = addMesh(collisions, mesh), b = addMesh(collisions, mesh);
   expectRefused(ErrorCode::UnknownPair, "(0, 1)", [&] { (void)collisions.pairSettings(a, b); });
   collisions.addCollisionPair(a, b, {Method::Proximity, 0.5});
   EXPECT_EQ(collisions.pairSettings(a, b).thickness, 0.5);
@@ -150,8 +147,7 @@ TEST(GeometryAccess, PairSettingsAreTheLastOnes) {
 TEST(GeometryAccess, VerticesOfDisabledElementsAreFoundInABody) {
   const Mesh inner = sphere(3, 4, {0.5, 0.5, 0.5}, 0.1), outer = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
   OctreeBasedCD collisions;
-  const GeometryId vertices = collisions.addTriangleMesh(inner.positions, inner.triangles),
-                   body = collisions.addTriangleMesh(outer.positions, outer.triangles);
+  const GeometryId vertices = addMesh(collisions, inner), body = addMesh(collisions, outer);
   const std::size_t count = testing::insideVertices(collisions, vertices, body).size();
   EXPECT_EQ(count, inner.positions.size());
   std::vector<std::uint32_t> all(inner.triangles.size());
@@ -164,7 +160,7 @@ TEST(GeometryAccess, ShapesHaveNoVertices) {
   OctreeBasedCD collisions;
   const Mesh ball = sphere(6, 8, {0.5, 0.5, 0.5}, 0.4);
   const GeometryId shape = collisions.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.1, 0.1, 0.1}}),
-                   body = collisions.addTriangleMesh(ball.positions, ball.triangles);
+                   body = addMesh(collisions, ball);
   const auto refuse = [&](auto&& call) {
     expectRefused(ErrorCode::UnsupportedMethod, "geometry 0 is a shape, which has no vertices",
                   call);

@@ -1,6 +1,7 @@
 #include <palpate/Meshes.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/DegenerateCases.h"
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <vector>
 
 // Meshes as they come from files: triangles with vertices of their own, parts, and windings.
@@ -19,16 +19,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Each triangle with three vertices of its own.
-Mesh soupOf(const Mesh& mesh) {
-  Mesh soup;
-  for (const Triangle& t : mesh.triangles) {
-    const auto first = static_cast<std::uint32_t>(soup.positions.size());
-    for (const std::uint32_t v : t) soup.positions.push_back(mesh.positions[v]);
-    soup.triangles.push_back({first, first + 1, first + 2});
-  }
-  return soup;
-}
 void flip(Mesh& mesh) {
   for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
 }
@@ -45,7 +35,7 @@ std::size_t selfContacts(const std::vector<Vector3d>& positions,
 }
 
 TEST(Weld, JoinsTheTrianglesOfABody) {
-  const Mesh ball = sphere(8, 10, {1, 2, 3}, 1), soup = soupOf(ball);
+  const Mesh ball = sphere(8, 10, {1, 2, 3}, 1), soup = unwelded(ball);
   EXPECT_TRUE(findMeshDefects(soup.triangles).unwelded);
   EXPECT_GT(selfContacts(soup.positions, soup.triangles), 0u);
   const Welded welded = weld(soup.positions, soup.triangles);
@@ -116,7 +106,7 @@ TEST(MeshDefects, FindUnweldedTriangles) {
   EXPECT_FALSE(findMeshDefects(std::vector<Triangle>{{0, 1, 2}, {2, 4, 5}}).unwelded);
   EXPECT_FALSE(findMeshDefects(std::vector<Triangle>{{0, 1, 2}, {3, 3, 5}}).unwelded);
 
-  const Mesh soup = soupOf(boxMesh({0, 0, 0}, {20, 20, 20}));
+  const Mesh soup = unwelded(boxMesh({0, 0, 0}, {20, 20, 20}));
   OctreeBasedCD collisions;
   const GeometryId id = collisions.addTriangleMesh(soup.positions, soup.triangles);
   expectRefused(ErrorCode::NotClosed, "no two triangles share a vertex",
@@ -156,7 +146,7 @@ TEST(MeshDefects, FindPartsThatOverlap) {
     EXPECT_EQ(pair.a / count, 1u);
     EXPECT_EQ(pair.b / count, 2u);
   }
-  Mesh soup = soupOf(body);
+  Mesh soup = unwelded(body);
   EXPECT_TRUE(defectsOf(soup).unwelded);
   EXPECT_TRUE(defectsOf(soup).overlapping.empty());
   soup.positions[7].x() = std::nan("");

@@ -4,12 +4,10 @@
 
 #include "Common/RandomMeshes.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>

@@ -313,13 +313,8 @@ TEST(Rigid, ContactsBeginAtTheSameThickness) {
                       [](const CollisionData& data) { return Rows(data); });
         };
         const double first =
-            with(settingsOf(Engine::BruteForce), 1.0, true, [](const CollisionData& data) {
-              double least = 1.0;
-              for (const auto& c : data.vertexTriangle()) least = std::min(least, c.distance);
-              for (const auto& c : data.triangleVertex()) least = std::min(least, c.distance);
-              for (const auto& c : data.edgeEdge()) least = std::min(least, c.distance);
-              return least;
-            });
+            with(settingsOf(Engine::BruteForce), 1.0, true,
+                 [](const CollisionData& data) { return leastDistance(data, 1.0); });
         for (const double thickness :
              {std::nextafter(first, 0.0), first, std::nextafter(first, 9.0)}) {
           const Rows truth = rowsOf(settingsOf(Engine::BruteForce), thickness, false);
@@ -469,7 +464,7 @@ TEST(Rigid, BoundsReduceCandidates) {
       collisions.addCollisionPair(a, b, {Method::Proximity, 0.05});
       // The octrees exist before the bodies are placed.
       collisions.detectCollision();
-      collisions.setTransform(a, {Matrix3d::Identity(), Vector3d::Zero()});
+      collisions.setTransform(a, {});
       collisions.setTransform(b, {Matrix3d::Identity(), skew * Vector3d(2.01, 0, 0.3)});
       collisions.detectCollision();
       rows.emplace_back(collisions.collisionData(a, b));
@@ -523,7 +518,7 @@ TEST(Rigid, OctreeIsNotUpdated) {
   OctreeBasedCD collisions(settingsOf(Engine::Octree, 1, OctreeUpdate::Rebuild));
   const GeometryId body = bone.addTo(collisions), other = organ.addTo(collisions);
   collisions.addCollisionPair(body, other, {Method::Continuous, 0.0});
-  collisions.setTransform(body, {Matrix3d::Identity(), {0, 0, 0}});
+  collisions.setTransform(body, {});
   collisions.detectCollision();
   const auto boxes = [&] {
     std::vector<Vector3d> all;

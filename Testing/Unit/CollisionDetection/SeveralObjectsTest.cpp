@@ -20,8 +20,7 @@ std::vector<std::uint64_t> framesOf(const Settings& settings, std::uint64_t seed
   Random random(seed);
   const Mesh a = soup(random, 150, 0.1), b = soup(random, 150, 0.1);
   OctreeBasedCD detection(settings);
-  const GeometryId idA = detection.addTriangleMesh(a.positions, a.triangles),
-                   idB = detection.addTriangleMesh(b.positions, b.triangles);
+  const GeometryId idA = addMesh(detection, a), idB = addMesh(detection, b);
   detection.addCollisionPair(idA, idB, {.thickness = 0.01});
   detection.addCollisionPair(idA, idA, {.method = Method::Proximity, .thickness = 0.01});
   std::vector<std::uint64_t> hashes;
@@ -73,8 +72,8 @@ TEST(SeveralObjects, AnswerConstFunctionsInManyThreads) {
   Random random(3);
   const Mesh a = soup(random, 300, 0.2), b = soup(random, 300, 0.2);
   OctreeBasedCD engine(settingsOf(Engine::Octree, 2));
-  const GeometryId idA = engine.addTriangleMesh(a.positions, a.triangles);
-  const GeometryId idB = engine.addTriangleMesh(b.positions, b.triangles);
+  const GeometryId idA = addMesh(engine, a);
+  const GeometryId idB = addMesh(engine, b);
   engine.addCollisionPair(idA, idB, {.thickness = 0.01});
   std::vector<Eigen::Vector3d> now = b.positions;
   for (int frame = 0; frame < 10; ++frame) {

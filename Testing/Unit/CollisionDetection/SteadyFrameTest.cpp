@@ -63,8 +63,7 @@ LastPass lastPass(const scenes::Scene& scene, const Settings& settings,
   LastPass result;
   OctreeBasedCD detection(settings);
   std::vector<GeometryId> ids;
-  for (const auto& mesh : scene.meshes)
-    ids.push_back(detection.addTriangleMesh(mesh.positions, mesh.triangles));
+  for (const auto& mesh : scene.meshes) ids.push_back(testing::addMesh(detection, mesh));
   for (const auto& [a, b] : scene.pairs) detection.addCollisionPair(ids[a], ids[b], pairSettings);
   std::vector<Eigen::Vector3d> positions;
   for (int frame = 0; frame < 3 * scene.frames; ++frame) {
@@ -108,8 +107,8 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
                                MethodReason::Cheapest}));
 }
 
-/// Every two bodies that a row of the table of support answers, in one object. Steps of two sizes take
-/// turns.
+/// Every two bodies that a row of the table of support answers, in one object. Steps of two sizes
+/// take turns.
 TEST(SteadyFrame, AllocatesNothingForAnyRowOfTheTable) {
   const IntegersApart apart;
   for (std::size_t number = 0; number < std::size(kSupport); ++number)
@@ -160,9 +159,9 @@ TEST(SteadyFrame, AllocatesNothingWithSnapshots) {
   const IntegersApart integers;
   const Mesh ball = sphere(12, 16, {0, 0, 0}, 1), toolMesh = sphere(5, 6, {0, 0, 0}, 0.2);
   OctreeBasedCD collisions(Settings{.threads = 1});
-  const GeometryId organ = collisions.addTriangleMesh(ball.positions, ball.triangles),
-                   still = collisions.addTriangleMesh(ball.positions, ball.triangles),
-                   rigid = collisions.addTriangleMesh(ball.positions, ball.triangles),
+  const GeometryId organ = testing::addMesh(collisions, ball),
+                   still = testing::addMesh(collisions, ball),
+                   rigid = testing::addMesh(collisions, ball),
                    shape = collisions.addAnalyticalGeometry(
                        ConvexHull{{{-0.2, 0, -0.1}, {0.3, 0, -0.1}, {0, 0.3, 0}, {0, 0.1, 0.3}}});
   RigidMesh tool(toolMesh.positions, toolMesh.triangles);
@@ -271,8 +270,7 @@ TEST(SteadyFrame, AllocatesNothingInAGuard) {
   const testing::Mesh body = testing::sphere(12, 16, {0.51, 0.47, 0.53}, 0.3),
                       floor = testing::sheet(12, 0.5, 0.3);
   OctreeBasedCD collisions({.threads = 1});
-  const GeometryId a = collisions.addTriangleMesh(body.positions, body.triangles),
-                   b = collisions.addTriangleMesh(floor.positions, floor.triangles);
+  const GeometryId a = testing::addMesh(collisions, body), b = testing::addMesh(collisions, floor);
   collisions.addCollisionPair(a, b);
   collisions.addCollisionPair(b, b);
   StepGuard guard(collisions);

@@ -10,9 +10,7 @@
 
 #include <Eigen/Geometry>
 
-#include <cmath>
 #include <limits>
-#include <numeric>
 
 namespace palpate::testing {
 namespace {
@@ -337,14 +335,12 @@ TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
   all.pairs.push_back({0, 1});
   constexpr double kWanted = 0.01, kRate = 0.01;
   OctreeBasedCD collisions(settingsOf(Engine::Octree));
-  const GeometryId cloth =
-                       collisions.addTriangleMesh(all.bodies[0].positions, all.bodies[0].triangles),
-                   tool =
-                       collisions.addTriangleMesh(all.bodies[1].positions, all.bodies[1].triangles);
+  const GeometryId cloth = addMesh(collisions, all.bodies[0]),
+                   tool = addMesh(collisions, all.bodies[1]);
   collisions.addCollisionPair(cloth, tool, {.thickness = 2 * kWanted});
   StepGuard guard(collisions);
   Vector3d at(0.35, 0.5, 0.72);
-  collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), at});
+  collisions.setTransform(tool, {.translation = at});
   collisions.advance();
   const Positions rest = all.bodies[0].positions;
   Positions now = rest;
@@ -361,7 +357,7 @@ TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
     const Vector3d way = target - at,
                    wanted = at + way * std::min(1.0, 2 * kRate / std::max(way.norm(), 1e-300));
     collisions.setPositions(cloth, now);
-    collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), wanted});
+    collisions.setTransform(tool, {.translation = wanted});
     collisions.detectCollision();
     std::vector<ConstraintRow> rows;
     const auto first = static_cast<std::uint32_t>(now.size());

@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <cmath>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -25,7 +24,7 @@ class Step : public ::testing::Test {
  protected:
   static std::vector<Eigen::Vector3d> at(double z) { return {{0, 0, z}, {1, 0, z}, {0, 1, z}}; }
   static std::vector<Triangle> triangle() { return {{0, 1, 2}}; }
-  static Pose poseAt(double z) { return {Eigen::Matrix3d::Identity(), {0, 0, z}}; }
+  static Pose poseAt(double z) { return {.translation = {0, 0, z}}; }
 
   void set(double z) { m_detection.setPositions(m_id, at(z)); }
   void set(double before, double now) { m_detection.setPositions(m_id, at(before), at(now)); }
@@ -201,8 +200,7 @@ TEST(PairStatistics, AddUpToThoseOfTheFrame) {
   const Mesh ball = sphere(12, 16, {0.5, 0.5, 0.3}, 0.3), ground = sheet(12, 0.0, 0.0);
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     OctreeBasedCD collisions(settingsOf(engine, 2));
-    const GeometryId a = collisions.addTriangleMesh(ball.positions, ball.triangles),
-                     b = collisions.addTriangleMesh(ground.positions, ground.triangles),
+    const GeometryId a = addMesh(collisions, ball), b = addMesh(collisions, ground),
                      tool = collisions.addAnalyticalGeometry(Sphere{{0.5, 0.5, 0.1}, 0.1});
     collisions.addCollisionPair(a, b, {.thickness = 0.05});
     collisions.addCollisionPair(tool, b, {.thickness = 0.05});
@@ -223,7 +221,7 @@ TEST(PairStatistics, AddUpToThoseOfTheFrame) {
     // The answer of the mesh, which does not move, still holds.
     collisions.advance();
     collisions.detectCollision();
-    collisions.setTransform(tool, {Eigen::Matrix3d::Identity(), {0.1, 0, 0}});
+    collisions.setTransform(tool, {.translation = {0.1, 0, 0}});
     collisions.detectCollision();
     EXPECT_EQ(collisions.pairStatistics(a, b).milliseconds, 0.0);
     EXPECT_EQ(collisions.pairStatistics(a, b).contacts, first.contacts);

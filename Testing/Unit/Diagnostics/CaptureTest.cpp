@@ -9,7 +9,6 @@
 
 #include <gtest/gtest.h>
 
-#include <bit>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -401,9 +400,9 @@ TEST_F(Capture, RefusesBodiesPlacedOutsideTheRange) {
   OctreeBasedCD detection;
   const GeometryId point =
       detection.addPointSet(std::vector<Eigen::Vector3d>{{kLargestMeasure, 0, 0}});
-  detection.setTransform(point, {Eigen::Matrix3d::Identity(), {kLargestMeasure, 0, 0}});
+  detection.setTransform(point, {.translation = {kLargestMeasure, 0, 0}});
   EXPECT_THROW(capture(detection, file()), Error);
-  detection.setTransform(point, {Eigen::Matrix3d::Identity(), {-kLargestMeasure, 0, 0}});
+  detection.setTransform(point, {.translation = {-kLargestMeasure, 0, 0}});
   detection.advance();
   capture(detection, file());
   EXPECT_EQ(readCapture(file()).geometries[0].now[0], Eigen::Vector3d(0, 0, 0));

@@ -4,6 +4,7 @@
 #include <palpate/MeshFiles.h>
 
 #include "Common/FailingAllocation.h"
+#include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
@@ -13,6 +14,8 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace palpate::testing {
 
@@ -109,6 +112,40 @@ class MeshFileFixture : public ::testing::Test {
                      const std::string& reason) const {
     EXPECT_NE(refusal(name, content).find(reason), std::string::npos)
         << name << ": expected \"" << reason << "\" in \"" << refusal(name, content) << "\"";
+  }
+
+  using Files = std::vector<std::pair<std::string, std::string>>;  ///< names and contents
+
+  /// The beginning of a file of each length is refused, or isComplete(name, mesh) holds.
+  template <class F>
+  void expectTruncatedRefused(const Files& files, F&& isComplete,
+                              const MeshReadSettings& settings = {}) const {
+    for (const auto& [name, content] : files)
+      for (std::size_t length = 0; length < content.size(); ++length) try {
+          const MeshArrays mesh = read(name, content.substr(0, length), settings);
+          EXPECT_TRUE(isComplete(name, mesh)) << name << " " << length;
+        } catch (const Error& error) {
+          EXPECT_EQ(error.code(), ErrorCode::File);
+        }
+  }
+  /// With any byte changed, a file is refused, or its elements have vertices.
+  void expectDamagedRefused(const Files& files) const {
+    for (const auto& [name, content] : files)
+      for (std::size_t at = 0; at < content.size(); at += kShareOfCases)
+        for (const char damage : {'\0', '9', '-', '\xff'}) {
+          std::string damaged = content;
+          damaged[at] = damage;
+          try {
+            const MeshArrays mesh = read(name, damaged);
+            const auto expectVertices = [&](const auto& elements) {
+              for (const auto& element : elements)
+                for (const std::uint32_t v : element) EXPECT_LT(v, mesh.positions.size());
+            };
+            expectVertices(mesh.triangles), expectVertices(mesh.tetrahedra);
+          } catch (const Error& error) {
+            EXPECT_EQ(error.code(), ErrorCode::File);
+          }
+        }
   }
 
   std::filesystem::path folder;

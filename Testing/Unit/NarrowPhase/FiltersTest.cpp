@@ -1,14 +1,12 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
-#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
-#include <string>
 #include <tuple>
 #include <vector>
 
@@ -38,8 +36,7 @@ struct Answer {
 
 Answer answer(const Settings& settings, const Case& c) {
   OctreeBasedCD detection(settings);
-  const GeometryId a = detection.addTriangleMesh(c.a.positions, c.a.triangles),
-                   b = c.self ? a : detection.addTriangleMesh(c.b.positions, c.b.triangles);
+  const GeometryId a = addMesh(detection, c.a), b = c.self ? a : addMesh(detection, c.b);
   detection.addCollisionPair(a, b, c.pair);
   detection.setPositions(a, c.a.positions, c.nowA);
   detection.setDisabledElements(a, c.disabledA);
@@ -148,7 +145,7 @@ TEST(Filters, DisablingATrianglePassesItsFeaturesToNeighbours) {
   // Two triangles at an edge, and a point over a corner of both.
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
+  const GeometryId mesh = addMesh(detection, roof),
                    probe = detection.addPointSet(Positions{{2, 2, 0.25}});
   detection.addCollisionPair(probe, mesh, {Method::Proximity, 0.5});
   const auto triangles = [&] {
@@ -221,7 +218,7 @@ TEST(Filters, PredicateExcludesWhatItRefuses) {
 TEST(Filters, RefusedContactsSuppressNoOthers) {
   const Mesh roof{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {4, 4, 0}}, {{0, 1, 2}, {1, 3, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId mesh = detection.addTriangleMesh(roof.positions, roof.triangles),
+  const GeometryId mesh = addMesh(detection, roof),
                    probe = detection.addPointSet(Positions{{2, 2, 0.25}});
   detection.addCollisionPair(mesh, probe, {Method::Proximity, 0.5});
   std::atomic<int> asked = 0;
@@ -385,7 +382,7 @@ TEST(Filters, GroupsAndMasksSelectThePairs) {
 TEST(Filters, BadInputThrowsErrorsThatNameIt) {
   const Mesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId mesh = detection.addTriangleMesh(one.positions, one.triangles),
+  const GeometryId mesh = addMesh(detection, one),
                    line = detection.addLineMesh(one.positions, std::vector<Segment>{{0, 1}});
   const std::vector<std::uint32_t> beyond{0, 1};
   expectRefused(ErrorCode::IndexOutOfRange,

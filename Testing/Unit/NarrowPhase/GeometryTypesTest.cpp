@@ -9,11 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -118,15 +115,6 @@ TEST(GeometryTypes, AllMatchesTheDefinition) {
   }
 }
 
-/// Of every contact.
-double least(const CollisionData& data) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& c : data.vertexTriangle()) least = std::min(least, c.distance);
-  for (const auto& c : data.triangleVertex()) least = std::min(least, c.distance);
-  for (const auto& c : data.edgeEdge()) least = std::min(least, c.distance);
-  return least;
-}
-
 TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
   Random random(3);
   for (int run = 0; run < 40; ++run) {
@@ -139,7 +127,7 @@ TEST(GeometryTypes, DistinctHasFewerContactsAndKeepsTheNearest) {
                           distinct = answer(*a, *b, {Method::Proximity, 0.1, Contacts::Distinct});
       const auto ofAll = idsOf(Rows(all).edgeEdge, 4);
       for (const Ids& ids : idsOf(Rows(distinct).edgeEdge, 4)) EXPECT_TRUE(ofAll.contains(ids));
-      EXPECT_DOUBLE_EQ(least(all), least(distinct));
+      EXPECT_DOUBLE_EQ(leastDistance(all), leastDistance(distinct));
     }
   }
 }

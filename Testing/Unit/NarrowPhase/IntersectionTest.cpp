@@ -4,7 +4,6 @@
 #include "Meshes.h"
 #include "Unit/Math/TrianglePairs.h"
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/NarrowPhase.h"
 
-#include "Common/RandomMeshes.h"
+#include "Common/DegenerateCases.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -34,25 +34,15 @@ TriangleMesh pyramid(const Vector3d& tip, double height, double halfWidth) {
                       {{0, 2, 1}, {0, 3, 2}, {0, 4, 3}, {0, 1, 4}, {1, 2, 3}, {1, 3, 4}});
 }
 
-/// Vertex i + 5 j is at (i, j, 0) for 0 <= i, j <= 4. All diagonals are along (1, 1, 0).
-TriangleMesh plate() {
-  Vertices positions;
-  std::vector<Triangle> triangles;
-  for (std::uint32_t j = 0; j < 5; ++j)
-    for (std::uint32_t i = 0; i < 5; ++i) {
-      positions.emplace_back(i, j, 0);
-      const std::uint32_t v = 5 * j + i;
-      if (i < 4 && j < 4) {
-        triangles.push_back({v, v + 1, v + 6});
-        triangles.push_back({v, v + 6, v + 5});
-      }
-    }
-  return piercingMesh(positions, triangles);
+TriangleMesh piercingMesh(const testing::Mesh& mesh) {
+  return piercingMesh(mesh.positions, mesh.triangles);
 }
 
+/// Vertex i + 5 j is at (i, j, 0) for 0 <= i, j <= 4. All diagonals are along (1, 1, 0).
+TriangleMesh plate() { return piercingMesh(testing::moved(testing::flat(4, 0), {0, 0, 0}, 4)); }
+
 TriangleMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
-  const testing::Mesh box = testing::boxMesh(lower, upper);
-  return piercingMesh(box.positions, box.triangles);
+  return piercingMesh(testing::boxMesh(lower, upper));
 }
 
 TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector3d& shift) {

@@ -11,9 +11,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <set>
-#include <span>
 #include <vector>
 
 // Sidedness::Outer against the exact winding number of findInsideVertices(). A contact points
@@ -35,8 +33,7 @@ Mesh burr(Random& random) {
 /// Which of the positions are inside the body.
 std::vector<bool> areInside(const Mesh& body, const Positions& places) {
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId probes = detection.addPointSet(places),
-                   id = detection.addTriangleMesh(body.positions, body.triangles);
+  const GeometryId probes = detection.addPointSet(places), id = addMesh(detection, body);
   std::vector<bool> inside(places.size());
   for (const InsideVertex& v : testing::insideVertices(detection, probes, id))
     inside[v.vertex] = true;
@@ -138,7 +135,7 @@ struct SidedTool {
 CollisionData answer(const Settings& settings, const Mesh& body, const SidedTool& tool,
                      const PairSettings& pair, Sidedness sidedness) {
   OctreeBasedCD detection(settings);
-  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
+  const GeometryId id = addMesh(detection, body),
                    other = tool.segments.empty()
                                ? detection.addPointSet(tool.before)
                                : detection.addLineMesh(tool.before, tool.segments);

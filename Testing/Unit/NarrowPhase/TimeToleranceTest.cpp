@@ -217,10 +217,10 @@ TEST(EarliestTime, MatchesAllContactsOfAShapeBesideOtherPairs) {
                               .continuous = {.earliestTimeOnly = true}};
   detection.addCollisionPair(tool, tissue, earliest);
   detection.addCollisionPair(first, first, earliest);
-  detection.setTransform(tool, {Eigen::Matrix3d::Identity(), {0, 0, 0}});
+  detection.setTransform(tool, {});
   detection.detectCollision();
   detection.advance();
-  detection.setTransform(tool, {Eigen::Matrix3d::Identity(), {0.2, 0, 0}});
+  detection.setTransform(tool, {.translation = {0.2, 0, 0}});
   detection.setPositions(tissue, a.positions, now);
   Positions moved = b.positions;
   for (Eigen::Vector3d& p : moved) p += testing::randomPoint(random, -0.02, 0.02);

@@ -1,6 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/DegenerateCases.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
@@ -17,20 +18,13 @@ namespace {
 using Eigen::Vector3d;
 using testing::dividedBox, testing::Mesh;
 
-/// A flat square of n x n squares in the plane z = height, wound up, or down if flipped.
-Mesh plate(int n, double halfSide, double height, bool flipped = false) {
-  Mesh mesh;
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i)
-      mesh.positions.push_back(
-          {halfSide * (2.0 * i / n - 1), halfSide * (2.0 * j / n - 1), height});
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const auto a = static_cast<std::uint32_t>(j * (n + 1) + i);
-      const std::uint32_t b = a + 1, d = a + static_cast<std::uint32_t>(n) + 1, c = d + 1;
-      mesh.triangles.push_back(flipped ? Triangle{a, c, b} : Triangle{a, b, c});
-      mesh.triangles.push_back(flipped ? Triangle{a, d, c} : Triangle{a, c, d});
-    }
+/// A flat square of n x n squares in the plane z = 0, wound up.
+Mesh plate(int n, double halfSide) {
+  return testing::moved(testing::flat(n, 0), {-halfSide, -halfSide, 0}, 2 * halfSide);
+}
+
+Mesh flipped(Mesh mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
   return mesh;
 }
 
@@ -47,10 +41,10 @@ std::vector<Case> restingBodies(double gap) {
   const auto box = [&](Vector3d lower, Vector3d upper, const Vector3d& apart, int n = 1) {
     return dividedBox(lower + gap * apart, upper + gap * apart, n);
   };
-  return {{"on a table", box({-.5, -.5, 0}, {.5, .5, 1}, z), plate(1, 2, 0), z},
+  return {{"on a table", box({-.5, -.5, 0}, {.5, .5, 1}, z), plate(1, 2), z},
           {"on a table that is wound down", box({-.5, -.5, 0}, {.5, .5, 1}, z),
-           plate(1, 2, 0, true), z},
-          {"on a fine table", box({-.5, -.5, 0}, {.5, .5, 1}, z, 3), plate(8, 2, 0), z},
+           flipped(plate(1, 2)), z},
+          {"on a fine table", box({-.5, -.5, 0}, {.5, .5, 1}, z, 3), plate(8, 2), z},
           {"common face across x", box({1, 0, 0}, {2, 1, 1}, x), unit, x},
           {"common face across y", box({0, 1, 0}, {1, 2, 1}, y), unit, y},
           {"common face across z", box({0, 0, 1}, {1, 1, 2}, z), unit, z},

@@ -5,8 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <string>
-#include <utility>
 #include <vector>
 
 // Method::Auto, the default, for every pair of geometry types. Its contacts are those of

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <set>
-#include <tuple>
 
 // Method::Auto: octrees match brute force, and it finds all that Method::Continuous finds.
 

@@ -414,16 +414,16 @@ TEST(TrustOfTypes, ACapsuleInAClothIsSeenInEachStep) {
       for (const double height : {0.06, 0.045, 0.01, -0.04}) {
         SCOPED_TRACE(::testing::Message() << isShape << " " << height);
         OctreeBasedCD collisions;
-        const GeometryId sheet = collisions.addTriangleMesh(cloth.positions, cloth.triangles);
+        const GeometryId sheet = addMesh(collisions, cloth);
         const GeometryId tool =
             isShape
                 ? collisions.addAnalyticalGeometry(Capsule{p, q, kRadius})
                 : collisions.addLineMesh(Positions{p, q}, std::vector<Segment>{{0, 1}}, kRadius);
         collisions.addCollisionPair(sheet, tool, {.method = method});
-        collisions.setTransform(tool, {Matrix3d::Identity(), {0, 0, height}});
+        collisions.setTransform(tool, {.translation = {0, 0, height}});
         collisions.advance();
         for (int step = 1; step <= 3; ++step) {
-          collisions.setTransform(tool, {Matrix3d::Identity(), {0, 0, height - 0.001 * step}});
+          collisions.setTransform(tool, {.translation = {0, 0, height - 0.001 * step}});
           collisions.detectCollision();
           const CollisionData& data = collisions.collisionData(sheet, tool);
           const bool apart = height > kRadius;

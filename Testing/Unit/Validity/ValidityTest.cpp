@@ -1,9 +1,9 @@
+#include "Common/DegenerateCases.h"
 #include "Common/PairRun.h"
 #include "Common/Sanitized.h"
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <Eigen/Geometry>
 #include <iostream>
 
@@ -151,11 +151,7 @@ TEST_P(ValidityOfMethod, NeverFailsSilently) {
 /// A ball and a sheet as one mesh.
 Mesh asOne(const BallAndSheet& scene) {
   Mesh mesh = scene.ball;
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), scene.sheet.positions.begin(),
-                        scene.sheet.positions.end());
-  for (const auto& [a, b, c] : scene.sheet.triangles)
-    mesh.triangles.push_back({first + a, first + b, first + c});
+  append(mesh, scene.sheet);
   return mesh;
 }
 
@@ -173,7 +169,7 @@ Known livesThrough(const PairSettings& settings, const Mesh& a, const Mesh* b, i
   OctreeBasedCD truth(settingsOf(Engine::BruteForce));
   OctreeBasedCD all(settingsOf(Engine::Octree, threads));  // impacts that Distinct excludes
   const auto add = [&](OctreeBasedCD& to, const PairSettings& pair) {
-    const GeometryId first = to.addTriangleMesh(a.positions, a.triangles);
+    const GeometryId first = addMesh(to, a);
     to.addCollisionPair(first, b ? to.addTriangleMesh(b->positions, b->triangles) : first, pair);
   };
   add(detection, settings);
@@ -281,21 +277,13 @@ TEST_P(ValidityOfMethod, KnowsStartedApartFromImpactsOfThePreviousStep) {
   }
 }
 
-/// Read while positions are copied or later, it is the displacement of the same step.
 /// As an STL file has it: each triangle has three vertices of its own.
 TEST(Validity, OfAnUnweldedMeshWithItselfIsNotTrusted) {
-  const Mesh cube = boxMesh({0, 0, 0}, {1, 1, 1});
-  Mesh unwelded;
-  for (const Triangle& t : cube.triangles) {
-    const auto first = static_cast<std::uint32_t>(unwelded.positions.size());
-    for (const std::uint32_t v : t) unwelded.positions.push_back(cube.positions[v]);
-    unwelded.triangles.push_back({first, first + 1, first + 2});
-  }
-  const Welded welded = weld(unwelded.positions, unwelded.triangles);
+  const Mesh cut = unwelded(cube(0, 1));
+  const Welded welded = weld(cut.positions, cut.triangles);
   for (const Method method : {Method::Auto, Method::Proximity, Method::Intersection}) {
     OctreeBasedCD detection;
-    const GeometryId soup = detection.addTriangleMesh(unwelded.positions, unwelded.triangles),
-                     closed = detection.addTriangleMesh(welded.positions, welded.triangles);
+    const GeometryId soup = addMesh(detection, cut), closed = addMesh(detection, welded);
     for (const GeometryId id : {soup, closed})
       detection.addCollisionPair(
           id, id, {.method = method, .thickness = method == Method::Intersection ? 0.0 : 0.01});
@@ -322,6 +310,7 @@ TEST(Validity, OfAnUnweldedMeshWithItselfIsNotTrusted) {
   EXPECT_TRUE(detection.collisionData(apart, apart).validity().trusted);
 }
 
+/// Read while positions are copied or later, it is the displacement of the same step.
 TEST(Displacement, IsTheRelativeMotionOfTheStep) {
   for (const int threads : {1, 2}) {
     Random random(3);
@@ -378,7 +367,7 @@ TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
   std::vector<Eigen::Vector3d> high = low.positions;
   for (Eigen::Vector3d& p : high) p.z() += 0.02;
   OctreeBasedCD collisions;
-  const GeometryId a = collisions.addTriangleMesh(low.positions, low.triangles),
+  const GeometryId a = addMesh(collisions, low),
                    b = collisions.addTriangleMesh(high, low.triangles);
   collisions.addCollisionPair(a, b, {.method = Method::Continuous, .thickness = 0.05});
   collisions.detectCollision();
