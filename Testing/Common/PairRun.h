@@ -54,14 +54,6 @@ class PairRun {
     m_detection.addCollisionPair(m_b, m_b, pair);
   }
 
-  void setTriangles(const Mesh& a, const Mesh& b) {
-    m_detection.setTriangles(m_a, a.positions, a.triangles);
-    m_detection.setTriangles(m_b, b.positions, b.triangles);
-  }
-  void setPairSettings(const PairSettings& settings) {
-    const std::vector<CollisionPair> pairs(m_detection.pairs().begin(), m_detection.pairs().end());
-    for (const CollisionPair& pair : pairs) m_detection.setPairSettings(pair.a, pair.b, settings);
-  }
   /// One frame of a step between the given positions.
   void step(const std::vector<Eigen::Vector3d>& aBefore, const std::vector<Eigen::Vector3d>& aNow,
             const std::vector<Eigen::Vector3d>& bBefore, const std::vector<Eigen::Vector3d>& bNow) {

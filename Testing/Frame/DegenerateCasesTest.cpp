@@ -70,24 +70,6 @@ TEST_P(DegenerateCases, EachCaseMatchesBruteForce) {
   EXPECT_GT(met, leastOf(20));
 }
 
-TEST_P(DegenerateCases, TopologyMayChangeFromCaseToCase) {
-  std::size_t number = 0;
-  for (const OctreeUpdate update : {OctreeUpdate::Auto, OctreeUpdate::Rebuild}) {
-    PairRun run(settingsOf(Engine::Octree, 2, update), {}, {}, GetParam().settings);
-    PairRun oracle(settingsOf(Engine::BruteForce), {}, {}, GetParam().settings);
-    for (const DegenerateCase& input : degenerateCases()) {
-      if (input.large || isLeftOut(number++)) continue;
-      SCOPED_TRACE(input.name);
-      for (PairRun* each : {&run, &oracle}) {
-        each->setTriangles(input.a, input.b);
-        each->setPairSettings(settingsFor(input));
-        stepThere(*each, input);
-      }
-      expectSame(run.answers(), oracle.answers());
-    }
-  }
-}
-
 INSTANTIATE_TEST_SUITE_P(EveryMethod, DegenerateCases, ::testing::ValuesIn(methodCases(1.0)),
                          [](const auto& method) { return method.param.name; });
 

@@ -402,21 +402,6 @@ TEST(FreeMotion, IsBelowTheGapOfTaperedThreads) {
   EXPECT_GT(near, 100u);
 }
 
-TEST(FreeMotion, IsTheSameForAllEnginesAndThreads) {
-  Random random(4);
-  for (int trial = 0; trial < 60 / kShareOfCases; ++trial) {
-    const Scene scene = randomScene(random);
-    if (scene.thickness == 0.0 && !(scene.hasOneRadius(0) && scene.hasOneRadius(1))) continue;
-    SceneRun truth(scene, Method::Auto, testing::settingsOf(Engine::BruteForce));
-    truth.detect();
-    for (const Settings& settings : octreeSettings()) {
-      SceneRun run(scene, Method::Auto, settings);
-      run.detect();
-      EXPECT_EQ(run.freeMotions(), truth.freeMotions()) << trial << ", " << nameOf(settings);
-    }
-  }
-}
-
 /// Two parallel sheets share the gap; a filter or a disabled element lifts its limit.
 TEST(FreeMotion, FollowsPairsFiltersAndElements) {
   const Mesh low = flat(4, 0.0), high = flat(4, 0.5);

@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <string>
 
 namespace palpate {
@@ -23,6 +22,64 @@ namespace {
 
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
+
+using Ids = std::array<std::uint32_t, 2>;
+
+std::vector<Ids> sorted(std::span<const FeaturePair> pairs) {
+  std::vector<Ids> ids;
+  for (const FeaturePair& pair : pairs) ids.push_back({pair.a, pair.b});
+  std::sort(ids.begin(), ids.end());
+  return ids;
+}
+
+bool holds(const Triangle& triangle, std::uint32_t vertex) {
+  return std::find(triangle.begin(), triangle.end(), vertex) != triangle.end();
+}
+bool meet(const Segment& p, const Segment& q) {
+  return p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1];
+}
+
+struct Lists {
+  std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
+};
+
+/// The pairs of features by their definition, of two meshes or of one with itself, for which
+/// near(vertices of a, vertices of b) holds.
+template <class Near>
+Lists pairsOf(const MeshTopology& a, const MeshTopology& b, Near&& near) {
+  const bool self = &a == &b;
+  Lists all;
+  for (std::uint32_t v = 0; v < a.vertexCount; ++v)
+    for (std::uint32_t t = 0; t < b.elements.size(); ++t)
+      if (!(self && holds(b.elements[t], v)) && near(std::array{v}, b.elements[t]))
+        all.vertexTriangle.push_back({v, t});
+  for (std::uint32_t t = 0; t < a.elements.size() && !self; ++t)
+    for (std::uint32_t v = 0; v < b.vertexCount; ++v)
+      if (near(a.elements[t], std::array{v})) all.triangleVertex.push_back({t, v});
+  for (std::uint32_t p = 0; p < a.edges.size(); ++p)
+    for (std::uint32_t q = self ? p + 1 : 0; q < b.edges.size(); ++q)
+      if (!(self && meet(a.edges[p], b.edges[q])) && near(a.edges[p], b.edges[q]))
+        all.edgeEdge.push_back({p, q});
+  return all;
+}
+
+std::vector<ElementPair> everyPair(const MeshTopology& a, const MeshTopology& b) {
+  std::vector<ElementPair> pairs;
+  for (std::uint32_t i = 0; i < a.elements.size(); ++i)
+    for (std::uint32_t j = &a == &b ? i + 1 : 0; j < b.elements.size(); ++j)
+      pairs.push_back({i, j});
+  return pairs;
+}
+
+/// All pairs with overlapping boxes in double, each once, and hardly more.
+void expectOverlapping(std::span<const FeaturePair> found, std::vector<Ids> exact,
+                       std::size_t more = 0) {
+  const std::vector<Ids> ids = sorted(found);
+  std::sort(exact.begin(), exact.end());
+  EXPECT_TRUE(std::adjacent_find(ids.begin(), ids.end()) == ids.end());
+  EXPECT_TRUE(std::includes(ids.begin(), ids.end(), exact.begin(), exact.end()));
+  EXPECT_LE(ids.size(), exact.size() + exact.size() / 10'000 + more);
+}
 
 struct Moving {
   testing::Mesh mesh;
@@ -60,29 +117,16 @@ TEST(FeaturePairs, KeepOverlappingPairsUpToAnyTime) {
       FloatPair floats{a.floatsNow.data(), b.floatsNow.data(), a.floatsBefore.data(),
                        b.floatsBefore.data()};
       floats.upTo = upTo;
-      std::vector<ElementPair> candidates;
-      for (std::uint32_t i = 0; i < 40; ++i)
-        for (std::uint32_t j = 0; j < 40; ++j) candidates.push_back({i, j});
       FeaturePairs pairs;
-      findFeaturePairs(a.topology, b.topology, &floats, candidates, pairs);
-      std::set<std::array<std::uint32_t, 2>> corners, edges;
-      for (const FeaturePair& pair : pairs.vertexTriangle) corners.insert({pair.a, pair.b});
-      for (const FeaturePair& pair : pairs.edgeEdge) edges.insert({pair.a, pair.b});
-      std::size_t overlapping = 0;
-      for (std::uint32_t v = 0; v < a.now.size(); ++v)
-        for (std::uint32_t t = 0; t < 40; ++t)
-          if (a.box(std::array{v}, upTo).intersects(b.box(b.mesh.triangles[t], upTo))) {
-            EXPECT_TRUE(corners.contains({v, t})) << upTo;
-            ++overlapping;
-          }
-      for (std::uint32_t p = 0; p < a.topology.edges.size(); ++p)
-        for (std::uint32_t q = 0; q < b.topology.edges.size(); ++q)
-          if (a.box(a.topology.edges[p], upTo).intersects(b.box(b.topology.edges[q], upTo))) {
-            EXPECT_TRUE(edges.contains({p, q})) << upTo;
-            ++overlapping;
-          }
-      EXPECT_GT(overlapping, 0u);
-      EXPECT_LE(corners.size() + edges.size(), overlapping + 2 + overlapping / 100) << upTo;
+      findFeaturePairs(a.topology, b.topology, &floats, everyPair(a.topology, b.topology), pairs);
+      const Lists exact = pairsOf(a.topology, b.topology, [&](const auto& p, const auto& q) {
+        return a.box(p, upTo).intersects(b.box(q, upTo));
+      });
+      SCOPED_TRACE(upTo);
+      expectOverlapping(pairs.vertexTriangle, exact.vertexTriangle, 2);
+      expectOverlapping(pairs.triangleVertex, exact.triangleVertex, 2);
+      expectOverlapping(pairs.edgeEdge, exact.edgeEdge, 2);
+      EXPECT_GT(exact.edgeEdge.size(), 0u);
     }
   }
 }
@@ -151,22 +195,6 @@ TEST(FeaturePairs, KeepBoxesThatTouch) {
   EXPECT_LT(kept, 3 * 4000u / 2);  // of three vertices each, few reach
 }
 
-using Ids = std::array<std::uint32_t, 2>;
-
-std::vector<Ids> sorted(std::span<const FeaturePair> pairs) {
-  std::vector<Ids> ids;
-  for (const FeaturePair& pair : pairs) ids.push_back({pair.a, pair.b});
-  std::sort(ids.begin(), ids.end());
-  return ids;
-}
-
-bool holds(const Triangle& triangle, std::uint32_t vertex) {
-  return std::find(triangle.begin(), triangle.end(), vertex) != triangle.end();
-}
-bool meet(const Segment& p, const Segment& q) {
-  return p[0] == q[0] || p[0] == q[1] || p[1] == q[0] || p[1] == q[1];
-}
-
 /// Triangles over few vertices, so that many share some, degenerate ones among them.
 MeshTopology crowded(testing::Random& random, std::uint32_t vertices, std::size_t triangles) {
   const auto any = [&] { return static_cast<std::uint32_t>(random() % vertices); };
@@ -181,25 +209,15 @@ TEST(FeaturePairs, AreEachTestedOnce) {
   for (const std::size_t size : {1, 2, 7, 60, 300}) {
     const MeshTopology a = crowded(random, 40, size), b = crowded(random, 900, 50);
     for (const MeshTopology* second : {&a, &b}) {
-      const bool self = second == &a;
-      std::vector<ElementPair> candidates;
-      for (std::uint32_t i = 0; i < a.elements.size(); ++i)
-        for (std::uint32_t j = self ? i + 1 : 0; j < second->elements.size(); ++j)
-          candidates.push_back({i, j});
+      std::vector<ElementPair> candidates = everyPair(a, *second);
       std::shuffle(candidates.begin(), candidates.end(), random);
-
-      std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
-      for (std::uint32_t v = 0; v < a.vertexCount; ++v)
-        for (std::uint32_t t = 0; t < second->elements.size(); ++t)
-          if (a.vertexTriangles[v].size() > 0 && !(self && holds(a.elements[t], v)))
-            vertexTriangle.push_back({v, t});
-      for (std::uint32_t t = 0; t < a.elements.size() && !self; ++t)
-        for (std::uint32_t v = 0; v < b.vertexCount; ++v)
-          if (b.vertexTriangles[v].size() > 0) triangleVertex.push_back({t, v});
-      for (std::uint32_t p = 0; p < a.edges.size(); ++p)
-        for (std::uint32_t q = self ? p + 1 : 0; q < second->edges.size(); ++q)
-          if (!(self && meet(a.edges[p], a.edges[q]))) edgeEdge.push_back({p, q});
-
+      const auto isUsed = [](const MeshTopology& mesh, const auto& vertices) {
+        return std::all_of(vertices.begin(), vertices.end(),
+                           [&](std::uint32_t v) { return mesh.vertexTriangles[v].size() > 0; });
+      };
+      const auto [vertexTriangle, triangleVertex, edgeEdge] =
+          pairsOf(a, *second,
+                  [&](const auto& p, const auto& q) { return isUsed(a, p) && isUsed(*second, q); });
       std::vector<FeaturePair> first;
       for (const std::string& path : simdPaths()) {
         useSimdPath(path);
@@ -221,15 +239,6 @@ TEST(FeaturePairs, AreEachTestedOnce) {
       useSimdPath("");
     }
   }
-}
-
-/// All pairs with overlapping boxes in double, each once, and hardly more.
-void expectOverlapping(std::span<const FeaturePair> found, std::vector<Ids> exact) {
-  const std::vector<Ids> ids = sorted(found);
-  std::sort(exact.begin(), exact.end());
-  EXPECT_TRUE(std::adjacent_find(ids.begin(), ids.end()) == ids.end());
-  EXPECT_TRUE(std::includes(ids.begin(), ids.end(), exact.begin(), exact.end()));
-  EXPECT_LE(ids.size(), exact.size() + exact.size() / 10'000);
 }
 
 struct PublishedStep {
@@ -304,37 +313,20 @@ TEST(FeaturePairs, IncludePairsWithinTheThickness) {
     const FloatPair floats{floatsA.data(),   self ? floatsA.data() : floatsB.data(),
                            nullptr,          nullptr,
                            shift.shiftLower, shift.shiftUpper};
-    std::vector<ElementPair> candidates;
-    for (std::uint32_t i = 0; i < first.elements.size(); ++i)
-      for (std::uint32_t j = self ? i + 1 : 0; j < b.elements.size(); ++j)
-        candidates.push_back({i, j});
     FeaturePairs pairs;
-    findFeaturePairs(first, b, &floats, candidates, pairs);
+    findFeaturePairs(first, b, &floats, everyPair(first, b), pairs);
     const auto boxOf = [](const std::vector<Vector3d>& positions, const auto& vertices) {
       AlignedBox3d box;
       for (const std::uint32_t v : vertices) box.extend(positions[v]);
       return box;
     };
-    const auto near = [&](const AlignedBox3d& s, AlignedBox3d t) {
-      t.min().array() -= kThickness;
-      t.max().array() += kThickness;
-      return s.intersects(t);
-    };
-    std::vector<Ids> vertexTriangle, triangleVertex, edgeEdge;
-    for (std::uint32_t v = 0; v < first.vertexCount; ++v)
-      for (std::uint32_t t = 0; t < b.elements.size(); ++t)
-        if (!(self && holds(b.elements[t], v)) &&
-            near(boxOf(sheet.positions, std::array{v}), boxOf(positionsB, b.elements[t])))
-          vertexTriangle.push_back({v, t});
-    for (std::uint32_t t = 0; t < first.elements.size() && !self; ++t)
-      for (std::uint32_t v = 0; v < b.vertexCount; ++v)
-        if (near(boxOf(sheet.positions, first.elements[t]), boxOf(positionsB, std::array{v})))
-          triangleVertex.push_back({t, v});
-    for (std::uint32_t p = 0; p < first.edges.size(); ++p)
-      for (std::uint32_t q = self ? p + 1 : 0; q < b.edges.size(); ++q)
-        if (!(self && meet(first.edges[p], b.edges[q])) &&
-            near(boxOf(sheet.positions, first.edges[p]), boxOf(positionsB, b.edges[q])))
-          edgeEdge.push_back({p, q});
+    const auto [vertexTriangle, triangleVertex, edgeEdge] =
+        pairsOf(first, b, [&](const auto& p, const auto& q) {
+          AlignedBox3d box = boxOf(positionsB, q);
+          box.min().array() -= kThickness;
+          box.max().array() += kThickness;
+          return boxOf(sheet.positions, p).intersects(box);
+        });
     EXPECT_GT(edgeEdge.size(), 500u);
     expectOverlapping(pairs.vertexTriangle, vertexTriangle);
     expectOverlapping(pairs.triangleVertex, triangleVertex);
