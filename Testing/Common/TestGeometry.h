@@ -6,6 +6,7 @@
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,6 +20,30 @@ namespace palpate::testing {
 
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
+
+/// A rigid placement. Products are summed as the library does.
+struct Place {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+
+  Vector3d operator()(const Vector3d& p) const {
+    Vector3d q;
+    for (int k = 0; k < 3; ++k)
+      q[k] = rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
+    return q;
+  }
+  Pose pose() const { return {rotation, translation}; }
+  Positions operator()(Positions positions) const {
+    for (Vector3d& p : positions) p = (*this)(p);
+    return positions;
+  }
+  /// Then turns by the angle about an axis through a point, and shifts.
+  Place then(const Vector3d& axis, double angle, const Vector3d& through,
+             const Vector3d& by) const {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+    return {turn * rotation, turn * (translation - through) + through + by};
+  }
+};
 
 /// A geometry with vertices, of any type.
 struct TestGeometry {

@@ -47,9 +47,7 @@ class Simulation {
       const Mesh& mesh = ofA ? bodies.a : bodies.b;
       (ofA ? m_a : m_b) = addMesh(m_collisions, mesh);
     }
-    PairSettings settings;
-    settings.thickness = 0.05;
-    m_collisions.addCollisionPair(m_a, m_b, settings);
+    m_collisions.addCollisionPair(m_a, m_b, {.thickness = 0.05});
   }
   bool intersect() {
     set();
@@ -129,9 +127,7 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
     for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
       OctreeBasedCD collisions(settingsOf(engine));
       const GeometryId a = addMesh(collisions, bodies.a), b = addMesh(collisions, bodies.b);
-      PairSettings settings;
-      settings.thickness = 0.05;
-      collisions.addCollisionPair(a, b, settings);
+      collisions.addCollisionPair(a, b, {.thickness = 0.05});
       collisions.detectCollision();
       const CollisionData& data = collisions.collisionData(a, b);
       rows[engine == Engine::BruteForce] = Rows(data);
@@ -209,9 +205,7 @@ TEST(BodyContacts, ShallowVerticesAndOpenMeshesKeepLocalNormals) {
     if (isOpen) unit.triangles.erase(unit.triangles.begin()), tip.positions.back()[2] -= 0.2;
     OctreeBasedCD collisions;
     const GeometryId a = addMesh(collisions, tip), b = addMesh(collisions, unit);
-    PairSettings settings;
-    settings.thickness = 0.05;
-    collisions.addCollisionPair(a, b, settings);
+    collisions.addCollisionPair(a, b, {.thickness = 0.05});
     collisions.detectCollision();
     bool found = false;
     for (const auto& c : collisions.collisionData(a, b).vertexTriangle())

@@ -171,6 +171,8 @@ void expectPossible(Call call) {
   for (const double bad : {0.0, 0x1p-51, 1.5, -1.0, kNan})
     refuse({.continuous = {.timeTolerance = bad}},
            {ErrorCode::InvalidSettings, {"timeTolerance", "2^-50"}});
+  for (const double bad : {-1.0, kInfinity, kNan})
+    refuse({.freeMotionReach = bad}, {ErrorCode::InvalidSettings, {"freeMotionReach is"}});
   refuse({.method = static_cast<Method>(99), .thickness = 1}, {ErrorCode::InvalidSettings, {}});
   refuse({.thickness = 1, .contacts = static_cast<Contacts>(99)}, {ErrorCode::InvalidSettings, {}});
 }

@@ -241,6 +241,10 @@ TEST(ConstraintRows, TooFewPositionsThrowAnErrorThatNamesTheVertex) {
       EXPECT_THROW(appendRows(beside, {}, {}, rows), Error);
     EXPECT_EQ(rows.size(), 1u);
   }
+  for (const Span before : {Span(), all})  // a shape has none at either end
+    expectRefused(ErrorCode::WrongPositionCount, "both sides have positions", [&] {
+      appendRows(beside, {0, high, high}, {0, before, high}, rows);
+    });
   appendRows(contacts, {0, low, low}, {3, high, high}, rows);
   EXPECT_GT(rows.size(), 1u);
   rows.clear();

@@ -483,14 +483,5 @@ TEST(FreeMotion, IsZeroWhereFeaturesTouchAndPositiveInContact) {
   }
 }
 
-TEST(FreeMotion, RefusesWhatItCannotDo) {
-  OctreeBasedCD collisions;
-  const Mesh mesh = sheet(2, 0, 0);
-  const GeometryId a = addMesh(collisions, mesh), b = addMesh(collisions, mesh);
-  for (const double bad : {-1.0, kInfinity, std::nan("")})
-    expectRefused(ErrorCode::InvalidSettings, "freeMotionReach is",
-                  [&] { collisions.addCollisionPair(a, b, {.freeMotionReach = bad}); });
-}
-
 }  // namespace
 }  // namespace palpate::testing

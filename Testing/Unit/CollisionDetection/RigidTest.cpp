@@ -20,29 +20,6 @@ namespace {
 
 using Eigen::Matrix3d;
 
-struct Place {
-  Matrix3d rotation = Matrix3d::Identity();
-  Vector3d translation = Vector3d::Zero();
-
-  Vector3d operator()(const Vector3d& p) const {
-    Vector3d q;
-    for (int k = 0; k < 3; ++k)
-      q[k] = rotation(k, 0) * p[0] + rotation(k, 1) * p[1] + rotation(k, 2) * p[2] + translation[k];
-    return q;
-  }
-  Pose pose() const { return {rotation, translation}; }
-  Positions operator()(Positions positions) const {
-    for (Vector3d& p : positions) p = (*this)(p);
-    return positions;
-  }
-  /// Then turns by the angle about an axis through a point, and shifts.
-  Place then(const Vector3d& axis, double angle, const Vector3d& through,
-             const Vector3d& by) const {
-    const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
-    return {turn * rotation, turn * (translation - through) + through + by};
-  }
-};
-
 Place somewhere(Random& random) {
   return Place().then(randomPoint(random, -1, 1), uniform(random, 0, 3), {0.5, 0.5, 0.5},
                       randomPoint(random, -0.1, 0.1));

@@ -296,10 +296,9 @@ TEST(StepGuard, PlacedBodiesStayRigidAndTouchNothing) {
     all.add(testGeometry(sphere(6, 8, {0, 0, 0}, 0.3)));
     all.pairs.push_back({0, 1});
     Guarded guarded(all);
-    const Pose start{turned(0.3 * scene), {0.5, 0.5, 1.2}},
+    const Place start{turned(0.3 * scene), {0.5, 0.5, 1.2}},
         end{turned(0.3 * scene + 0.4), {0.55, 0.45, 0.2 + 0.05 * scene}};
-    guarded.collisions.setTransform(GeometryId{1}, {start.rotation, start.translation},
-                                    {end.rotation, end.translation});
+    guarded.collisions.setTransform(GeometryId{1}, start.pose(), end.pose());
     all.now[0] = moved(random, all.before[0], 0.02);
     guarded.collisions.setPositions(GeometryId{0}, all.before[0], all.now[0]);
     EXPECT_GT(guarded.guard.hold(), 0u);
@@ -307,20 +306,14 @@ TEST(StepGuard, PlacedBodiesStayRigidAndTouchNothing) {
     EXPECT_GT(fraction, 0.1);
     EXPECT_LT(fraction, 1.0);
     const Pose pose = guarded.collisions.transform(GeometryId{1});
+    const Place reached{pose.rotation, pose.translation};
     EXPECT_LE((pose.rotation.transpose() * pose.rotation - Eigen::Matrix3d::Identity()).norm(),
               1e-14);
     EXPECT_LE(offTheWay(start.translation, end.translation, pose.translation, fraction), 1e-15);
-    const auto place = [](const Pose& at, const Vector3d& p) {
-      Vector3d x;
-      for (int k = 0; k < 3; ++k)
-        x[k] = at.rotation(k, 0) * p[0] + at.rotation(k, 1) * p[1] + at.rotation(k, 2) * p[2] +
-               at.translation[k];
-      return x;
-    };
     std::vector<Positions> ends = guarded.ends(all);
     for (std::size_t v = 0; v < ends[1].size(); ++v) {
-      all.before[1][v] = place(start, all.bodies[1].positions[v]);
-      ends[1][v] = place(pose, all.bodies[1].positions[v]);
+      all.before[1][v] = start(all.bodies[1].positions[v]);
+      ends[1][v] = reached(all.bodies[1].positions[v]);
     }
     EXPECT_EQ(countTouches(all, ends), 0u);
   }

@@ -175,17 +175,6 @@ TEST(GeometryTypes, EdgesHaveOneContactAtTheirClosestPoints) {
   }
 }
 
-TEST(GeometryTypes, ParticleOnAPlaneReportsItsDepth) {
-  const TestGeometry ground{
-      GeometryType::Triangles, {{-4, -4, 0}, {4, -4, 0}, {0, 4, 0}}, {{0, 1, 2}}, {}};
-  const TestGeometry drop{GeometryType::Points, {{0, 0, 0.25}, {0, 0, -3}}, {}, {}, {0.5, 1.0}};
-  const CollisionData data = answer(drop, ground, {Method::Proximity, 0.0, Contacts::Distinct});
-  ASSERT_EQ(data.vertexTriangle().size(), 1u);
-  EXPECT_EQ(data.vertexTriangle()[0].vertex, 0u);
-  EXPECT_EQ(data.vertexTriangle()[0].distance, -0.25);
-  EXPECT_EQ(data.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
-}
-
 TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
   const TestGeometry thread = lineOf({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}}, 0.125);
   const TestGeometry drops{GeometryType::Points,

@@ -148,19 +148,6 @@ TEST(Intersection, OneEdgeOfEachGivesTheEndsBehind) {
   EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
 }
 
-TEST(Intersection, NormalsOfFacesAreWindingNormalsAndDistancesBehindThemAreNegative) {
-  const ContactBuffers found = contactsOf(meshOf(kPiercing), meshOf(kGround));
-  EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
-  EXPECT_EQ(found.vertexTriangle[0].distance, -1);
-  EXPECT_EQ(found.vertexTriangle[0].timeOfImpact, 1);
-  const Corners turned{{kGround[1], kGround[0], kGround[2]}};
-  const ContactBuffers above = contactsOf(meshOf(kPiercing), meshOf(turned));
-  EXPECT_EQ(above.vertexTriangle[0].normal, Vector3d(-Vector3d::UnitZ()));
-  // The tip is in front of the turned ground, and the other two vertices are behind it.
-  ASSERT_EQ(above.vertexTriangle.size(), 2u);
-  for (const VertexTriangleContact& c : above.vertexTriangle) EXPECT_EQ(c.distance, -2);
-}
-
 /// The tip is below the ground and beyond its edge y = 0. The nearest point of the ground is (1, 0,
 /// 0). The normal is along the line from the tip to it.
 TEST(Intersection, NormalsOfEdgesPointToTheSideOfTheWindingNormal) {

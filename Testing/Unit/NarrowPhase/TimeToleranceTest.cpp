@@ -119,42 +119,6 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
 }
 
-/// A thousand impacts at a fiftieth of the step, and one at a hundredth. Once the remaining time is
-/// short, boxes of features sweep the first part of the step only.
-TEST(EarliestTime, IsFoundAmongManyLaterImpacts) {
-  testing::Mesh mesh;
-  Positions now;
-  const auto add = [&](const Eigen::Vector3d& at, double height, double fall) {
-    const auto v = static_cast<std::uint32_t>(mesh.positions.size());
-    for (const Eigen::Vector3d& corner :
-         {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0.25, 1, 0)}) {
-      mesh.positions.push_back(at + corner + Eigen::Vector3d(0, 0, height));
-      now.push_back(mesh.positions.back() - Eigen::Vector3d(0, 0, fall));
-    }
-    mesh.triangles.push_back({v, v + 1, v + 2});
-  };
-  for (const int first : {0, 2499}) {
-    mesh = {};
-    now.clear();
-    for (int i = 0; i < 2500; ++i) {
-      const Eigen::Vector3d at(3 * (i % 50), 3 * (i / 50), 0);
-      add(at, 0, 0);
-      add(at, i == first ? 1 : 2, 100);
-    }
-    for (const int threads : {1, 2}) {
-      OctreeBasedCD detection({.threads = threads});
-      const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-      detection.addCollisionPair(
-          id, id, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
-      detection.setPositions(id, mesh.positions, now);
-      detection.detectCollision();
-      const double time = detection.collisionData(id, id).earliestTimeOfImpact();
-      EXPECT_LE(time, 0.01) << first;
-      EXPECT_GE(time, 0.01 - 1e-6) << first;
-    }
-  }
-}
-
 /// With many triangles, the time is that of all contacts, in any order of the search. The octrees
 /// sweep the whole step.
 TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {

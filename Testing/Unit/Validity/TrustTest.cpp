@@ -21,38 +21,26 @@ namespace {
 
 constexpr int kSamples = 48;
 
-/// A body turns evenly about an axis and slides along it.
-struct Pose {
-  Matrix3d rotation = Matrix3d::Identity();
-  Vector3d translation = Vector3d::Zero();
-
-  Vector3d operator()(const Vector3d& p) const { return rotation * p + translation; }
-  Pose then(const Vector3d& axis, double angle, const Vector3d& through,
-            const Vector3d& slide) const {
-    const Matrix3d turn = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
-    return {turn * rotation, turn * (translation - through) + through + slide};
-  }
-};
-
-/// One geometry of a pair and its step.
+/// One geometry of a pair and its step, in which a placed body turns evenly about an axis and
+/// slides along it.
 struct Body {
   std::optional<AnalyticalGeometry> shape;
   TestGeometry geometry;
   bool placed = false;
   Positions before, now;  ///< in the body's frame
-  Pose pose;              ///< before the step
+  Place pose;             ///< before the step
   Vector3d axis = Vector3d::UnitX(), through = Vector3d::Zero(), slide = Vector3d::Zero();
   double angle = 0;
 
   GeometryId addTo(OctreeBasedCD& collisions) const {
     return shape ? collisions.addAnalyticalGeometry(*shape) : geometry.addTo(collisions);
   }
-  Pose poseAt(double s) const { return pose.then(axis, s * angle, through, s * slide); }
+  Place poseAt(double s) const { return pose.then(axis, s * angle, through, s * slide); }
   /// Places it where it is at the time s of its step.
   void placeAt(double s, OctreeBasedCD& collisions, GeometryId id) const {
     if (placed) {
-      const Pose at = poseAt(s);
-      collisions.setTransform(id, {at.rotation, at.translation});
+      const Place at = poseAt(s);
+      collisions.setTransform(id, at.pose());
       return;
     }
     Positions positions = before;
@@ -273,9 +261,8 @@ void runHistory(Random& random, int kindA, int kindB, std::map<std::string, Tall
       if (random() % 5 != 0) move(random, *body, most);
       if (onGrid) snap(*body);
       if (body->placed) {
-        const Pose end = body->poseAt(1);
-        collisions.setTransform(id, {body->pose.rotation, body->pose.translation},
-                                {end.rotation, end.translation});
+        const Place end = body->poseAt(1);
+        collisions.setTransform(id, body->pose.pose(), end.pose());
       } else {
         collisions.setPositions(id, body->before, body->now);
       }

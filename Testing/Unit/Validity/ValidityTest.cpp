@@ -360,6 +360,22 @@ INSTANTIATE_TEST_SUITE_P(
                       MethodCase{"AutoWithoutThickness", {Method::Auto, 0}}),
     [](const auto& test) { return test.param.name; });
 
+/// Of those that move further than the limit, the first.
+TEST(Validity, NamesFastVertices) {
+  const Mesh low = flat(12, 0), high = flat(12, 1);
+  for (const std::uint32_t every : {1u, 2u}) {
+    PairRun run(settingsOf(Engine::Octree), high, low, {Method::Proximity, 0.01}, false);
+    Positions now = high.positions;
+    std::vector<std::uint32_t> fast;
+    for (std::uint32_t v = 0; v < now.size(); v += every) {
+      now[v].x() += 0.5;
+      if (fast.size() < Validity::kMaxFastVertices) fast.push_back(v);
+    }
+    run.step(high.positions, now, low.positions, low.positions);
+    EXPECT_EQ(run.data().validity().untrustedVerticesA, fast);
+  }
+}
+
 /// A step without motion, with features within the thickness. Then a solver moves positions by less
 /// than the thickness, so that the meshes intersect.
 TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
