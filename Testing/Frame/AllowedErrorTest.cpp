@@ -130,14 +130,19 @@ class BodyScene {
   bool m_isBodyFirst;
 };
 
+Matrix3d turnBy(Random& random, double by) {
+  return AngleAxisd(uniform(random, -by, by), randomPoint(random, -1, 1).normalized())
+      .toRotationMatrix();
+}
+
 /// A ball that comes near the ring and goes away again. The ring turns, and both are carried along.
 class Walk {
  public:
   Walk(std::uint64_t seed, Kind kind) : m_random(seed), m_ball(ball(kind).positions) {
     m_gap = uniform(m_random, 0, 0.2);
     m_place = uniform(m_random, -3, 3);
-    m_turn = randomTurn(3);
-    m_now.rotation = randomTurn(3);
+    m_turn = turnBy(m_random, 3);
+    m_now.rotation = turnBy(m_random, 3);
     m_now.translation = randomPoint(m_random, -2, 2);
     place();
   }
@@ -154,8 +159,8 @@ class Walk {
       const double size = kind < 4 ? 0.002 : kind < 7 ? 0.01 : 0.03;
       m_gap += uniform(m_random, -size, size);
       m_place += uniform(m_random, -size, size);
-      m_turn = randomTurn(size) * m_turn;
-      if (kind % 2) m_now.rotation = randomTurn(size) * m_now.rotation;
+      m_turn = turnBy(m_random, size) * m_turn;
+      if (kind % 2) m_now.rotation = turnBy(m_random, size) * m_now.rotation;
     } else if (kind < 12) {  // about the distance at the end
       const double motion = std::clamp(m_gap - uniform(m_random, 0, 2 * kErrorBound), 0.0, 0.2);
       m_place += motion / 1.6;
@@ -174,10 +179,6 @@ class Walk {
   }
 
  private:
-  Matrix3d randomTurn(double by) {
-    return AngleAxisd(uniform(m_random, -by, by), randomPoint(m_random, -1, 1).normalized())
-        .toRotationMatrix();
-  }
   void place() {
     const Matrix3d around = AngleAxisd(m_place, Vector3d::UnitZ()).toRotationMatrix();
     const Vector3d centre = (1.3 + kBallRadius + m_gap) * Vector3d::UnitX();
@@ -459,7 +460,7 @@ constexpr double kParticle = 0.01, kProxyError = 0.01, kNear = 0.04;
 class Cloud {
  public:
   Cloud(std::uint64_t seed, bool isOpen) : m_random(seed), m_mesh(ring(isOpen).mesh) {
-    m_now.rotation = randomTurn(3);
+    m_now.rotation = turnBy(m_random, 3);
     m_now.translation = randomPoint(m_random, -2, 2);
     for (int i = 0; i < 400; ++i) m_offsets.push_back(offset(i));
     place();
@@ -471,7 +472,7 @@ class Cloud {
     m_before = m_now;
     const std::uint64_t kind = m_random() % 5;
     if (kind == 0) return;  // at rest
-    if (kind > 2) m_now.rotation = randomTurn(kind == 3 ? 1e-3 : 0.2) * m_now.rotation;
+    if (kind > 2) m_now.rotation = turnBy(m_random, kind == 3 ? 1e-3 : 0.2) * m_now.rotation;
     m_now.translation += randomPoint(m_random, -0.5, 0.5);
     for (std::size_t i = 0; i < m_offsets.size(); ++i) {
       const std::uint64_t motion = m_random() % 8;
@@ -483,10 +484,6 @@ class Cloud {
   }
 
  private:
-  Matrix3d randomTurn(double by) {
-    return AngleAxisd(uniform(m_random, -by, by), randomPoint(m_random, -1, 1).normalized())
-        .toRotationMatrix();
-  }
   /// From a triangle's centre, in the body's frame.
   Vector3d offset(std::size_t i) {
     const auto& [a, b, c] = m_mesh.triangles[(7 * i) % m_mesh.triangles.size()];
