@@ -115,30 +115,6 @@ OctreeBasedCD movedScene() {
   return detection;
 }
 
-TEST_F(Capture, ReplaysTheLastFrame) {
-  const OctreeBasedCD detection = movedScene();
-  const GeometryId a{1}, b{2};
-  capture(detection, file());
-  EXPECT_EQ(fileCount(), 1u);
-  const CollisionProblem problem = readCapture(file());
-  expectSame(problem, detection.problem());
-  ASSERT_EQ(problem.geometries.size(), 2u);
-  EXPECT_EQ(problem.geometries[0].id, a);
-  EXPECT_FALSE(sameBits(problem.geometries[0].before, problem.geometries[0].now));
-  ASSERT_EQ(problem.pairs.size(), 2u);
-  EXPECT_EQ(problem.pairs[0].settings.method, Method::Auto);
-  EXPECT_EQ(problem.pairs[0].method, detection.collisionData(b, a).validity().method);
-  EXPECT_EQ(problem.pairs[1].method, detection.collisionData(a, a).validity().method);
-
-  OctreeBasedCD replay = setUp(problem);
-  replay.detectCollision();
-  const CollisionData& data = replay.collisionData(GeometryId{1}, GeometryId{0});
-  EXPECT_GT(data.vertexTriangle().size(), 0u);
-  EXPECT_EQ(data.hash(), detection.collisionData(b, a).hash());
-  EXPECT_EQ(replay.collisionData(GeometryId{0}, GeometryId{0}).hash(),
-            detection.collisionData(a, a).hash());
-}
-
 /// Placed bodies, radii, tetrahedra, a rest distance, settings of a proxy, and every filter.
 TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
   const testing::WholeSceneInput input(8);
@@ -195,6 +171,7 @@ TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
   const CollisionData& whole = detection.collisionData(b, a);
   const AuditFailure failure{.a = b, .b = a};
   capture(detection, failure, file());
+  EXPECT_EQ(fileCount(), 1u);
   CollisionProblem problem = readCapture(file());
   ASSERT_EQ(problem.pairs.size(), 1u);
   ASSERT_EQ(problem.geometries.size(), 2u);

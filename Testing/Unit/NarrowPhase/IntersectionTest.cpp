@@ -98,39 +98,26 @@ void expectContacts(const Corners& first, const Corners& second,
 const Corners kGround{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}};
 const Corners kPiercing{{{1, 1, -1}, {1, 1.5, 2}, {1.5, 1, 2}}};
 
-// ---- Cases in which the old octree had no contacts ----
-
-TEST(IntersectionRegression, VertexOfTheSecondMeshPiercesAFaceOfTheFirst) {
+/// The older octree had no contacts in these cases. Testing/Regression has them as captures.
+TEST(IntersectionRegression, HasTheContactsOfTheDefinition) {
   expectContacts(kGround, kPiercing, {}, {{0, 0}}, {});
   expectContacts(kPiercing, kGround, {{0, 0}}, {}, {});
-}
-
-TEST(IntersectionRegression, ThreeEdgesCross) {
   // Two edges of the first cross the ground's plane: one inside, one exactly on the edge y = 0. The
   // vertex that they share is behind the ground, and a corner of the ground behind the first.
   const Corners three{{{1, 1, 1}, {1, 1, -1}, {1, -1, 1}}};
   expectContacts(three, kGround, {{1, 0}}, {{1, 0}}, {{1, 2, 0, 1}});
-}
-
-TEST(IntersectionRegression, CoplanarTriangles) {
   const Corners inside{{{1, 1, 0}, {2, 1, 0}, {1, 2, 0}}};
   expectContacts(inside, kGround, {{0, 0}, {1, 0}, {2, 0}}, {}, {});
   const Corners star{{{-1, 1, 0}, {6, 1, 0}, {1, -1, 0}}};
   expectContacts(
       star, kGround, {}, {{0, 0}},
       {{0, 1, 0, 2}, {0, 1, 1, 2}, {0, 2, 0, 1}, {0, 2, 0, 2}, {1, 2, 0, 1}, {1, 2, 1, 2}});
-}
-
-TEST(IntersectionRegression, VertexExactlyOnAFace) {
   const Corners standing{{{1, 1, 0}, {1, 2, 3}, {2, 1, 3}}};
   expectContacts(standing, kGround, {{0, 0}}, {}, {});
   const ContactBuffers found = contactsOf(meshOf(standing), meshOf(kGround));
   EXPECT_EQ(found.vertexTriangle[0].distance, 0);
   EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
   EXPECT_TRUE(found.vertexTriangle[0].weights.isApprox(Vector3d(0.5, 0.25, 0.25), 1e-15));
-}
-
-TEST(IntersectionRegression, EdgesShorterThanTwentyMillionths) {
   Corners ground = kGround, piercing = kPiercing;
   for (Corners* corners : {&ground, &piercing})
     for (Vector3d& corner : *corners) corner *= 1e-9;
@@ -233,32 +220,6 @@ TEST(SelfIntersection, DuplicatedVerticesTouch) {
   EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{0, 1}, {3, 0}}));
   EXPECT_EQ(found.edgeEdge.size(), 4u);
   EXPECT_EQ(found.intersectingTriangles.size(), 1u);
-}
-
-TEST(SelfIntersection, FoldByAHalfTurnAboutAnEdgeIsFound) {
-  const std::vector<Triangle> hinge{{0, 1, 2}, {1, 0, 3}};
-  const auto folded = [&](const Vector3d& wing) {
-    return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {1, 3, 1}, wing}, hinge));
-  };
-  EXPECT_TRUE(folded({1, -3, -1}).intersectingTriangles.empty());  // flat
-  EXPECT_TRUE(folded({1, 3, 2}).intersectingTriangles.empty());
-  const ContactBuffers found = folded({1.5, 1.5, 0.5});
-  EXPECT_EQ(found.intersectingTriangles.size(), 1u);
-  EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{3, 0}}));
-}
-
-TEST(SelfIntersection, EdgeThroughAFaceAtACommonVertexIsListed) {
-  const std::vector<Triangle> fan{{0, 1, 2}, {0, 3, 4}};
-  const auto fanned = [&](const Vector3d& p, const Vector3d& q) {
-    return selfContactsOf(meshOf({{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, p, q}, fan));
-  };
-  EXPECT_TRUE(fanned({1, 1, 1}, {1, 1, 2}).intersectingTriangles.empty());
-  EXPECT_TRUE(fanned({-1, -1, -1}, {-1, -1, 2}).intersectingTriangles.empty());
-  const ContactBuffers found = fanned({1, 1, -1}, {1, 1, 2});
-  EXPECT_EQ(found.intersectingTriangles, (Buffer<ElementPair>{{0, 1}}));
-  EXPECT_EQ(idsOf(rowsOf(found.vertexTriangle)), (std::vector<Row>{{3, 0}}));
-  EXPECT_TRUE(found.edgeEdge.empty());
-  EXPECT_EQ(idsOf(rowsOf(fanned({1, 1, 0}, {1, 1, 2}).vertexTriangle)), (std::vector<Row>{{3, 0}}));
 }
 
 TEST(SelfIntersection, DuplicateTrianglesShareEverything) {
