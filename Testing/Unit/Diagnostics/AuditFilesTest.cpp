@@ -3,6 +3,7 @@
 
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
+#include "Common/TemporaryFolder.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +11,6 @@
 #include <fstream>
 #include <set>
 #include <string>
-#include <unistd.h>
 
 // Whole frames with a planted fault: the failures that the audit lists, and the files that it
 // writes.
@@ -32,18 +32,16 @@ void corrupt(const OctreeBasedCD& detection, GeometryId geometry) {
 
 class AuditFiles : public ::testing::Test {
  protected:
-  const fs::path m_folder =
-      fs::temp_directory_path() / ("palpate-audit" + std::to_string(::getpid()));
+  const testing::TemporaryFolder m_temporary;
+  const fs::path& m_folder = m_temporary.path;
   const GeometryId m_a{0}, m_b{1};
   Mesh m_meshes[2] = {testing::sheet(12, 0.0, 0.0), testing::sheet(11, 0.01, 1.0)};
 
   void SetUp() override {
-    fs::create_directory(m_folder);
 #ifdef PALPATE_VALIDATE
     GTEST_SKIP() << "octrees are validated here, which finds the planted fault first";
 #endif
   }
-  void TearDown() override { fs::remove_all(m_folder); }
 
   OctreeBasedCD detection(AuditSettings audit) const {
     OctreeBasedCD detection({.threads = 1, .audit = std::move(audit)});
@@ -63,17 +61,13 @@ class AuditFiles : public ::testing::Test {
     detection.detectCollision();
     detection.advance();
   }
-  std::size_t fileCount() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(m_folder), fs::directory_iterator()));
-  }
 };
 
 TEST_F(AuditFiles, FaultIsListedAndWrittenToAFileThatReplaysIt) {
   OctreeBasedCD faulty = detection(everything());
   faulty.detectCollision();
   EXPECT_TRUE(faulty.auditFailures().empty());
-  EXPECT_EQ(fileCount(), 0u);
+  EXPECT_EQ(m_temporary.fileCount(), 0u);
   const std::size_t contacts = faulty.collisionData(m_a, m_b).vertexTriangle().size();
   EXPECT_GT(contacts, 20u);
   faultyFrame(faulty);
@@ -91,7 +85,7 @@ TEST_F(AuditFiles, FaultIsListedAndWrittenToAFileThatReplaysIt) {
     lists.insert(failure.list);
   }
   EXPECT_EQ(lists.size(), 3u);
-  EXPECT_EQ(fileCount(), 1u);
+  EXPECT_EQ(m_temporary.fileCount(), 1u);
 
   // Without the fault, the file's problem has exactly the missing contacts.
   const CollisionProblem problem = readCapture(file);
@@ -142,7 +136,7 @@ TEST_F(AuditFiles, AtMostMaxFilesAreWrittenAndARemovedFolderIsNamed) {
     ASSERT_FALSE(faulty.auditFailures().empty());
     EXPECT_EQ(faulty.auditFailures().front().file.empty(), frame == 3);
   }
-  EXPECT_EQ(fileCount(), 2u);
+  EXPECT_EQ(m_temporary.fileCount(), 2u);
   EXPECT_NE(faulty.auditFailures().front().fileError.find(m_folder.string()), std::string::npos);
 
   OctreeBasedCD homeless = detection(everything());

@@ -5,15 +5,14 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Replayed.h"
 #include "Common/Sanitized.h"
+#include "Common/TemporaryFolder.h"
 #include "Common/WholeScene.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <limits>
-#include <unistd.h>
 
 namespace palpate {
 namespace {
@@ -25,24 +24,7 @@ using testing::Random;
 
 class Capture : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    m_folder = fs::temp_directory_path() /
-               ("palpate-" + std::string(test->name()) + std::to_string(::getpid()));
-    fs::create_directories(m_folder);
-  }
-  void TearDown() override { fs::remove_all(m_folder); }
-
-  fs::path file(const char* name = "file.capture") const { return m_folder / name; }
-  std::size_t fileCount() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(m_folder), fs::directory_iterator()));
-  }
-
-  std::string textOf(const fs::path& path) const {
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
+  fs::path file(const char* name = "file.capture") const { return m_folder.path / name; }
   void write(const std::string& text) const {
     std::ofstream(file(), std::ios::binary | std::ios::trunc) << text;
   }
@@ -53,7 +35,7 @@ class Capture : public ::testing::Test {
       testing::expectRefused(ErrorCode::File, named, [&] { readCapture(file()); });
   }
 
-  fs::path m_folder;
+  testing::TemporaryFolder m_folder;
 };
 
 bool sameBits(const std::vector<Eigen::Vector3d>& l, const std::vector<Eigen::Vector3d>& r) {
@@ -171,7 +153,7 @@ TEST_F(Capture, KeepsThePairOfAnAuditFailure) {
   const CollisionData& whole = detection.collisionData(b, a);
   const AuditFailure failure{.a = b, .b = a};
   capture(detection, failure, file());
-  EXPECT_EQ(fileCount(), 1u);
+  EXPECT_EQ(m_folder.fileCount(), 1u);
   CollisionProblem problem = readCapture(file());
   ASSERT_EQ(problem.pairs.size(), 1u);
   ASSERT_EQ(problem.geometries.size(), 2u);
@@ -219,7 +201,7 @@ TEST_F(Capture, KeepsEveryBit) {
 
 TEST_F(Capture, RefusesTruncatedFiles) {
   writeCapture(smallProblem(), file());
-  const std::string whole = textOf(file());
+  const std::string whole = testing::contentOf(file());
   ASSERT_TRUE(whole.ends_with("end\n"));
   for (std::size_t size = 0; size + 1 < whole.size(); size += 2) {
     write(whole.substr(0, size));
@@ -240,7 +222,7 @@ TEST_F(Capture, ErrorsNameTheFault) {
   fs::remove(file());
 
   writeCapture(smallProblem(), file());
-  const std::string whole = textOf(file());
+  const std::string whole = testing::contentOf(file());
   const auto expectRefusedWith = [&](const std::string& from, const std::string& to,
                                      const std::string& reason) {
     std::string text = whole;
@@ -296,7 +278,7 @@ TEST_F(Capture, RefusesCountsThatDoNotFitIntoTheFile) {
 
 TEST_F(Capture, ReadsEarlierVersions) {
   writeCapture(smallProblem(), file());
-  std::string text = textOf(file());
+  std::string text = testing::contentOf(file());
   const auto replaceAll = [&](const std::string& words, const std::string& with) {
     ASSERT_NE(text.find(words), text.npos) << words;
     for (std::size_t at; (at = text.find(words)) != text.npos;)
@@ -346,7 +328,7 @@ TEST_F(Capture, ReadsEarlierVersions) {
 TEST_F(Capture, RefusesWhatIsOutsideTheRange) {
   const auto expectNotWritten = [&](const CollisionProblem& problem, ErrorCode code) {
     testing::expectRefused(code, "", [&] { writeCapture(problem, file()); });
-    EXPECT_EQ(fileCount(), 0u);
+    EXPECT_EQ(m_folder.fileCount(), 0u);
   };
   CollisionProblem problem;
   for (const double bad :
@@ -362,7 +344,7 @@ TEST_F(Capture, RefusesWhatIsOutsideTheRange) {
   problem.geometries[1].now[2][0] = 0x1.8p-7;
   problem.pairs[0].settings.thickness = 0x1.8p-9;
   writeCapture(problem, file());
-  const std::string whole = textOf(file());
+  const std::string whole = testing::contentOf(file());
   for (const std::string bad : {"nan", "inf", "1p+997"})
     for (const auto& [from, reason] : {std::pair("1.8p-7", "geometry 1, vertex 2: position is"),
                                        std::pair("1.8p-9", "thickness is")}) {
@@ -386,21 +368,21 @@ TEST_F(Capture, RefusesBodiesPlacedOutsideTheRange) {
 }
 
 TEST_F(Capture, LeavesNoPartialFile) {
-  const fs::path nowhere = m_folder / "missing" / "file.capture";
+  const fs::path nowhere = m_folder.path / "missing" / "file.capture";
   EXPECT_THROW(writeCapture(smallProblem(), nowhere), Error);
-  EXPECT_EQ(fileCount(), 0u);
+  EXPECT_EQ(m_folder.fileCount(), 0u);
   // A folder has the file's name, so the rename fails.
   fs::create_directories(file() / "full");
   testing::expectRefused(ErrorCode::File, file().string(),
                          [&] { writeCapture(smallProblem(), file()); });
-  EXPECT_EQ(fileCount(), 1u);
+  EXPECT_EQ(m_folder.fileCount(), 1u);
   // The disk is full after a part: the existing file stays.
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   writeCapture(CollisionProblem(), file("kept.capture"));
   fs::create_symlink("/dev/full", file("kept.capture.part"));
   EXPECT_THROW(writeCapture(smallProblem(), file("kept.capture")), Error);
   EXPECT_TRUE(readCapture(file("kept.capture")).geometries.empty());
-  EXPECT_EQ(fileCount(), 2u);
+  EXPECT_EQ(m_folder.fileCount(), 2u);
 }
 
 }  // namespace

@@ -5,9 +5,9 @@
 #include "Common/ExpectRefused.h"
 #include "Common/FailingAllocation.h"
 #include "Common/RandomMeshes.h"
+#include "Common/TemporaryFolder.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -84,12 +84,8 @@ struct Balls {
 
 class TraceFile : public ::testing::Test {
  protected:
-  void SetUp() override { fs::create_directory(m_folder); }
-  void TearDown() override { fs::remove_all(m_folder); }
-
-  const fs::path m_folder =
-                     fs::temp_directory_path() / ("palpate-trace" + std::to_string(::getpid())),
-                 m_file = m_folder / "frames.json";
+  const TemporaryFolder m_folder;
+  const fs::path m_file = m_folder.path / "frames.json";
 };
 
 TEST_F(TraceFile, HasTheLastFramesWithNestedEvents) {
@@ -154,7 +150,7 @@ TEST_F(TraceFile, RefusesWhatItCannotDo) {
                 [&] { untraced.collisions.writeTrace(m_file); });
   EXPECT_FALSE(fs::exists(m_file));
   Balls traced({.traceFrames = 1});
-  const fs::path missing = m_folder / "missing" / "frames.json";
+  const fs::path missing = m_folder.path / "missing" / "frames.json";
   expectRefused(ErrorCode::File, missing.string().c_str(),
                 [&] { traced.collisions.writeTrace(missing); });
   traced.collisions.writeTrace(m_file);  // before any frame

@@ -5,6 +5,7 @@
 
 #include "Common/FailingAllocation.h"
 #include "Common/Sanitized.h"
+#include "Common/TemporaryFolder.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,25 +67,10 @@ inline ReadOutcome outcomeOf(const std::string& name, const std::string& content
 /// A folder for the files of one test.
 class MeshFileFixture : public ::testing::Test {
  protected:
-  MeshFileFixture()
-      : folder(std::filesystem::path(::testing::TempDir()) /
-               (std::string(test()->test_suite_name()) + "." + test()->name() + ".mesh-files")) {
-    std::filesystem::create_directories(folder);
-  }
-  static const ::testing::TestInfo* test() {
-    return ::testing::UnitTest::GetInstance()->current_test_info();
-  }
-  ~MeshFileFixture() override { std::filesystem::remove_all(folder); }
-
   std::filesystem::path write(const std::string& name, const std::string& content) const {
     std::filesystem::remove(folder / name);  // a file truncated and written again goes to the disk
     std::ofstream(folder / name, std::ios::binary) << content;
     return folder / name;
-  }
-
-  static std::string contentOf(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
   }
 
   MeshArrays read(const std::string& name, const std::string& content,
@@ -148,7 +133,8 @@ class MeshFileFixture : public ::testing::Test {
         }
   }
 
-  std::filesystem::path folder;
+  const TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path;
 };
 
 }  // namespace palpate::testing
