@@ -22,68 +22,27 @@ namespace palpate {
 namespace {
 
 using Eigen::Vector3d;
-using oracle::checkEdgeEdge, oracle::checkVertexTriangle, oracle::Four, oracle::isDegenerate;
+using oracle::checkEdgeEdge, oracle::checkVertexTriangle, oracle::DistanceCases,
+    oracle::DistanceKind, oracle::Four, oracle::isDegenerate;
 
-class RandomFeatures {
- public:
-  explicit RandomFeatures(std::uint64_t seed = 7) : m_engine(seed) {}
-  double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
-  int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
-  double smallPower() { return std::pow(10.0, -below(18)); }
-  Vector3d vector() { return {real(), real(), real()}; }
-  Four four() { return {vector(), vector(), vector(), vector()}; }
-
- private:
-  std::mt19937_64 m_engine;
-};
-
-/// One category of configurations each: random; slivers; far from the origin; on a small grid;
-/// nearly touching; nearly parallel; nearly coincident; from the smallest to the largest doubles.
-constexpr int kKindsOfPoints = 8;
-
-Four configuration(int kind, RandomFeatures& random) {
-  Four x = random.four();
-  switch (kind) {
-    case 1:
-      x[3] = x[1] + random.real() * (x[2] - x[1]) + random.smallPower() * random.vector();
-      break;
-    case 2:
-      for (Vector3d& v : x) v += Vector3d(1e6, -2e6, 3e5);
-      break;
-    case 3:
-      for (Vector3d& v : x) v = Vector3d(random.below(4), random.below(4), random.below(4));
-      break;
-    case 4:
-      x[0] = x[1] + 0.5 * (1 + random.real()) * (x[2] - x[1]) +
-             0.3 * random.below(2) * (x[3] - x[1]) + random.smallPower() * random.vector();
-      break;
-    case 5:
-      x[3] = x[2] + random.real() * (x[1] - x[0]) + random.smallPower() * random.vector();
-      break;
-    case 6:
-      x[1 + random.below(3)] = x[random.below(4)] + random.smallPower() * random.vector();
-      break;
-    case 7:
-      for (Vector3d& v : x) v = v * std::ldexp(1.0, random.below(2092) - 1070);
-      if (random.below(4) == 0) x[random.below(4)] *= 1e-20;
-      break;
-  }
-  return x;
+VertexTriangleDistance faceOf(const Four& x) {
+  return vertexTriangleDistance(x[0], x[1], x[2], x[3]);
 }
+EdgeEdgeDistance edgesOf(const Four& x) { return edgeEdgeDistance(x[0], x[1], x[2], x[3]); }
 
 /// The number of cases of each category. Long tests run more, and others.
 int pairsOfEachKind() {
   const char* asked = std::getenv("PALPATE_DISTANCE_PAIRS");
-  return asked ? std::atoi(asked) / kKindsOfPoints : testing::casesOf(1500);
+  return asked ? std::atoi(asked) / oracle::kDistanceKinds : testing::casesOf(1500);
 }
 
 TEST(ClosestPoint, AgreesWithRationalArithmetic) {
-  RandomFeatures random(std::getenv("PALPATE_DISTANCE_PAIRS") ? 8 : 7);
+  DistanceCases cases(std::getenv("PALPATE_DISTANCE_PAIRS") ? 8 : 7);
   oracle::Errors vertexTriangle, edgeEdge;
-  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
+  for (int kind = 0; kind < oracle::kDistanceKinds; ++kind) {
     for (int i = 0; i < pairsOfEachKind() && !HasFailure(); ++i) {
       SCOPED_TRACE("kind " + std::to_string(kind) + ", number " + std::to_string(i));
-      const Four x = configuration(kind, random);
+      const Four x = cases.next(static_cast<DistanceKind>(kind));
       vertexTriangle.keepLarger(checkVertexTriangle(x));
       edgeEdge.keepLarger(checkEdgeEdge(x));
     }
@@ -98,12 +57,11 @@ TEST(ClosestPoint, AgreesWithRationalArithmetic) {
 
 /// Features that touch are decided in integers.
 TEST(ClosestPoint, OrdinaryFeaturesNeedNoExactArithmetic) {
-  RandomFeatures random;
+  DistanceCases cases(7);
   int exact = 0;
   for (int i = 0; i < 2000; ++i) {
-    const Four x = configuration(0, random);
-    exact += vertexTriangleDistance(x[0], x[1], x[2], x[3]).exact;
-    exact += edgeEdgeDistance(x[0], x[1], x[2], x[3]).exact;
+    const Four x = cases.next(DistanceKind::Random);
+    exact += faceOf(x).exact + edgesOf(x).exact;
   }
   EXPECT_LT(exact, 4);
   const Vector3d a(0, 0, 0), b(4, 0, 0), c(0, 4, 0);
@@ -148,75 +106,41 @@ TEST(ClosestPoint, EveryRegionBorderOfTwoEdgesIsCrossed) {
         }
 }
 
-/// Found by fuzzing: scaled so that the differences are near 1, the positions' sums overflow.
-TEST(ClosestPoint, SmallDifferencesFarFromTheOriginDoNotOverflow) {
-  checkEdgeEdge({Vector3d(2, 0, 0x1.fp-1021), Vector3d(2, 0, 0x1p-1050),
-                 Vector3d(2, 0, 0x1.74p-1021), Vector3d(2, 0, 0x1.74p-1021)});
-  RandomFeatures random;
-  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
-    Four x;
-    const int axis = random.below(3), exponent = random.below(1060) - 1074;
-    const double far = std::ldexp(1.0, exponent + 1010 + random.below(25));
-    for (Vector3d& p : x) {
-      p = Vector3d(random.below(9), random.below(9), random.below(9));
-      for (double& coordinate : p) coordinate = std::ldexp(coordinate, exponent);
-      p[axis] = far;
-    }
+/// What fuzzing found. DistanceCases has random positions of most of these kinds.
+TEST(ClosestPoint, FoundPositionsAgreeWithRationalArithmetic) {
+  const Vector3d none = Vector3d::Zero();
+  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+  const Vector3d p(1, kLeast, 0), q(4, 3 * kLeast, 0);
+  const std::pair<const char*, Four> found[] = {
+      {"scaled positions have sums that overflow",
+       {Vector3d(2, 0, 0x1.fp-1021), Vector3d(2, 0, 0x1p-1050), Vector3d(2, 0, 0x1.74p-1021),
+        Vector3d(2, 0, 0x1.74p-1021)}},
+      {"weights of 1/2 and 2^-53 more have a sum that rounds to 1",
+       {Vector3d(0x1.0000000000003p-66, 0x1.78p+34, 0x1.78p+34),
+        Vector3d(0x1.78p+34, 0x1.78p+35, 0x1.7800000000001p+34),
+        Vector3d(0, 0x1.68p+19, 0x1.aef94p-72), none}},
+      {"the weight along an edge that is 2^-52 of the others has an error",
+       {Vector3d(1, 0, 0x0.00000ffd1de4p-1022), Vector3d(1, -0x1.bp+4, -0x1.bp+4),
+        Vector3d(1, -0x1.affffffffffffp+4, -0x1.b000000000001p+4),
+        Vector3d(0x0.0005d61bba9e5p-1022, 0, 0x1.000ffffffff23p-895)}},
+      {"ends are equally far within rounding, and the vectors to them differ by more",
+       {Vector3d(13697, 0x1.ep45, 1), Vector3d(81, 0x1.ep45, 3), none, none}},
+      {"the same",
+       {Vector3d(1, -3848290697215, 1), Vector3d(-0x1p-414, -3848290697215, 1), none, none}},
+      {"the same",
+       {Vector3d(9000, 0x1p45, 0), Vector3d(1, 0x1p45, 0), Vector3d(-3, 0, 0), Vector3d(-2, 0, 0)}},
+      {"the square of the normal is denormal",
+       {Vector3d(-2.8468967807917267e-267, -1.2114454386347773e-268, 6.0572271931738892e-269),
+        Vector3d(0, 0, 1.3435752215134178e-138),
+        Vector3d(0, -8.6172813846470428e-19, 1.817168157952166e-268),
+        Vector3d(1.2126554232481092e-34, 5.0274985703343258e-267, 1.3435752215134175e-138)}},
+      {"another end's distance is computed as 0", {none, p, none, q}},
+      {"the same", {none, p, q, none}},
+      {"the same", {p, none, q, none}}};
+  for (const auto& [fault, x] : found) {
+    SCOPED_TRACE(fault);
     checkVertexTriangle(x);
     checkEdgeEdge(x);
-  }
-}
-
-/// Found by fuzzing: the weights of b and c are 1/2 and 2^-53 more, whose sum is rounded to 1.
-TEST(ClosestPoint, WeightsNextToTheLongestEdgeAreNotNegative) {
-  checkVertexTriangle({Vector3d(0x1.0000000000003p-66, 0x1.78p+34, 0x1.78p+34),
-                       Vector3d(0x1.78p+34, 0x1.78p+35, 0x1.7800000000001p+34),
-                       Vector3d(0, 0x1.68p+19, 0x1.aef94p-72), Vector3d(0, 0, 0)});
-  RandomFeatures random;
-  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
-    const Vector3d b = random.vector(), c = random.vector(),
-                   a = 0.5 * (b + c) + 0.3 * random.vector(),
-                   normal = (b - a).cross(c - a).normalized();
-    const double s = 0.5 + 0.1 * random.smallPower() * random.real();
-    const Vector3d p = b + s * (c - b) + random.real() * random.smallPower() * normal +
-                       0x1p-53 * random.below(3) * (a - b);
-    checkVertexTriangle({p, a, b, c});
-  }
-}
-
-/// Found by fuzzing: the weight along an edge that is 2^-52 of the others has an error, and the sum
-/// of the weights is past 1 by as much.
-TEST(ClosestPoint, WeightsAlongShortEdgesDoNotMoveThePoint) {
-  checkVertexTriangle({Vector3d(1, 0, 0x0.00000ffd1de4p-1022), Vector3d(1, -0x1.bp+4, -0x1.bp+4),
-                       Vector3d(1, -0x1.affffffffffffp+4, -0x1.b000000000001p+4),
-                       Vector3d(0x0.0005d61bba9e5p-1022, 0, 0x1.000ffffffff23p-895)});
-  RandomFeatures random;
-  for (int i = 0; i < testing::casesOf(4000) && !HasFailure(); ++i) {
-    const Vector3d a = random.vector(),
-                   b = a + std::ldexp(1.0, -random.below(50)) * random.vector(),
-                   c = random.vector(), normal = (b - a).cross(c - a).normalized();
-    const double s = 0.5 * (1 + random.real());
-    const Vector3d p = (1 - s) * a + s * c +
-                       std::ldexp(1.0, -random.below(60)) * random.real() * (b - a) +
-                       random.vector().x() * normal;
-    checkVertexTriangle({p, a, b, c});
-    checkVertexTriangle({p, b, c, a});
-  }
-}
-
-/// Edges far apart for their length. Their common perpendicular passes exactly through an end, and
-/// products with the vector between the edges round.
-TEST(ClosestPoint, FarEdgesAreClassifiedExactly) {
-  RandomFeatures random;
-  const auto whole = [&] {
-    return Vector3d(random.below(1 << 20), random.below(1 << 20), random.below(1 << 20));
-  };
-  for (int i = 0; i < 1000 && !HasFailure(); ++i) {
-    const Vector3d p = 4 * (whole() - whole()), q = 4 * (whole() - whole()), p0 = whole();
-    const double s = random.below(2), t = 0.25 * random.below(5);
-    const Vector3d q0 = p0 + s * p - t * q + (1 + random.below(3)) * p.cross(q);
-    checkEdgeEdge({p0, p0 + p, q0, q0 + q});
-    checkEdgeEdge({q0, q0 + q, p0, p0 + p});
   }
 }
 
@@ -234,17 +158,6 @@ TEST(ClosestPoint, MiddlesOfShortSharedIntervalsAreEnds) {
   EXPECT_EQ(end.featureB, EdgeFeature::Interior);
   EXPECT_EQ(swapped.featureA, EdgeFeature::Interior);
   EXPECT_EQ(swapped.featureB, EdgeFeature::Start);
-}
-
-/// Found by fuzzing: the ends of one edge are equally far from the other within rounding, but the
-/// vectors to them differ by much more.
-TEST(ClosestPoint, NearlyTiedEndsOfParallelEdgesAreDecidedExactly) {
-  const Vector3d none = Vector3d::Zero();
-  checkEdgeEdge({Vector3d(13697, 0x1.ep45, 1), Vector3d(81, 0x1.ep45, 3), none, none});
-  checkEdgeEdge(
-      {Vector3d(1, -3848290697215, 1), Vector3d(-0x1p-414, -3848290697215, 1), none, none});
-  checkEdgeEdge(
-      {Vector3d(9000, 0x1p45, 0), Vector3d(1, 0x1p45, 0), Vector3d(-3, 0, 0), Vector3d(-2, 0, 0)});
 }
 
 /// Found by fuzzing: the foot of q's end is inside p, but so near to p's end that its weight rounds
@@ -265,40 +178,6 @@ TEST(ClosestPoint, FeetNextToAnEndHaveTheirOwnDifference) {
     EXPECT_LT(std::abs(forward.difference[1] / expected[1] - 1.0), 0x1p-20) << exponent;
     checkEdgeEdge({p0, p1, q0, q1});
   }
-}
-
-/// Edges that share an end are so nearly parallel that another end's distance is computed as 0.
-TEST(ClosestPoint, CommonEndsAreNearest) {
-  constexpr double kLeast = std::numeric_limits<double>::denorm_min();
-  const Vector3d common = Vector3d::Zero(), p(1, kLeast, 0), q(4, 3 * kLeast, 0);
-  for (const Four& x :
-       {Four{common, p, common, q}, Four{common, p, q, common}, Four{p, common, q, common}}) {
-    checkEdgeEdge(x);
-    EXPECT_EQ(edgeEdgeDistance(x[0], x[1], x[2], x[3]).distance, 0.0);
-  }
-}
-
-/// Their differences are moderate, but not their coordinates, whose error compensation would carry.
-TEST(ClosestPoint, NearlyParallelEdgesFarFromTheOriginAreDecidedExactly) {
-  RandomFeatures random;
-  const auto onGrid = [&](int size) -> Vector3d {
-    return Vector3d(random.below(size), random.below(size), random.below(size)) * 0x1p50;
-  };
-  for (int i = 0; i < 2000 && !HasFailure(); ++i) {
-    const Vector3d origin = Vector3d(1.1, -1.3, 1.7) * 0x1p99, edge = onGrid(1000);
-    Four x{origin, origin + edge, origin + onGrid(100), origin};
-    x[3] = x[2] + (1 + random.below(3)) * edge + onGrid(2);
-    checkEdgeEdge(x);
-  }
-}
-
-/// Found by fuzzing: the square of the normal is denormal, though the extent is moderate.
-TEST(ClosestPoint, NormalIsUnitWhereItsSquareUnderflows) {
-  checkEdgeEdge(
-      {Vector3d(-2.8468967807917267e-267, -1.2114454386347773e-268, 6.0572271931738892e-269),
-       Vector3d(0, 0, 1.3435752215134178e-138),
-       Vector3d(0, -8.6172813846470428e-19, 1.817168157952166e-268),
-       Vector3d(1.2126554232481092e-34, 5.0274985703343258e-267, 1.3435752215134175e-138)});
 }
 
 // ---- Invariances ----
@@ -330,48 +209,45 @@ Bits bitsOf(const EdgeEdgeDistance& d) {
   return bits;
 }
 
-TEST(ClosestPoint, PermutingCornersPermutesWeights) {
-  RandomFeatures random;
-  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
-    for (int i = 0; i < 300; ++i) {
-      const Four x = configuration(kind, random);
-      if (isDegenerate(x)) continue;
-      const Bits bits = bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3]));
-      std::array<int, 3> order{0, 1, 2};
-      do {
-        const VertexTriangleDistance other =
-            vertexTriangleDistance(x[0], x[1 + order[0]], x[1 + order[1]], x[1 + order[2]]);
-        std::array<int, 3> back;
-        for (int j = 0; j < 3; ++j) back[order[j]] = j;
-        ASSERT_EQ(bitsOf(other, back), bits) << "kind " << kind << ", number " << i;
-      } while (std::next_permutation(order.begin(), order.end()));
-    }
+/// Expects the same bits for exchanged edges and exchanged ends.
+void expectSwapped(const Four& x) {
+  const auto& [p0, p1, q0, q1] = x;
+  const EdgeEdgeDistance answer = edgesOf(x);
+  EdgeEdgeDistance edges = edgesOf({q0, q1, p0, p1}), first = edgesOf({p1, p0, q0, q1}),
+                   second = edgesOf({p0, p1, q1, q0});
+  std::swap(edges.weightA, edges.weightB);
+  edges.difference = -edges.difference;
+  edges.normal = -edges.normal;
+  first.weightA = 1.0 - first.weightA;
+  second.weightB = 1.0 - second.weightB;
+  for (const EdgeEdgeDistance& other : {edges, first, second})
+    ASSERT_EQ(bitsOf(other), bitsOf(answer));
+  if (answer.parallel) {
+    ASSERT_EQ(edges.normal, answer.normal);
   }
 }
 
-TEST(ClosestPoint, SwappingEdgesOrEndsSwapsTheResult) {
-  RandomFeatures random;
-  for (int kind = 0; kind < kKindsOfPoints; ++kind) {
-    for (int i = 0; i < 500; ++i) {
-      const auto [p0, p1, q0, q1] = configuration(kind, random);
-      const EdgeEdgeDistance answer = edgeEdgeDistance(p0, p1, q0, q1);
-      if (answer.parallel) continue;
-      EdgeEdgeDistance edges = edgeEdgeDistance(q0, q1, p0, p1);
-      std::swap(edges.weightA, edges.weightB);
-      edges.difference = -edges.difference;
-      edges.normal = -edges.normal;
-      ASSERT_EQ(bitsOf(edges), bitsOf(answer)) << "kind " << kind << ", number " << i;
-      EdgeEdgeDistance ends = edgeEdgeDistance(p1, p0, q0, q1);
-      ends.weightA = 1.0 - ends.weightA;
-      ASSERT_EQ(bitsOf(ends), bitsOf(answer)) << "kind " << kind << ", number " << i;
+TEST(ClosestPoint, ExchangedCornersEdgesAndEndsKeepTheBits) {
+  DistanceCases cases(7);
+  for (int kind = 0; kind < oracle::kDistanceKinds; ++kind)
+    for (int i = 0; i < 300 && !HasFailure(); ++i) {
+      SCOPED_TRACE("kind " + std::to_string(kind) + ", number " + std::to_string(i));
+      const Four x = cases.next(static_cast<DistanceKind>(kind));
+      if (!edgesOf(x).parallel) expectSwapped(x);
+      if (isDegenerate(x)) continue;
+      std::array<int, 3> order{0, 1, 2}, back{};
+      do {
+        for (int j = 0; j < 3; ++j) back[order[j]] = j;
+        ASSERT_EQ(bitsOf(faceOf({x[0], x[1 + order[0]], x[1 + order[1]], x[1 + order[2]]}), back),
+                  bitsOf(faceOf(x)));
+      } while (std::next_permutation(order.begin(), order.end()));
     }
-  }
 }
 
 /// Parallel edges in every relation: along an axis with coordinates of two decimals, or in any
 /// direction; side by side, behind each other, collinear.
-TEST(ClosestPoint, SwappingParallelEdgesOrEndsSwapsTheResult) {
-  RandomFeatures random;
+TEST(ClosestPoint, ExchangedParallelEdgesAndEndsKeepTheBits) {
+  DistanceCases random(7);
   int touching = 0;
   for (int i = 0; i < 20000; ++i) {
     Four x;
@@ -391,19 +267,10 @@ TEST(ClosestPoint, SwappingParallelEdgesOrEndsSwapsTheResult) {
     const auto& [p0, p1, q0, q1] = x;
     if (p0 == p1 || q0 == q1) continue;  // all weights name one point
     if ((p0 == q0 && p1 == q1) || (p0 == q1 && p1 == q0)) continue;
-    const EdgeEdgeDistance answer = edgeEdgeDistance(p0, p1, q0, q1);
-    touching += answer.distance == 0.0;
-    EdgeEdgeDistance edges = edgeEdgeDistance(q0, q1, p0, p1);
-    std::swap(edges.weightA, edges.weightB);
-    edges.difference = -edges.difference;
-    edges.normal = -edges.normal;
-    ASSERT_EQ(bitsOf(edges), bitsOf(answer)) << i;
-    if (answer.parallel) {
-      ASSERT_EQ(edges.normal, answer.normal) << i;
-    }
-    EdgeEdgeDistance ends = edgeEdgeDistance(p0, p1, q1, q0);
-    ends.weightB = 1.0 - ends.weightB;
-    ASSERT_EQ(bitsOf(ends), bitsOf(answer)) << i;
+    SCOPED_TRACE(i);
+    expectSwapped(x);
+    if (HasFatalFailure()) return;
+    touching += edgesOf(x).distance == 0.0;
   }
   EXPECT_GT(touching, 1000);
 }
@@ -422,70 +289,61 @@ Bits scaledBits(Answer answer, int exponent) {
   return bitsOf(answer);
 }
 
-TEST(ClosestPoint, MirroringKeepsTheBits) {
-  RandomFeatures random;
-  for (int kind = 0; kind < 7; ++kind) {
-    for (int i = 0; i < 500; ++i) {
-      const Four x = configuration(kind, random);
-      Four mirrored = x;
-      for (Vector3d& v : mirrored) v[0] = -v[0];
-      ASSERT_EQ(mirroredBits(edgeEdgeDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3])),
-                bitsOf(edgeEdgeDistance(x[0], x[1], x[2], x[3])));
-      if (kind == 3) continue;  // corners that are mirror images of each other
-      ASSERT_EQ(
-          mirroredBits(vertexTriangleDistance(mirrored[0], mirrored[1], mirrored[2], mirrored[3])),
-          bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3])))
-          << "kind " << kind << ", number " << i;
-    }
-  }
+/// Of positions that a function maps to others.
+template <class F>
+Four mapped(Four x, F&& f) {
+  for (Vector3d& p : x) p = f(p);
+  return x;
 }
 
 /// Scales from where distances of 1e-17 of the positions still have all their bits to where squared
 /// lengths have long overflowed.
-TEST(ClosestPoint, PowersOfTwoKeepTheBits) {
-  RandomFeatures random;
-  for (int kind = 0; kind < 7; ++kind) {
+TEST(ClosestPoint, MirroredScaledAndMovedPositionsKeepTheBits) {
+  DistanceCases cases(7);
+  for (int k = 0; k < oracle::kDistanceKinds; ++k) {
+    const auto kind = static_cast<DistanceKind>(k);
+    // Corners on a grid may be mirror images of each other. Corners of a triangle without area may
+    // have one place.
+    const bool isOnGrid = kind == DistanceKind::SmallGrid || kind == DistanceKind::FarEdges ||
+                          kind == DistanceKind::SmallFarAway,
+               isNearOne = k <= static_cast<int>(DistanceKind::NoArea) ||
+                           kind == DistanceKind::MiddleOfTheLongestEdge;
     for (int i = 0; i < 200; ++i) {
-      const Four x = configuration(kind, random);
-      const EdgeEdgeDistance edges = edgeEdgeDistance(x[0], x[1], x[2], x[3]);
-      const VertexTriangleDistance face = vertexTriangleDistance(x[0], x[1], x[2], x[3]);
+      SCOPED_TRACE("kind " + std::to_string(k) + ", number " + std::to_string(i));
+      const Four x = cases.next(kind);
+      const bool hasArea = !isDegenerate(x);
+      const EdgeEdgeDistance edges = edgesOf(x);
+      const VertexTriangleDistance face = faceOf(x);
+      const Four mirrored =
+          mapped(x, [](const Vector3d& p) { return Vector3d(-p[0], p[1], p[2]); });
+      ASSERT_EQ(mirroredBits(edgesOf(mirrored)), bitsOf(edges));
+      if (!isOnGrid && hasArea) {
+        ASSERT_EQ(mirroredBits(faceOf(mirrored)), bitsOf(face));
+      }
+      if (kind == DistanceKind::SmallGrid || kind == DistanceKind::FarEdges) {
+        const Four moved =
+            mapped(x, [](const Vector3d& p) -> Vector3d { return p + Vector3d(1e6, -3e6, 5e5); });
+        ASSERT_EQ(bitsOf(edgesOf(moved)), bitsOf(edges));
+        ASSERT_EQ(bitsOf(faceOf(moved)), bitsOf(face));
+      }
+      if (!isNearOne) continue;
       for (const int exponent : {-900, -521, -260, -99, -7, 79, 101, 255, 512, 900, 1001}) {
-        Four y = x;
-        for (Vector3d& v : y)
-          for (double& coordinate : v) coordinate = std::ldexp(coordinate, exponent);
-        ASSERT_EQ(bitsOf(edgeEdgeDistance(y[0], y[1], y[2], y[3])), scaledBits(edges, exponent))
-            << "kind " << kind << ", number " << i << ", 2^" << exponent;
-        ASSERT_EQ(bitsOf(vertexTriangleDistance(y[0], y[1], y[2], y[3])),
-                  scaledBits(face, exponent))
-            << "kind " << kind << ", number " << i << ", 2^" << exponent;
+        const Four y = mapped(x, [&](const Vector3d& p) { return test::scaled(p, exponent); });
+        ASSERT_EQ(bitsOf(edgesOf(y)), scaledBits(edges, exponent)) << "2^" << exponent;
+        if (hasArea) {
+          ASSERT_EQ(bitsOf(faceOf(y)), scaledBits(face, exponent)) << "2^" << exponent;
+        }
       }
     }
   }
 }
 
-TEST(ClosestPoint, MovingOnAGridKeepsTheBits) {
-  RandomFeatures random;
-  for (int i = 0; i < 2000; ++i) {
-    Four x, moved;
-    const Vector3d offset(1e6, -3e6, 5e5);
-    for (int j = 0; j < 4; ++j) {
-      x[j] =
-          Vector3d(random.below(1 << 20), random.below(1 << 20), random.below(1 << 20)) * 0x1p-20;
-      moved[j] = x[j] + offset;
-    }
-    ASSERT_EQ(bitsOf(vertexTriangleDistance(x[0], x[1], x[2], x[3])),
-              bitsOf(vertexTriangleDistance(moved[0], moved[1], moved[2], moved[3])));
-    ASSERT_EQ(bitsOf(edgeEdgeDistance(x[0], x[1], x[2], x[3])),
-              bitsOf(edgeEdgeDistance(moved[0], moved[1], moved[2], moved[3])));
-  }
-}
-
 TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
-  RandomFeatures random;
+  DistanceCases cases(7);
   int shared = 0;
   for (int i = 0; i < 3000; ++i) {
-    const auto [p, a, b, c] = configuration(i % 7, random);
-    const Vector3d d = random.vector();
+    const auto [p, a, b, c] = cases.next(static_cast<DistanceKind>(i % 7));
+    const Vector3d d = cases.next(DistanceKind::Random)[0];
     const VertexTriangleDistance left = vertexTriangleDistance(p, a, b, c);
     const VertexTriangleDistance right = vertexTriangleDistance(p, b, a, d);
     if (left.feature != TriangleFeature::EdgeAB || right.feature != TriangleFeature::EdgeAB)
@@ -504,11 +362,11 @@ TEST(ClosestPoint, TrianglesThatShareAnEdgeAgreeOnIt) {
 // ---- Sides ----
 
 TEST(ClosestPoint, SidesAreExact) {
-  RandomFeatures random;
+  DistanceCases cases(7);
   int inwards = 0, nearer = 0;
   constexpr int kCases = 8000;
   for (int i = 0; i < kCases; ++i) {
-    const auto [p, a, b, c] = configuration(i % kKindsOfPoints, random);
+    const auto [p, a, b, c] = cases.next(static_cast<DistanceKind>(i % oracle::kDistanceKinds));
     ASSERT_EQ(liesInwards(p, a, b, c), exact::side(p, a, b, c) > 0) << i;
     ASSERT_EQ(comesNearer(p, a, b), exact::along(p, a, b) > 0) << i;
     inwards += liesInwards(p, a, b, c);

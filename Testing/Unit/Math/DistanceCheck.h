@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Math/ClosestPoint.h"
+#include "DistanceCases.h"
 #include "Math/ExactClosestPoint.h"
 #include "RationalOracle.h"
 
@@ -12,8 +13,6 @@
 
 /// Results of Distance.h compared with rational arithmetic. Failures are GoogleTest's.
 namespace palpate::oracle {
-
-using Four = std::array<Eigen::Vector3d, 4>;  ///< p a b c, or p0 p1 q0 q1
 
 inline constexpr double kAllowedUlp = 8.0;
 

@@ -10,9 +10,7 @@ namespace palpate {
 namespace {
 
 ImpactResult find(const ImpactCase& query, double distance, double upTo) {
-  ImpactQuery q{query.edges ? ImpactQuery::Kind::EdgeEdge : ImpactQuery::Kind::VertexTriangle, {}};
-  for (int i = 0; i < 4; ++i) q.vertices[i] = {query.positions[i], query.positions[4 + i]};
-  return findImpact(q, {.minimumDistance = distance}, upTo);
+  return findImpact(query.query(), {.minimumDistance = distance}, upTo);
 }
 
 /// Grids, small displacements between features that pass at about the distance, and random queries.

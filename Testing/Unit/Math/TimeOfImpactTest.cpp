@@ -74,16 +74,6 @@ TEST(TimeOfImpact, AgreesWithOracleOnSmallGrids) {
   EXPECT_GT(impacts, static_cast<int>(testing::leastOf(600)));
 }
 
-TEST(TimeOfImpact, AgreesWithOracleOnFullDoubles) {
-  test::Random random(2);
-  int impacts = 0;
-  for (int i = 0; i < 400; ++i) {
-    expectTrue(randomCase(random, i % 2 == 0), 1e-6, impacts);
-    if (HasFatalFailure()) return;
-  }
-  EXPECT_GT(impacts, 40);
-}
-
 /// Random queries that `change` makes hard. Some have impacts, and some have none.
 template <class Change>
 void expectTrueOfChanged(test::Random& random, Change&& change) {
@@ -215,60 +205,32 @@ TEST(TimeOfImpact, IsNotEarlierThanTheToleranceWhereRoundingHidesTheRoot) {
   EXPECT_GT(impacts, 600);
 }
 
-TEST(TimeOfImpact, DoesNotDependOnTheOrderOfCorners) {
+/// In other orders, at other sizes and origins, and backwards. Coordinates of sizes from the
+/// smallest to the largest double in one query are ordered by exact arithmetic only.
+TEST(TimeOfImpact, EquivalentQueriesHaveTheSameDecisionAndTime) {
   test::Random random(3);
-  for (int i = 0; i < 3000 && !::testing::Test::HasFatalFailure(); ++i) {
-    const ImpactCase query =
-        i % 4 < 3 ? randomGridCase(random, i % 2 == 0, 2) : randomCase(random, i % 2 == 0);
-    for (const auto& order : orders(query.edges)) expectSame(query, query.permuted(order));
-  }
-}
-
-TEST(TimeOfImpact, DecisionIsTheSameBackwards) {
-  test::Random random(4);
-  for (int i = 0; i < 6000; ++i) {
-    const ImpactCase query =
-        i % 4 < 3 ? randomGridCase(random, i % 2 == 0, 2) : randomCase(random, i % 2 == 0);
+  int impacts = 0;
+  const int cases = testing::casesOf(4000);
+  for (int i = 0; i < cases && !::testing::Test::HasFatalFailure(); ++i) {
+    ImpactCase query =
+        i % 4 < 3 ? randomGridCase(random, i % 8 < 4, 2) : randomCase(random, i % 8 < 4);
+    const bool isMixed = i % 4 == 2;
+    for (Eigen::Vector3d& p : query.positions)
+      for (int k = 0; k < 3 && isMixed; ++k)
+        if (random.below(3) == 0) p[k] = std::ldexp(p[k], random.between(-1074, 1021));
+    impacts += query.time().has_value();
     ASSERT_EQ(query.time().has_value(), query.reversed().time().has_value()) << text(query);
-  }
-}
-
-TEST(TimeOfImpact, ScalesByPowersOfTwo) {
-  test::Random random(5);
-  for (int i = 0; i < 2000 && !::testing::Test::HasFatalFailure(); ++i) {
-    const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
+    for (const auto& order : orders(query.edges)) expectSame(query, query.permuted(order));
+    if (i % 4 > 1) continue;
     for (const int exponent : {-1074, -1073, -900, -300, -150, 100, 180, 400, 1000, 1020})
       expectSame(query,
                  query.mapped([&](const Eigen::Vector3d& p) { return test::scaled(p, exponent); }));
-  }
-}
-
-TEST(TimeOfImpact, DoesNotDependOnTheOrigin) {
-  test::Random random(6);
-  for (int i = 0; i < 2000 && !::testing::Test::HasFatalFailure(); ++i) {
-    const ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
     for (const double offset : {1e3, 1e6, 0x1p51})
       expectSame(query, query.mapped([&](const Eigen::Vector3d& p) -> Eigen::Vector3d {
         return p + Eigen::Vector3d(offset, -offset, 3 * offset);
       }));
   }
-}
-
-/// Sizes from the smallest to the largest double in one query: only exact arithmetic can order
-/// these.
-TEST(TimeOfImpact, DecidesMixedSizesTheSameInAnyOrder) {
-  test::Random random(7);
-  std::size_t impacts = 0;
-  for (int i = 0; i < testing::casesOf(1000) && !::testing::Test::HasFatalFailure(); ++i) {
-    ImpactCase query = randomGridCase(random, i % 2 == 0, 2);
-    for (Eigen::Vector3d& p : query.positions)
-      for (int k = 0; k < 3; ++k)
-        if (random.below(3) == 0) p[k] = std::ldexp(p[k], random.between(-1074, 1021));
-    impacts += query.time().has_value();
-    ASSERT_EQ(query.time().has_value(), query.reversed().time().has_value()) << text(query);
-    for (const auto& order : orders(query.edges)) expectSame(query, query.permuted(order));
-  }
-  EXPECT_GT(impacts, testing::leastOf(50));
+  EXPECT_GT(impacts, cases / 20);
 }
 
 TEST(TimeOfImpact, TakesAnyToleranceAndDistanceThatIsNotPositive) {
@@ -290,99 +252,6 @@ TEST(TimeOfImpact, TakesAnyToleranceAndDistanceThatIsNotPositive) {
       EXPECT_GE(*time, 1.0 / 3.0 - (tolerance > 0x1p-50 ? tolerance : 0x1p-50));
     }
   }
-}
-
-TEST(TimeOfImpact, HandlesStepsWithoutMotion) {
-  const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0);
-  const auto still = [](const Eigen::Vector3d& v, const Eigen::Vector3d& p,
-                        const Eigen::Vector3d& q, const Eigen::Vector3d& r) {
-    return vertexTriangleTimeOfImpact(v, p, q, r, v, p, q, r);
-  };
-  EXPECT_EQ(still({0.25, 0.25, 0}, a, b, c), 0.0);
-  EXPECT_EQ(still(a, a, b, c), 0.0);
-  EXPECT_EQ(still(a, a, a, a), 0.0);  // all in one place
-  EXPECT_EQ(still({0.5, 0.5, 0}, a, b, c), 0.0);
-  EXPECT_FALSE(still({0.5, 0.5, 5e-324}, a, b, c));
-  EXPECT_FALSE(still({0.5, std::nextafter(0.5, 1.0), 0}, a, b, c));
-  EXPECT_FALSE(still(b, a, a, a));
-  EXPECT_EQ(edgeEdgeTimeOfImpact(a, b, a, b, a, b, a, b), 0.0);
-  EXPECT_EQ(edgeEdgeTimeOfImpact(a, b, b, c, a, b, b, c), 0.0);
-  EXPECT_FALSE(edgeEdgeTimeOfImpact(a, b, c, c, a, b, c, c));
-}
-
-TEST(TimeOfImpact, TouchesAtTheEndsOfTheStep) {
-  const Eigen::Vector3d a(0, 0, 0), b(1, 0, 0), c(0, 1, 0), above(0.25, 0.25, 1), on(0.25, 0.25, 0);
-  EXPECT_EQ(vertexTriangleTimeOfImpact(on, a, b, c, above, a, b, c), 0.0);
-  const std::optional<double> last = vertexTriangleTimeOfImpact(above, a, b, c, on, a, b, c);
-  ASSERT_TRUE(last);
-  EXPECT_LE(*last, 1.0);
-  EXPECT_GE(*last, 1.0 - 1e-6);
-  EXPECT_FALSE(vertexTriangleTimeOfImpact(above, a, b, c, {0.25, 0.25, 5e-324}, a, b, c));
-  EXPECT_TRUE(vertexTriangleTimeOfImpact(above, a, b, c, {0.25, 0.25, -5e-324}, a, b, c));
-}
-
-/// Distance at a time, from the closest of all feature pairs, by independent plain code.
-double distanceAt(const ImpactCase& query, double t) {
-  std::array<Eigen::Vector3d, 4> x;
-  for (int i = 0; i < 4; ++i) x[i] = (1 - t) * query.positions[i] + t * query.positions[4 + i];
-  const auto toSegment = [](const Eigen::Vector3d& p, const Eigen::Vector3d& q,
-                            const Eigen::Vector3d& r) {
-    const double lengthSquared = (r - q).squaredNorm();
-    const double z =
-        lengthSquared > 0 ? std::clamp((p - q).dot(r - q) / lengthSquared, 0.0, 1.0) : 0.0;
-    return (p - q - z * (r - q)).norm();
-  };
-  const Eigen::Vector3d u =
-      query.edges ? Eigen::Vector3d(x[1] - x[0]) : Eigen::Vector3d(x[2] - x[1]);
-  const Eigen::Vector3d w =
-      query.edges ? Eigen::Vector3d(x[3] - x[2]) : Eigen::Vector3d(x[3] - x[1]);
-  const Eigen::Vector3d from =
-      query.edges ? Eigen::Vector3d(x[2] - x[0]) : Eigen::Vector3d(x[0] - x[1]);
-  Eigen::Matrix2d gram;
-  gram << u.dot(u), u.dot(w), u.dot(w), w.dot(w);
-  double best = query.edges ? std::min({toSegment(x[0], x[2], x[3]), toSegment(x[1], x[2], x[3]),
-                                        toSegment(x[2], x[0], x[1]), toSegment(x[3], x[0], x[1])})
-                            : std::min({toSegment(x[0], x[1], x[2]), toSegment(x[0], x[2], x[3]),
-                                        toSegment(x[0], x[3], x[1])});
-  if (gram.determinant() > 1e-12 * gram(0, 0) * gram(1, 1)) {
-    Eigen::Vector2d weights = gram.inverse() * Eigen::Vector2d(u.dot(from), w.dot(from));
-    const double x0 = weights[0], x1 = query.edges ? -weights[1] : weights[1];
-    const bool inside = x0 >= 0 && x1 >= 0 && (query.edges ? x0 <= 1 && x1 <= 1 : x0 + x1 <= 1);
-    if (inside) best = std::min(best, (from - weights[0] * u - weights[1] * w).norm());
-  }
-  return best;
-}
-
-TEST(TimeOfImpact, KeepsTheMinimumDistance) {
-  test::Random random(8);
-  const double tolerance = 1e-4, rounding = 1e-9;
-  int impacts = 0, misses = 0;
-  for (int i = 0; i < 3000; ++i) {
-    const ImpactCase query =
-        i % 2 ? randomCase(random, i % 4 < 2) : randomGridCase(random, i % 4 < 2, 2);
-    const double distance = std::ldexp(random.unit(), -random.below(8)) + 1e-3;
-    double displacement = 0;
-    for (int j = 0; j < 4; ++j)
-      displacement = std::max(displacement, (query.positions[4 + j] - query.positions[j]).norm());
-    const std::optional<double> time = query.time({distance, tolerance});
-    // No late time and no false negative: at no earlier sample is the distance below the minimum.
-    for (int sample = 0; sample <= 200; ++sample) {
-      const double t = time.value_or(1.0) * sample / 200;
-      if (time && t >= *time) break;
-      ASSERT_GT(distanceAt(query, t), distance - rounding) << text(query) << "\nat " << t;
-    }
-    // No false positive: soon after, the distance is within the stated error of the minimum.
-    if (time) {
-      double least = std::numeric_limits<double>::infinity();
-      for (int sample = 0; sample <= 10; ++sample)
-        least = std::min(least, distanceAt(query, std::min(*time + tolerance * sample / 10, 1.0)));
-      ASSERT_LE(least, distance + 3 * tolerance * displacement + rounding)
-          << text(query) << "\nat " << *time;
-    }
-    ++(time ? impacts : misses);
-  }
-  EXPECT_GT(impacts, 500);
-  EXPECT_GT(misses, 500);
 }
 
 TEST(TimeOfImpact, KeepsTheMinimumDistanceAtAnyScale) {
