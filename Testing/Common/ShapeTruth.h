@@ -7,7 +7,12 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <initializer_list>
 #include <limits>
+#include <optional>
+#include <variant>
 #include <vector>
 
 /// Analytical shapes by their definition: their extent along a direction.
@@ -106,6 +111,135 @@ inline std::vector<Vector3d> facetDirections(const PlacedShape& a, const PlacedS
       directions.push_back(-directions.back());
     }
   return directions;
+}
+
+/// Triangles that cover a hull's surface, each with its plane: every three points with all others
+/// on one side. If all points are in one plane: every three.
+struct Facets {
+  struct Facet {
+    std::array<Vector3d, 3> corners;
+    Vector3d normal;  ///< out
+    double turn;      ///< 1: by the corners' winding, too
+  };
+  std::vector<Facet> all;
+  bool isBody = false;
+
+  explicit Facets(const std::vector<Vector3d>& points) {
+    const std::size_t n = points.size();
+    for (const bool body : {true, false}) {
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = i; j < n; ++j)
+          for (std::size_t k = j; k < n; ++k) {
+            Vector3d normal = (points[j] - points[i]).cross(points[k] - points[i]);
+            double above = 0, below = 0;
+            for (const Vector3d& p : points) {
+              const double height = normal.normalized().dot(p - points[i]);
+              above = std::max(above, height);
+              below = std::min(below, height);
+            }
+            if (body && (normal.norm() < 1e-12 || std::min(above, -below) > 1e-12)) continue;
+            isBody |= body && std::max(above, -below) > 1e-12;
+            const double turn = above > -below ? -1 : 1;
+            normal = turn * normal.normalized();
+            all.push_back({{points[i], points[j], points[k]}, normal, turn});
+            if (body || normal == Vector3d::Zero()) continue;
+            all.push_back({{points[i], points[j], points[k]}, -normal, -turn});
+          }
+      if (isBody) return;
+      if (body) all.clear();
+    }
+  }
+
+  double signedDistance(const Vector3d& x) const {
+    double highest = -std::numeric_limits<double>::infinity(), nearest = -highest;
+    for (const Facet& f : all) {
+      const double height = f.normal.dot(x - f.corners[0]);
+      highest = std::max(highest, height);
+      if (height < -1e-14) continue;
+      bool over = true;
+      for (int i = 0; i < 3; ++i) {
+        const Vector3d &p = f.corners[i], edge = f.corners[(i + 1) % 3] - p, from = x - p;
+        over &= f.normal.dot(edge.cross(from)) * f.turn > 0;
+        const double square = edge.squaredNorm(),
+                     t = square > 0 ? std::clamp(from.dot(edge) / square, 0.0, 1.0) : 0.0;
+        nearest = std::min(nearest, (from - t * edge).norm());
+      }
+      if (over) nearest = std::min(nearest, std::abs(height));
+    }
+    return isBody && highest < 0 ? highest : nearest;
+  }
+};
+
+/// A shape with its distance. A hull must have fewer than ten points.
+struct MeasuredShape : PlacedShape {
+  std::optional<Facets> facets{};
+
+  MeasuredShape(const AnalyticalGeometry& shape, const Matrix3d& turn = Matrix3d::Identity(),
+                const Vector3d& shift = Vector3d::Zero())
+      : PlacedShape{shape, turn, shift} {
+    const auto* hull = std::get_if<ConvexHull>(&geometry);
+    if (hull && hull->points.size() < 10) facets.emplace(hull->points);
+  }
+  /// From its definition.
+  double signedDistance(const Vector3d& world) const {
+    const Vector3d x = rotation.transpose() * (world - translation);
+    const auto ofBox = [](std::initializer_list<double> beyond) {
+      double outside = 0;
+      for (const double b : beyond) outside += b > 0 ? b * b : 0;
+      return outside > 0 ? std::sqrt(outside) : std::max(beyond);
+    };
+    if (const auto* s = std::get_if<Sphere>(&geometry)) return (x - s->centre).norm() - s->radius;
+    if (const auto* c = std::get_if<Capsule>(&geometry)) {
+      const Vector3d u = c->p1 - c->p0;
+      const double t = u.dot(x - c->p0) / u.squaredNorm();
+      return (x - c->p0 - std::clamp(t, 0.0, 1.0) * u).norm() - c->radius;
+    }
+    if (const auto* p = std::get_if<Plane>(&geometry)) {
+      const double height = p->normal.normalized().dot(x - p->point);
+      return p->twoSided ? std::abs(height) : height;
+    }
+    if (const auto* b = std::get_if<Box>(&geometry)) {
+      const Vector3d beyond = (x - b->centre).cwiseAbs() - b->halfExtents;
+      return ofBox({beyond[0], beyond[1], beyond[2]});
+    }
+    if (facets) return facets->signedDistance(x);
+    const auto& c = std::get<Cylinder>(geometry);
+    const Vector3d u = (c.p1 - c.p0).normalized(), from = x - 0.5 * (c.p0 + c.p1);
+    return ofBox(
+        {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
+  }
+};
+
+/// The least distance on a segment, and on a triangle: of functions that are convex.
+inline double leastOn(const MeasuredShape& shape, const Vector3d& p, const Vector3d& q) {
+  return minimumOf([&](double t) { return shape.signedDistance(p + t * (q - p)); });
+}
+inline double leastOn(const MeasuredShape& shape, const Vector3d& a, const Vector3d& b,
+                      const Vector3d& c) {
+  return minimumOf([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
+}
+
+/// One of each kind, about 0.3 large and around the origin. Some are flat, thin, or a point.
+inline std::vector<AnalyticalGeometry> shapesOfEveryKind(Random& random) {
+  std::vector<Vector3d> cloud, plate;
+  for (int i = 0; i < 8; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
+  for (int i = 0; i < 5; ++i)
+    plate.push_back({uniform(random, -.3, .3), 0.1, uniform(random, -.3, .3)});
+  return {Sphere{{0.01, 0, 0}, 0.25},
+          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1},
+          Plane{{0, 0.05, 0}, {1, 2, 3}, false},
+          Plane{{0, 0.05, 0}, {1, -2, 3}, true},
+          Box{{0.05, 0, 0}, {0.3, 0.2, 0.1}},
+          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15},
+          ConvexHull{cloud},
+          Sphere{{0, 0, 0}, 0},
+          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0},
+          Box{{0, 0, 0}, {0.3, 0.2, 0}},
+          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0},
+          Cylinder{{0, 0, -0.01}, {0, 0, 0.01}, 0.4},
+          ConvexHull{plate},
+          ConvexHull{{{-0.3, 0, 0}, {0.1, 0, 0}, {0.3, 0, 0}}},
+          ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}}};
 }
 
 }  // namespace palpate::testing

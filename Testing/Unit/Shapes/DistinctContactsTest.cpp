@@ -230,28 +230,6 @@ TEST(DistinctContacts, MatchTheDefinition) {
   EXPECT_GT(dropped, leastOf(1000));
 }
 
-TEST(DistinctContacts, OfARidgeAreItsEdgesAndOfAValleyItsFaces) {
-  Random random(3);
-  const PairSettings settings{Method::Proximity, 0.05};
-  const auto countOf = [&](double slope, ShapeElement element, bool isRidge) {
-    const Mesh mesh =
-        floorOf(random, 16, 0.25, false, [&](double x, double) { return slope * std::abs(x); });
-    // A ball of radius 1 that is 0.02 away.
-    const double height = isRidge ? 1.02 : 1.02 * std::sqrt(1 + slope * slope);
-    const auto contacts =
-        contactsOf(mesh, Sphere{Vector3d::Zero(), 1.0}, settings, Matrix3d::Identity(),
-                   Vector3d::Zero(), Vector3d(0, 0.1, height));
-    return std::count_if(contacts.begin(), contacts.end(),
-                         [&](const ShapeContact& c) { return c.element == element; });
-  };
-  EXPECT_EQ(countOf(-0.5, ShapeElement::Edge, true), 1);
-  EXPECT_EQ(countOf(-0.5, ShapeElement::Face, true), 0);
-  EXPECT_EQ(countOf(-0.5, ShapeElement::Vertex, true), 0);
-  EXPECT_EQ(countOf(0.5, ShapeElement::Edge, false), 0);
-  EXPECT_EQ(countOf(0.5, ShapeElement::Face, false), 2);
-  EXPECT_EQ(countOf(0.5, ShapeElement::Vertex, false), 0);
-}
-
 /// A projected Gauss-Seidel solver moves a body by translation over a floor without friction.
 struct Sliding {
   double speed;   ///< at the end, relative to the start
@@ -382,33 +360,6 @@ TEST(DistinctContacts, OfABodyThatStandsInAFloorLeadOut) {
     }
   }
   EXPECT_GT(contacts, leastOf(20000));
-}
-
-/// Contacts of an impact are dropped by the same rule: a ball falls on a flat floor.
-TEST(DistinctContacts, OfAStepKeepTheFirstImpact) {
-  Random random(5);
-  const Mesh floor = flatFloor(random, true, Matrix3d::Identity());
-  for (int run = 0; run < 20; ++run) {
-    const Vector3d from(uniform(random, -1, 1), uniform(random, -1, 1), 1.3),
-        to = from + Vector3d(0.2, 0.1, -0.5);
-    for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-      FloorScene distinct(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05}, engine),
-          all(floor, Sphere{Vector3d::Zero(), 1.0}, {Method::Continuous, 0.05, Contacts::All},
-              engine);
-      const auto few = distinct.contacts(Matrix3d::Identity(), from, to),
-                 many = all.contacts(Matrix3d::Identity(), from, to);
-      EXPECT_LT(few.size(), many.size());
-      EXPECT_EQ(
-          distinct.collisions.collisionData(distinct.mesh, distinct.tool).earliestTimeOfImpact(),
-          all.collisions.collisionData(all.mesh, all.tool).earliestTimeOfImpact());
-      ASSERT_FALSE(few.empty());
-      const auto isFirst = [](const auto& l, const auto& r) {
-        return std::tie(l.timeOfImpact, l.distance) < std::tie(r.timeOfImpact, r.distance);
-      };
-      EXPECT_EQ(*std::min_element(few.begin(), few.end(), isFirst),
-                *std::min_element(many.begin(), many.end(), isFirst));
-    }
-  }
 }
 
 }  // namespace

@@ -1,8 +1,6 @@
-#include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/PairRun.h"
-#include "Common/Replayed.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 
@@ -236,35 +234,12 @@ void expectTrueContacts(const MovingShape& a, const MovingShape& b, const PairSe
   }
 }
 
-std::vector<AnalyticalGeometry> kindsOfShape(Random& random) {
-  std::vector<Vector3d> cloud, plate;
-  for (int i = 0; i < 8; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
-  for (int i = 0; i < 5; ++i)
-    plate.push_back({uniform(random, -.3, .3), 0.1, uniform(random, -.3, .3)});
-  return {Sphere{{0.01, 0, 0}, 0.25},
-          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1},
-          Plane{{0, 0.05, 0}, {1, 2, 3}, false},
-          Plane{{0, 0.05, 0}, {1, -2, 3}, true},
-          Box{{0.05, 0, 0}, {0.3, 0.2, 0.1}},
-          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15},
-          Cylinder{{0, 0, -0.01}, {0, 0, 0.01}, 0.4},
-          ConvexHull{cloud},
-          Sphere{{0, 0, 0}, 0},
-          Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0},
-          Box{{0, 0, 0}, {0.3, 0.2, 0}},
-          Box{{0, 0, 0}, {0.3, 0, 0}},
-          Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0},
-          ConvexHull{plate},
-          ConvexHull{{{-0.3, 0, 0}, {0.3, 0, 0}}},
-          ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}}};
-}
-
 TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   Random random(1);
   PairTally tally;
   std::size_t number = 0;
   for (int run = 0; run < 6; ++run) {
-    const std::vector<AnalyticalGeometry> all = kindsOfShape(random);
+    const std::vector<AnalyticalGeometry> all = shapesOfEveryKind(random);
     for (std::size_t i = 0; i < all.size(); ++i)
       for (std::size_t j = 0; j <= i; ++j) {
         if (std::holds_alternative<Plane>(all[i]) && std::holds_alternative<Plane>(all[j]))
@@ -340,89 +315,48 @@ TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
 }
 
 TEST(ShapePairSteps, MatchHandComputedValues) {
-  const auto only = [](const MovingShape& a, const MovingShape& b, double thickness) {
-    const auto c = contactOf(answer(a, b, continuousPair(thickness)));
-    EXPECT_TRUE(c);
-    return c ? *c : ShapeShapeContact{};
+  const Vector3d zero = Vector3d::Zero(), up = Vector3d::UnitZ();
+  const MovingShape ball(Sphere{{0, 0, 0}, 1}, zero, zero), floor(Plane{}, zero, zero),
+      table(Box{{0, 0, -1}, {5, 5, 1}}, zero, zero),
+      sheet(Plane{{0, 0, 0}, {0, 0, 1}, true}, up, -up);
+  const auto falling = [&](const AnalyticalGeometry& shape, double from, double to) {
+    return MovingShape(shape, from * up, to * up);
   };
-  const MovingShape ball(Sphere{{0, 0, 0}, 1}, {0, 0, 0}, {0, 0, 0});
-  for (const double thickness : {0.0, 0.25}) {
-    // Fast, through the plate and out again.
-    const double time = (500 - 2 - thickness) / 1000;
-    const ShapeShapeContact c =
-        only(MovingShape(Sphere{{0, 0, 0}, 1}, {0, 0, 500}, {0, 0, -500}), ball, thickness);
-    EXPECT_LE(c.timeOfImpact, time);
-    EXPECT_NEAR(c.timeOfImpact, time, 1e-6);
-    EXPECT_NEAR((c.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
-    EXPECT_NEAR(c.distance, thickness, 1e-3);
-    EXPECT_NEAR((c.pointB - Vector3d::UnitZ()).norm(), 0, 1e-12);
+  struct Row {
+    MovingShape a, b;
+    double thickness, time;
+    Vector3d normal;
+  };
+  for (const auto& [a, b, thickness, time, normal] : {
+           Row{falling(Sphere{zero, 1}, 500, -500), ball, 0, 0.498, up},  // fast, and out again
+           Row{falling(Sphere{zero, 1}, 500, -500), ball, 0.25, 0.49775, up},
+           Row{falling(Box{zero, {1, 1, 1}}, 5, -5), floor, 0, 0.4, up},
+           Row{falling(Box{zero, {1, 1, 1}}, 5, -5), table, 0, 0.4, up},
+           Row{falling(Cylinder{-up, up, 0.5}, 5, -5), floor, 0, 0.4, up},
+           Row{falling(Cylinder{-up, up, 0.5}, 5, -5), table, 0, 0.4, up},
+           Row{falling(Cylinder{{-1, 0, 0}, {1, 0, 0}, 1}, 5, -5), floor, 0, 0.4, up},
+           Row{falling(Cylinder{{-1, 0, 0}, {1, 0, 0}, 1}, 5, -5), table, 0, 0.4, up},
+           Row{falling(Sphere{zero, 0.5}, -3, 3), sheet, 0, 3.5 / 8, -up},  // from below
+       }) {
+    SCOPED_TRACE(std::to_string(a.geometry.index()) + " on " + std::to_string(b.geometry.index()));
+    const auto c = contactOf(answer(a, b, continuousPair(thickness)));
+    ASSERT_TRUE(c);
+    EXPECT_LE(c->timeOfImpact, time);
+    EXPECT_NEAR(c->timeOfImpact, time, 1e-6);
+    EXPECT_NEAR((c->normal - normal).norm(), 0, 1e-12);
+    EXPECT_NEAR(c->distance, thickness, 1e-3);
   }
   // Past each other at a little more, and a little less, than the thickness.
   for (const double gap : {1e-5, -1e-5}) {
-    const MovingShape past(Sphere{{0, 0, 0}, 1}, {-9, 0, 2.5 + gap}, {9, 0, 2.5 + gap});
+    const MovingShape past(Sphere{zero, 1}, {-9, 0, 2.5 + gap}, {9, 0, 2.5 + gap});
     EXPECT_EQ(answer(past, ball, continuousPair(0.5)).shapeShape().size(), gap < 0) << gap;
   }
-  // A box that lands flat on another, a cylinder on a floor on its end and on its side.
-  const MovingShape floor(Plane{}, {0, 0, 0}, {0, 0, 0}),
-      table(Box{{0, 0, -1}, {5, 5, 1}}, {0, 0, 0}, {0, 0, 0});
-  for (const MovingShape& ground : {floor, table}) {
-    const Vector3d from(0, 0, 5), to(0, 0, -5);
-    const ShapeShapeContact flat =
-                                only(MovingShape(Box{{0, 0, 0}, {1, 1, 1}}, from, to), ground, 0),
-                            onEnd =
-                                only(MovingShape(Cylinder{{0, 0, -1}, {0, 0, 1}, 0.5}, from, to),
-                                     ground, 0),
-                            onSide = only(MovingShape(Cylinder{{-1, 0, 0}, {1, 0, 0}, 1}, from, to),
-                                          ground, 0);
-    for (const ShapeShapeContact& c : {flat, onEnd, onSide}) {
-      EXPECT_NEAR(c.timeOfImpact, 0.4, 1e-6);
-      EXPECT_LE(c.timeOfImpact, 0.4);
-      EXPECT_NEAR((c.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
-    }
-  }
-  // Shapes within the thickness at the start are a contact at time 0, with all fields of Proximity.
-  const MovingShape deep(Box{{0, 0, 0}, {1, 1, 1}}, {0.25, 0, 1.5}, {0, 0, 9});
-  const ShapeShapeContact start = only(deep, ball, 0.125);
-  EXPECT_EQ(start.timeOfImpact, 0);
-  EXPECT_NEAR(start.distance, -0.5, 1e-13);
-  // Through a sheet, from below.
-  const MovingShape sheet(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 1}, {0, 0, -1});
-  const ShapeShapeContact below =
-      only(MovingShape(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, 3}), sheet, 0);
-  EXPECT_NEAR(below.timeOfImpact, 3.5 / 8, 1e-6);
-  EXPECT_EQ(below.normal, -Vector3d::UnitZ());
-  EXPECT_EQ(answer(MovingShape(Sphere{{0, 0, 0}, 0.5}, {0, 0, -3}, {0, 0, -1.75}),
-                   MovingShape(Plane{{0, 0, 0}, {0, 0, 1}, true}, {0, 0, 0}, {0, 0, -1}),
-                   continuousPair(0))
-                .shapeShape()
-                .size(),
-            0u);
-}
-
-TEST(ShapePairSteps, CapturesAndAuditIncludeThem) {
-  Random random(3);
-  Settings audited = settingsOf(Engine::Octree, 2);
-  audited.audit.features = 10;
-  OctreeBasedCD collisions(audited);
-  std::vector<GeometryId> ids;
-  for (const AnalyticalGeometry& shape : kindsOfShape(random)) {
-    ids.push_back(collisions.addAnalyticalGeometry(shape));
-    const Matrix3d turn = randomTurn(random);
-    collisions.setTransform(ids.back(), {turn, randomPoint(random, -1, 1)});
-    for (const GeometryId id : ids)
-      if (id != ids.back() && !std::holds_alternative<Plane>(shape))
-        collisions.addCollisionPair(id, ids.back(), continuousPair(0.05));
-  }
-  collisions.detectCollision();
-  collisions.advance();
-  for (const GeometryId id : ids) {
-    const Matrix3d turn = randomTurn(random);
-    collisions.setTransform(id, {turn, randomPoint(random, -1, 1)});
-  }
-  collisions.detectCollision();
-  EXPECT_TRUE(collisions.auditFailures().empty());
-  EXPECT_GT(collisions.statistics().contacts, 20u);
-  replayed(collisions);
+  // Within the thickness at the start: a contact at time 0, with all fields of Proximity.
+  const auto start = contactOf(answer(MovingShape(Box{zero, {1, 1, 1}}, {0.25, 0, 1.5}, {0, 0, 9}),
+                                      ball, continuousPair(0.125)));
+  ASSERT_TRUE(start);
+  EXPECT_EQ(start->timeOfImpact, 0);
+  EXPECT_NEAR(start->distance, -0.5, 1e-13);
 }
 
 }  // namespace

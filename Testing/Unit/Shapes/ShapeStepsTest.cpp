@@ -1,4 +1,3 @@
-#include <palpate/Capture.h>
 #include <palpate/ConstraintRows.h>
 #include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
@@ -6,7 +5,6 @@
 #include "Common/DistinctTruth.h"
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
-#include "Common/Replayed.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/TestGeometry.h"
@@ -489,32 +487,6 @@ TEST(ShapeSteps, NearMissesAreNoContacts) {
   }
 }
 
-/// A plane acts like the face of a large box, also where both turn.
-TEST(ShapeSteps, MovingPlanesMatchFacesOfBoxes) {
-  Random random(5);
-  const double size = 64;
-  for (int run = 0; run < 8; ++run) {
-    const Moving body = movingBody(random, 2, run % 2 ? 0.03 : 0.0);
-    Tool plane{Plane{}, {}}, box{Box{{0, 0, -size}, {size, size, size}}, {}};
-    plane.ends[0] = {randomTurn(random), randomPoint(random, -1, 1)};
-    plane.ends[1] = {
-        Eigen::AngleAxisd(uniform(random, 0, 2), randomPoint(random, -1, 1).normalized()) *
-            plane.ends[0].rotation,
-        randomPoint(random, -1, 1)};
-    box.ends = plane.ends;
-    const PairSettings pair = continuous(0.02);
-    const CollisionData ofPlane = answer(settingsOf(Engine::Octree), body, plane, pair),
-                        ofBox = answer(settingsOf(Engine::Octree), body, box, pair);
-    ASSERT_EQ(ofPlane.shape().size(), ofBox.shape().size());
-    for (std::size_t i = 0; i < ofBox.shape().size(); ++i) {
-      EXPECT_EQ(ofPlane.shape()[i].id, ofBox.shape()[i].id);
-      EXPECT_NEAR(ofPlane.shape()[i].timeOfImpact, ofBox.shape()[i].timeOfImpact, 2e-4);
-      EXPECT_NEAR((ofPlane.shape()[i].normal - ofBox.shape()[i].normal).norm(), 0, 1e-3);
-    }
-    EXPECT_EQ(ofPlane.validity().arcDeviation, kInfinity);
-  }
-}
-
 /// A shape turned over in one step has no extent at half time. No impact is late because of that.
 TEST(ShapeSteps, HalfTurnsHaveNoFalseNegatives) {
   Tool over = moving(Plane{}, {0, 0, 0}, {0, 0, 0});
@@ -537,30 +509,6 @@ TEST(ShapeSteps, ArcDeviationIsThatOfTheRotation) {
   const CollisionData data =
       answer(settingsOf(Engine::Octree), still(triangleAtZero()), rod, continuous(0));
   EXPECT_NEAR(data.validity().arcDeviation, 2 * (1 - std::cos(EIGEN_PI / 4)), 1e-9);
-}
-
-TEST(ShapeSteps, CapturesAndAuditIncludeThem) {
-  Random random(3);
-  const Moving body = movingBody(random, 0, 0);
-  Settings audited = settingsOf(Engine::Octree);
-  audited.audit.features = 1000;
-  OctreeBasedCD collisions(audited);
-  const GeometryId mesh = body.geometry.addTo(collisions);
-  std::vector<GeometryId> tools;
-  for (const AnalyticalGeometry& geometry : geometries(random)) {
-    tools.push_back(collisions.addAnalyticalGeometry(geometry));
-    collisions.setTransform(tools.back(), {randomTurn(random), randomPoint(random, -1, 1)});
-    collisions.addCollisionPair(tools.back(), mesh, continuous(0.02));
-  }
-  collisions.detectCollision();
-  collisions.advance();
-  for (const GeometryId tool : tools)
-    collisions.setTransform(tool, {randomTurn(random), randomPoint(random, -1, 1)});
-  collisions.setPositions(mesh, body.geometry.positions, body.now);
-  collisions.detectCollision();
-  EXPECT_TRUE(collisions.auditFailures().empty());
-  EXPECT_GT(collisions.statistics().contacts, 3u);
-  replayed(collisions);
 }
 
 }  // namespace

@@ -32,107 +32,19 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Triangles that cover a hull's surface, each with its plane: every three points with all others
-/// on one side. If all points are in one plane: every three.
-struct Facets {
-  struct Facet {
-    std::array<Vector3d, 3> corners;
-    Vector3d normal;  ///< out
-    double turn;      ///< 1: by the corners' winding, too
-  };
-  std::vector<Facet> all;
-  bool isBody = false;
+using Placed = MeasuredShape;
 
-  explicit Facets(const Positions& points) {
-    const std::size_t n = points.size();
-    for (const bool body : {true, false}) {
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t j = i; j < n; ++j)
-          for (std::size_t k = j; k < n; ++k) {
-            Vector3d normal = (points[j] - points[i]).cross(points[k] - points[i]);
-            double above = 0, below = 0;
-            for (const Vector3d& p : points) {
-              const double height = normal.normalized().dot(p - points[i]);
-              above = std::max(above, height);
-              below = std::min(below, height);
-            }
-            if (body && (normal.norm() < 1e-12 || std::min(above, -below) > 1e-12)) continue;
-            isBody |= body && std::max(above, -below) > 1e-12;
-            const double turn = above > -below ? -1 : 1;
-            normal = turn * normal.normalized();
-            all.push_back({{points[i], points[j], points[k]}, normal, turn});
-            if (body || normal == Vector3d::Zero()) continue;
-            all.push_back({{points[i], points[j], points[k]}, -normal, -turn});
-          }
-      if (isBody) return;
-      if (body) all.clear();
-    }
-  }
-
-  double signedDistance(const Vector3d& x) const {
-    double highest = -std::numeric_limits<double>::infinity(), nearest = -highest;
-    for (const Facet& f : all) {
-      const double height = f.normal.dot(x - f.corners[0]);
-      highest = std::max(highest, height);
-      if (height < -1e-14) continue;
-      bool over = true;
-      for (int i = 0; i < 3; ++i) {
-        const Vector3d &p = f.corners[i], edge = f.corners[(i + 1) % 3] - p, from = x - p;
-        over &= f.normal.dot(edge.cross(from)) * f.turn > 0;
-        const double square = edge.squaredNorm(),
-                     t = square > 0 ? std::clamp(from.dot(edge) / square, 0.0, 1.0) : 0.0;
-        nearest = std::min(nearest, (from - t * edge).norm());
-      }
-      if (over) nearest = std::min(nearest, std::abs(height));
-    }
-    return isBody && highest < 0 ? highest : nearest;
-  }
-};
-
-struct Placed {
-  AnalyticalGeometry geometry;
-  Matrix3d rotation = Matrix3d::Identity();
-  Vector3d translation = Vector3d::Zero();
-  std::optional<Facets> facets{};  ///< of a hull of few points
-
-  Placed(const AnalyticalGeometry& shape, const Matrix3d& turn = Matrix3d::Identity(),
-         const Vector3d& shift = Vector3d::Zero())
-      : geometry(shape), rotation(turn), translation(shift) {
-    const auto* hull = std::get_if<ConvexHull>(&geometry);
-    if (hull && hull->points.size() < 10) facets.emplace(hull->points);
-  }
-};
-
-/// One of each type, around the middle of the unit cube.
+/// One of each kind, around the middle of the unit cube.
 std::vector<Placed> shapes(Random& random) {
   std::vector<Placed> all;
-  const auto place = [&](const AnalyticalGeometry& geometry) {
-    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.3, 0.7)});
-  };
-  place(Sphere{{0.01, 0, 0}, 0.25});
-  place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1});
-  place(Plane{{0, 0.05, 0}, {1, 2, 3}, false});
-  place(Plane{{0, 0.05, 0}, {1, -2, 3}, true});
-  place(Box{{0.05, 0, 0}, {0.3, 0.2, 0.1}});
-  place(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15});
-  place(Sphere{{0, 0, 0}, 0});
-  place(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0});
-  place(Box{{0, 0, 0}, {0.3, 0.2, 0}});
-  place(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0});
-  Positions cloud, plate;
-  for (int i = 0; i < 6; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
-  cloud.push_back(cloud[2]);
-  for (int i = 0; i < 4; ++i)
-    plate.push_back({uniform(random, -.3, .3), 0.1, uniform(random, -.3, .3)});
-  place(ConvexHull{cloud});
-  place(ConvexHull{plate});
-  place(ConvexHull{{{-0.3, 0, 0}, {0.1, 0, 0}, {0.3, 0, 0}}});
-  place(ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}});
-  Positions prism{{0.01, 0, 0}};  // with parallel faces
+  std::vector<AnalyticalGeometry> kinds = shapesOfEveryKind(random);
+  ConvexHull prism{{{0.01, 0, 0}}};  // with parallel faces
   for (int i = 0; i < 3; ++i)
     for (const double z : {-0.2, 0.2})
-      prism.push_back({0.25 * std::cos(2 * i), 0.25 * std::sin(2 * i), z});
-  place(ConvexHull{prism});
+      prism.points.push_back({0.25 * std::cos(2 * i), 0.25 * std::sin(2 * i), z});
+  kinds.push_back(prism);
+  for (const AnalyticalGeometry& geometry : kinds)
+    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.3, 0.7)});
   return all;
 }
 
@@ -167,43 +79,6 @@ std::map<Element, ShapeContact> contactsByElement(const CollisionData& data) {
 
 // ---- The definition ----
 
-/// The distance of each shape, from its definition.
-double signedDistance(const Placed& placed, const Vector3d& world) {
-  const Vector3d x = placed.rotation.transpose() * (world - placed.translation);
-  const auto ofBox = [](std::initializer_list<double> beyond) {
-    double outside = 0;
-    for (const double b : beyond) outside += b > 0 ? b * b : 0;
-    return outside > 0 ? std::sqrt(outside) : std::max(beyond);
-  };
-  if (const auto* s = std::get_if<Sphere>(&placed.geometry))
-    return (x - s->centre).norm() - s->radius;
-  if (const auto* c = std::get_if<Capsule>(&placed.geometry)) {
-    const Vector3d u = c->p1 - c->p0;
-    const double t = u.dot(x - c->p0) / u.squaredNorm();
-    return (x - c->p0 - std::clamp(t, 0.0, 1.0) * u).norm() - c->radius;
-  }
-  if (const auto* p = std::get_if<Plane>(&placed.geometry)) {
-    const double height = p->normal.normalized().dot(x - p->point);
-    return p->twoSided ? std::abs(height) : height;
-  }
-  if (const auto* b = std::get_if<Box>(&placed.geometry)) {
-    const Vector3d beyond = (x - b->centre).cwiseAbs() - b->halfExtents;
-    return ofBox({beyond[0], beyond[1], beyond[2]});
-  }
-  if (placed.facets) return placed.facets->signedDistance(x);
-  const auto& c = std::get<Cylinder>(placed.geometry);
-  const Vector3d u = (c.p1 - c.p0).normalized(), from = x - 0.5 * (c.p0 + c.p1);
-  return ofBox(
-      {u.cross(from).norm() - c.radius, std::abs(u.dot(from)) - 0.5 * (c.p1 - c.p0).norm()});
-}
-
-double leastOn(const Placed& shape, const Vector3d& p, const Vector3d& q) {
-  return minimumOf([&](double t) { return signedDistance(shape, p + t * (q - p)); });
-}
-double leastOn(const Placed& shape, const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-  return minimumOf([&](double t) { return leastOn(shape, a + t * (b - a), a + t * (c - a)); });
-}
-
 constexpr double kSearch = 1e-7;  ///< error of the search above where distances are constant
 
 /// Every element with its least distance, and the least distance on its boundary.
@@ -222,7 +97,7 @@ std::map<Element, Truth> truthOf(const TestGeometry& body, const Placed& shape, 
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t p = std::min(corners[i], corners[(i + 1) % 3]),
                           q = std::max(corners[i], corners[(i + 1) % 3]);
-      const double start = signedDistance(shape, at[p]), end = signedDistance(shape, at[q]);
+      const double start = shape.signedDistance(at[p]), end = shape.signedDistance(at[q]);
       truth[{0, p, p}] = {start, kNone};
       if (p == q) continue;
       const double edge = leastOn(shape, at[p], at[q]);
@@ -234,7 +109,7 @@ std::map<Element, Truth> truthOf(const TestGeometry& body, const Placed& shape, 
     const Vector3d middle = (at[a] + at[b] + at[c]) / 3;
     const double size =
         std::max({(at[a] - middle).norm(), (at[b] - middle).norm(), (at[c] - middle).norm()});
-    const double bound = signedDistance(shape, middle) - size;  // distances grow no faster
+    const double bound = shape.signedDistance(middle) - size;  // distances grow no faster
     truth[{2, t, b}] = {bound > reach ? bound : leastOn(shape, at[a], at[b], at[c]), edges};
   }
   return truth;
@@ -249,9 +124,9 @@ void expectWellFormed(const ShapeContact& c, const TestGeometry& body, const Pla
   const double centre = c.distance + body.radius(0);
   EXPECT_LE((point - c.point).norm(), 1e-14);
   EXPECT_LE((c.point - centre * c.normal - c.pointOnShape).norm(), 1e-14);
-  EXPECT_NEAR(signedDistance(shape, c.point), centre, 1e-13);
-  EXPECT_NEAR(signedDistance(shape, c.pointOnShape), 0, 1e-8);
-  EXPECT_GE(signedDistance(shape, c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
+  EXPECT_NEAR(shape.signedDistance(c.point), centre, 1e-13);
+  EXPECT_NEAR(shape.signedDistance(c.pointOnShape), 0, 1e-8);
+  EXPECT_GE(shape.signedDistance(c.point + 1e-3 * c.normal), centre + 1e-3 - 1e-10);
 }
 
 /// The least distance of the triangles around a vertex or an edge, or of the segments around a
@@ -321,75 +196,6 @@ TEST(Shapes, MatchTheDefinition) {
     EXPECT_GT(distinct[kind], leastOf(50)) << kind;
     EXPECT_GT(inside[kind], leastOf(30)) << kind;
   }
-}
-
-TEST(Shapes, MoveWithTheirBodies) {
-  Random random(3);
-  const TestGeometry body = testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
-  for (const Placed& shape : shapes(random)) {
-    const PairSettings pair{Method::Proximity, 0.05};
-    const auto here = contactsByElement(answer(body, shape, pair));
-    for (int run = 0; run < 5; ++run) {
-      const Matrix3d turn = randomTurn(random);
-      const Vector3d shift = randomPoint(random, -4, 4);
-      TestGeometry movedBody = body;
-      for (Vector3d& p : movedBody.positions) p = turn * p + shift;
-      const auto there = contactsByElement(
-          answer(movedBody,
-                 {shape.geometry, turn * shape.rotation, turn * shape.translation + shift}, pair));
-      for (const auto& [element, c] : here) {
-        const auto found = there.find(element);
-        if (found == there.end()) {  // on the border of being a contact
-          const double edge = std::min(c.weights.minCoeff(), 0.05 - c.distance);
-          EXPECT_TRUE(element[0] > 0 || edge < 1e-12) << element[0] << ' ' << c.weights.transpose();
-          continue;
-        }
-        EXPECT_NEAR(found->second.distance, c.distance, 1e-13);
-        EXPECT_NEAR((found->second.normal - turn * c.normal).norm(), 0, 1e-7)
-            << shape.geometry.index() << ' ' << element[0] << " at " << c.distance << ": "
-            << (shape.rotation.transpose() * c.normal).transpose() << " and "
-            << (shape.rotation.transpose() * turn.transpose() * found->second.normal).transpose();
-      }
-      EXPECT_NEAR(static_cast<double>(there.size()), static_cast<double>(here.size()), 1);
-    }
-  }
-}
-
-TEST(Shapes, MatchTheirTessellations) {
-  Random random(4);
-  const TestGeometry body = testGeometry(soup(random, 60, 0.15));
-  const auto nearest = [](const CollisionData& data) {
-    double distance = std::numeric_limits<double>::infinity();
-    for (const auto& c : data.vertexTriangle()) distance = std::min(distance, c.distance);
-    for (const auto& c : data.triangleVertex()) distance = std::min(distance, c.distance);
-    for (const auto& c : data.edgeEdge()) distance = std::min(distance, c.distance);
-    for (const auto& c : data.shape()) distance = std::min(distance, c.distance);
-    return distance;
-  };
-  const Mesh ball = sphere(30, 60, Vector3d::Zero(), 0.3);
-  const Mesh cube = boxMesh({-0.3, -0.2, -0.1}, {0.3, 0.2, 0.1});
-  int apart = 0;
-  for (int run = 0; run < casesOf(20); ++run) {
-    const Matrix3d turn = randomTurn(random);
-    const Vector3d at = Vector3d::Constant(0.5) + 1.1 * randomPoint(random, -1, 1).normalized();
-    for (const bool isBall : {true, false}) {
-      Mesh mesh = isBall ? ball : cube;
-      for (Vector3d& p : mesh.positions) p = turn * p + at;
-      const Placed shape{isBall ? AnalyticalGeometry(Sphere{{0, 0, 0}, 0.3})
-                                : AnalyticalGeometry(Box{{0, 0, 0}, {0.3, 0.2, 0.1}}),
-                         turn, at};
-      const Mesh own{body.positions, body.triangles};
-      PairRun meshes(settingsOf(Engine::Octree), own, mesh, {Method::Proximity, 1.0}, false);
-      meshes.detect();
-      const double truth = nearest(meshes.data()),
-                   found = nearest(answer(body, shape, {Method::Proximity, 1.0}));
-      if (!(truth > 0.01)) continue;
-      ++apart;
-      // Chords of 6 degrees are at most this far inside.
-      EXPECT_NEAR(found, truth, isBall ? 0.3 * 2 * (1 - std::cos(3.1415927 / 60)) : 1e-14);
-    }
-  }
-  EXPECT_GT(apart, casesOf(20));
 }
 
 TEST(Shapes, HullsMatchEqualBoxesAndCapsules) {
@@ -462,32 +268,32 @@ TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
     EXPECT_EQ(data.shape()[0].element, ShapeElement::Face);
     return data.shape()[0];
   };
-  ShapeContact c = only(Sphere{{0, 0, 2}, 1.5});
-  EXPECT_EQ(c.distance, 0.5);
-  EXPECT_EQ(c.normal, -Vector3d::UnitZ());
-  EXPECT_EQ(c.point, Vector3d::Zero());
-  c = only(Sphere{{0, 0, -0.5}, 1.5});
-  EXPECT_EQ(c.distance, -1);
-  EXPECT_EQ(c.normal, Vector3d::UnitZ());
-  c = only(Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5});  // parallel: in the middle of the overlap
-  EXPECT_EQ(c.point, Vector3d::Zero());
-  c = only(Capsule{{0, 0, 4}, {1, 0, 2}, 1.5});
-  EXPECT_EQ(c.point, Vector3d(1, 0, 0));
-  c = only(Capsule{{0, 0, 4}, {0, 0, -2}, 1.5});  // its axis goes through
-  EXPECT_EQ(c.distance, -1.5);
-  EXPECT_EQ(c.point, Vector3d::Zero());
-  EXPECT_EQ(c.normal[2], 0);              // out, across the axis
-  c = only(Box{{0, 0, 2}, {1, 1, 1.5}});  // flat: in the middle
-  EXPECT_EQ(c.point, Vector3d::Zero());
-  EXPECT_EQ(c.distance, 0.5);
-  c = only(Box{{0, 0, 1}, {1, 1, 1.5}});  // the nearest surface point is below
-  EXPECT_EQ(c.distance, -0.5);
-  EXPECT_EQ(c.normal, -Vector3d::UnitZ());
-  c = only(Cylinder{{0, 0, 0.5}, {0, 0, 4}, 1});
-  EXPECT_EQ(c.distance, 0.5);
-  c = only(Cylinder{{0, -1, 2}, {0, 1, 2}, 1.5});
-  EXPECT_EQ(c.point, Vector3d::Zero());
-  EXPECT_EQ(c.distance, 0.5);
+  const Vector3d zero = Vector3d::Zero(), up = Vector3d::UnitZ();
+  struct Row {
+    AnalyticalGeometry shape;
+    double distance;
+    Vector3d point, normal;
+  };
+  for (const auto& [shape, distance, point, normal] : {
+           Row{Sphere{{0, 0, 2}, 1.5}, 0.5, zero, -up},
+           Row{Sphere{{0, 0, -0.5}, 1.5}, -1, zero, up},
+           Row{Capsule{{-1, 0, 2}, {1, 0, 2}, 1.5}, 0.5, zero, -up},  // the middle of the overlap
+           Row{Capsule{{0, 0, 4}, {1, 0, 2}, 1.5}, 0.5, {1, 0, 0}, -up},
+           Row{Box{{0, 0, 2}, {1, 1, 1.5}}, 0.5, zero, -up},  // flat: in the middle
+           Row{Box{{0, 0, 1}, {1, 1, 1.5}}, -0.5, zero, -up},
+           Row{Cylinder{{0, 0, 0.5}, {0, 0, 4}, 1}, 0.5, zero, -up},
+           Row{Cylinder{{0, -1, 2}, {0, 1, 2}, 1.5}, 0.5, zero, -up},
+       }) {
+    SCOPED_TRACE(shape.index());
+    const ShapeContact c = only(shape);
+    EXPECT_EQ(c.distance, distance);
+    EXPECT_EQ(c.point, point);
+    EXPECT_EQ(c.normal, normal);
+  }
+  const ShapeContact through = only(Capsule{{0, 0, 4}, {0, 0, -2}, 1.5});  // its axis goes through
+  EXPECT_EQ(through.distance, -1.5);
+  EXPECT_EQ(through.point, zero);
+  EXPECT_EQ(through.normal[2], 0);  // out, across the axis
 }
 
 TEST(Shapes, DegenerateElementsMatchTheDefinition) {
@@ -626,24 +432,38 @@ TEST(Shapes, BadInputThrowsErrorsThatNameIt) {
 
 // ---- Captures and audit ----
 
+/// Pairs of shapes with a mesh and with each other, at rest and in a step.
 TEST(Shapes, CapturesAndAuditIncludeThem) {
   Random random(6);
   const TestGeometry body = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  for (const int features : {20, 100000}) {
-    Settings audited = settingsOf(Engine::Octree);
-    audited.audit.features = features;
-    OctreeBasedCD collisions(audited);
-    const GeometryId mesh = body.addTo(collisions);
-    for (const Placed& shape : shapes(random)) {
-      const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
-      collisions.setTransform(tool, {shape.rotation, shape.translation});
-      collisions.addCollisionPair(tool, mesh, {Method::Proximity, 0.03});
+  for (const Method method : {Method::Proximity, Method::Continuous})
+    for (const int features : {20, 100000}) {
+      Settings audited = settingsOf(Engine::Octree, 2);
+      audited.audit.features = features;
+      OctreeBasedCD collisions(audited);
+      const GeometryId mesh = body.addTo(collisions);
+      std::vector<GeometryId> tools;
+      for (const Placed& shape : shapes(random)) {
+        const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry);
+        collisions.setTransform(tool, {shape.rotation, shape.translation});
+        collisions.addCollisionPair(tool, mesh, {method, 0.03});
+        if (std::holds_alternative<Plane>(shape.geometry)) continue;
+        for (const GeometryId other : tools)
+          collisions.addCollisionPair(other, tool, {method, 0.05});
+        tools.push_back(tool);
+      }
+      collisions.detectCollision();
+      collisions.advance();
+      for (const GeometryId tool : tools) {
+        const Matrix3d turn = randomTurn(random);
+        collisions.setTransform(tool, {turn, randomPoint(random, 0.2, 0.8)});
+      }
+      collisions.setPositions(mesh, moved(random, body.positions, 0.05));
+      collisions.detectCollision();
+      EXPECT_TRUE(collisions.auditFailures().empty());
+      EXPECT_GT(collisions.statistics().contacts, 50u);
+      replayed(collisions);
     }
-    collisions.detectCollision();
-    EXPECT_TRUE(collisions.auditFailures().empty());
-    EXPECT_GT(collisions.statistics().contacts, 50u);
-    replayed(collisions);
-  }
 }
 
 }  // namespace
