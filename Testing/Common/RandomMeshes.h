@@ -24,6 +24,18 @@ inline void append(Mesh& mesh, const Mesh& other) {
     mesh.triangles.push_back({first + a, first + b, first + c});
 }
 
+/// With the opposite winding.
+inline Mesh insideOut(Mesh mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
+  return mesh;
+}
+
+/// Two meshes as one.
+inline Mesh joined(Mesh a, const Mesh& b) {
+  append(a, b);
+  return a;
+}
+
 /// Random numbers, the same on every machine. Or decisions that a fuzzer makes, one byte for each
 /// number, in which that byte is repeated; random numbers after the last one.
 class Random {

@@ -50,4 +50,12 @@ inline Solid cells(int n, Random& random) {
   return cells(n, random, [](const auto&) { return true; });
 }
 
+/// The surface as a mesh of the same positions.
+inline Mesh surfaceOf(const Solid& solid) {
+  OctreeBasedCD collisions;
+  const auto surface =
+      collisions.surface(collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra));
+  return {solid.positions, {surface.triangles.begin(), surface.triangles.end()}};
+}
+
 }  // namespace palpate::testing

@@ -124,6 +124,20 @@ inline TestGeometry tapered(Random& random, TestGeometry geometry, double most) 
   return geometry;
 }
 
+/// Meshes, lines and points in the unit cube: closed, open and in parts; without radii, with one,
+/// and with one for each vertex.
+inline std::vector<TestGeometry> geometriesOfEveryType(Random& random) {
+  return {testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4)),
+          testGeometry(soup(random, 150, 0.1)),
+          testGeometry(sheet(8, 0.5, 0.0)),
+          thread(random, 120, 0.1, 0.0, false),
+          thread(random, 120, 0.1, 0.01, true),
+          tapered(random, thread(random, 120, 0.1, 0.01, false), 0.05),
+          particles(random, 150, 0.0),
+          particles(random, 150, 0.02),
+          tapered(random, particles(random, 150, 0.02), 0.1)};
+}
+
 inline Positions moved(Random& random, Positions positions, double most) {
   for (Vector3d& p : positions) p += randomPoint(random, -most, most);
   return positions;

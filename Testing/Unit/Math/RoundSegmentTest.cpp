@@ -2,6 +2,7 @@
 
 #include <palpate/FeaturePairs.h>
 
+#include "Common/BallTruth.h"
 #include "Common/Sanitized.h"
 #include "Unit/Math/TrianglePairs.h"
 
@@ -17,22 +18,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// How far a point is outside a segment with radii; negative inside: its distance from the nearest
-/// of the balls along it, by halving the bracket of a convex function's minimum.
+/// How far a point is outside a segment with radii; negative inside.
 double outside(const Vector3d& at, const Vector3d& p, const Vector3d& q, double radiusP,
                double radiusQ) {
-  using Wide = Eigen::Matrix<long double, 3, 1>;
-  const Wide from = at.cast<long double>() - p.cast<long double>(),
-             u = q.cast<long double>() - p.cast<long double>();
-  const auto gap = [&](long double t) {
-    return (from - t * u).norm() - ((1 - t) * radiusP + t * radiusQ);
-  };
-  long double low = 0, high = 1;
-  for (int i = 0; i < 100; ++i) {
-    const long double l = low + (high - low) * 0.382L, r = low + (high - low) * 0.618L;
-    (gap(l) < gap(r) ? high : low) = gap(l) < gap(r) ? r : l;
-  }
-  return static_cast<double>(std::min({gap(0), gap(1), gap(low)}));
+  using namespace testing;
+  return static_cast<double>(roundDistance(wide(at), wide(p), wide(q), radiusP, radiusQ));
 }
 
 struct Case {

@@ -1,8 +1,6 @@
+#include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
-
-#include <palpate/OctreeBasedCD.h>
+#include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
 
@@ -50,19 +48,9 @@ std::optional<Held> holder(const Vector3d& p, const Solid& solid) {
   return {};
 }
 
-/// All points of the integer lattice in [-1, n + 1]³, as points, lines and triangles.
 std::vector<TestGeometry> lattices(int n) {
-  TestGeometry points{GeometryType::Points, {}, {}, {}, {0}};
-  for (int x = -1; x <= n + 1; ++x)
-    for (int y = -1; y <= n + 1; ++y)
-      for (int z = -1; z <= n + 1; ++z) points.positions.emplace_back(x, y, z);
-  TestGeometry line{GeometryType::Lines, points.positions, {}, {}, {0}},
-      mesh{GeometryType::Triangles, points.positions, {}, {}, {0}};
-  for (std::uint32_t v = 0; v + 1 < points.positions.size(); ++v)
-    line.segments.push_back({v, v + 1});
-  for (std::uint32_t v = 0; v + 2 < points.positions.size(); ++v)
-    mesh.triangles.push_back({v, v + 1, v + 2});
-  return {points, line, mesh};
+  return {lattice(GeometryType::Points, n, 1), lattice(GeometryType::Lines, n, 1),
+          lattice(GeometryType::Triangles, n, 1)};
 }
 
 std::vector<EmbeddedVertex> embedded(const Settings& settings, const TestGeometry& probes,
@@ -233,41 +221,6 @@ TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
 
 // ---- Inside, by tetrahedra ----
 
-std::vector<InsideVertex> inside(const Settings& settings, const TestGeometry& probes,
-                                 const Solid& solid, bool asTriangles) {
-  OctreeBasedCD detection(settings);
-  const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
-                   other = probes.addTo(detection);
-  if (!asTriangles) {
-    const auto found = testing::insideVertices(detection, other, body);
-    return {found.begin(), found.end()};
-  }
-  const GeometryId surface =
-      detection.addTriangleMesh(solid.positions, detection.surface(body).triangles);
-  const auto found = testing::insideVertices(detection, other, surface);
-  return {found.begin(), found.end()};
-}
-
-TEST(EmbeddedVertices, InsideMatchesTheSurfaceAtRest) {
-  Random random(5);
-  constexpr int n = 3;
-  const std::function<bool(const std::array<int, 3>&)> bodies[] = {
-      [](const auto&) { return true; }, [](const auto& c) { return c[2] == 0 || c[0] == 0; },
-      [](const auto& c) {
-        return c != std::array{1, 1, 1};
-      }};
-  for (const auto& filled : bodies) {
-    Solid solid = cells(n, random, filled);
-    for (Vector3d& p : solid.positions) p *= 2;
-    for (const TestGeometry& probes : lattices(2 * n)) {
-      const auto truth = inside(settingsOf(Engine::Octree), probes, solid, true);
-      EXPECT_GT(truth.size(), 10u);
-      EXPECT_EQ(inside(settingsOf(Engine::Octree, 2), probes, solid, false), truth);
-      EXPECT_EQ(inside(settingsOf(Engine::BruteForce), probes, solid, false), truth);
-    }
-  }
-}
-
 /// Where the surface is not closed and oriented, and where it is turned inside out.
 TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
   Random random(6);
@@ -303,30 +256,11 @@ TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
   EXPECT_GT(found, 50u);
 }
 
-TEST(EmbeddedVertices, BadCallsThrowErrorsThatNameTheCause) {
+TEST(EmbeddedVertices, FewTetrahedraHaveTheirVertices) {
   Random random(7);
   const Solid solid = cells(1, random);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
-                   points = detection.addPointSet(solid.positions);
-  const auto expectRefused = [](ErrorCode code, const std::string& words, auto&& call) {
-    try {
-      call();
-      ADD_FAILURE() << "accepted; expected: " << words;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), code);
-      EXPECT_EQ(std::string(error.what()), words);
-    }
-  };
-  expectRefused(ErrorCode::UnsupportedMethod,
-                "geometry 1 is a point set; findEmbeddedVertices() is for tetrahedral meshes",
-                [&] { testing::embeddedVertices(detection, body, points); });
-  expectRefused(ErrorCode::UnsupportedMethod,
-                "geometry 1 is a point set; findTetrahedron() is for tetrahedral meshes",
-                [&] { detection.queries().findTetrahedron(points, Vector3d::Zero()); });
-  expectRefused(ErrorCode::InvalidSettings,
-                "geometry 0 is both the body and the owner of the vertices; these must differ",
-                [&] { testing::embeddedVertices(detection, body, body); });
+  const GeometryId body = addTo(detection, solid), points = addTo(detection, solid.positions);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   expectRefused(ErrorCode::NonFinitePosition,
                 "geometry 0: the point is (nan, 0, 0); it must be finite and at most 1e+300 in "

@@ -2,9 +2,9 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/FailingAllocation.h"
-#include "Common/QueryCalls.h"
-#include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -44,9 +44,7 @@ struct Boxes {
     for (const Part& part : parts) {
       Mesh box = boxMesh(-part.half, part.half);
       for (Vector3d& p : box.positions) p = part.rotation * p + part.centre;
-      if (part.sign < 0)
-        for (auto& t : box.triangles) std::swap(t[1], t[2]);
-      append(result, box);
+      append(result, part.sign < 0 ? insideOut(box) : box);
     }
     return result;
   }
@@ -75,23 +73,13 @@ struct Boxes {
   }
 };
 
-std::vector<InsideVertex> insideOf(const std::vector<Vector3d>& points, const Mesh& body,
-                                   Engine engine, const InsideSettings& settings = {}) {
-  Settings all;
-  all.engine = engine;
-  OctreeBasedCD detection(all);
-  const GeometryId vertices = detection.addPointSet(points),
-                   id = detection.addTriangleMesh(body.positions, body.triangles);
-  return insideVertices(detection, vertices, id, settings);
-}
-
 void expectWaysOut(const Boxes& boxes, const std::vector<Vector3d>& points) {
   constexpr double kSpacing = 0.02;
   Random beside(7);
   const Mesh mesh = boxes.mesh();
-  const std::vector<InsideVertex> inside = insideOf(points, mesh, Engine::Octree);
-  EXPECT_EQ(inside, insideOf(points, mesh, Engine::BruteForce));
-  EXPECT_EQ(inside, insideOf(points, mesh, Engine::Octree, {.rule = InsideRule::WindingNumber}));
+  const std::vector<InsideVertex> inside = insideOf(points, mesh);
+  EXPECT_EQ(inside, insideOf(points, mesh, {}, settingsOf(Engine::BruteForce)));
+  EXPECT_EQ(inside, insideOf(points, mesh, {.rule = InsideRule::WindingNumber}));
   std::size_t count = 0;
   for (const Vector3d& p : points) count += boxes.contains(p);
   EXPECT_EQ(inside.size(), count);
@@ -129,11 +117,8 @@ TEST(OuterSurface, VerticesInTurnedOverlappingBoxesLeaveByIt) {
   for (int i = 0; i < casesOf(12); ++i) {
     Boxes boxes;
     for (int k = 0; k < 2; ++k)
-      boxes.parts.push_back(
-          {Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized())
-               .toRotationMatrix(),
-           0.3 * randomPoint(random, -1, 1),
-           Vector3d::Constant(0.4) + 0.5 * randomPoint(random, 0, 1)});
+      boxes.parts.push_back({randomTurn(random), 0.3 * randomPoint(random, -1, 1),
+                             Vector3d::Constant(0.4) + 0.5 * randomPoint(random, 0, 1)});
     std::vector<Vector3d> points;
     for (int k = 0; k < 20; ++k) points.push_back(randomPoint(random, -0.8, 0.8));
     expectWaysOut(boxes, points);
@@ -163,14 +148,11 @@ TEST(OuterSurface, VerticesInBoxesWithACommonPlaneLeaveByIt) {
 TEST(OuterSurface, VerticesNearACoveredEdgeOfACavityLeaveByIt) {
   Random random(4);
   for (int i = 0; i < casesOf(30); ++i) {
-    const auto turn = [&] {
-      return Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized())
-          .toRotationMatrix();
-    };
-    const Eigen::Matrix3d both = turn();
-    const Boxes body{{{both, {0, 0, 0}, Vector3d::Constant(3.0)},
-                      {both, {0, 0, 0}, Vector3d::Constant(0.8), -1},
-                      {turn(), both * Vector3d(0.9, 0.9, 0.9), Vector3d::Constant(0.8)}}};
+    const Matrix3d both = randomTurn(random);
+    const Boxes body{
+        {{both, {0, 0, 0}, Vector3d::Constant(3.0)},
+         {both, {0, 0, 0}, Vector3d::Constant(0.8), -1},
+         {randomTurn(random), both * Vector3d(0.9, 0.9, 0.9), Vector3d::Constant(0.8)}}};
     std::vector<Vector3d> points;
     for (int k = 0; k < casesOf(40); ++k) points.push_back(both * randomPoint(random, 0.4, 1.2));
     expectWaysOut(body, points);
@@ -217,7 +199,7 @@ TEST(OuterSurface, IsTheWholeSurfaceOfASimpleBody) {
   for (int i = 0; i < casesOf(2000); ++i) points.push_back(randomPoint(random, -1, 1));
   OctreeBasedCD detection;
   const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles);
-  const std::vector<InsideVertex> inside = insideOf(points, body, Engine::Octree);
+  const std::vector<InsideVertex> inside = insideOf(points, body);
   EXPECT_GT(inside.size(), points.size() / 20);
   for (const InsideVertex& each : inside) {
     const auto nearest = detection.queries().closestPoint(id, points[each.vertex]);

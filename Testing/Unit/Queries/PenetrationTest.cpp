@@ -1,8 +1,8 @@
 #include "Common/ExpectRefused.h"
-#include "Common/PairRun.h"
-#include "Common/RandomMeshes.h"
+#include "Common/FieldMeshes.h"
 #include "Common/Sanitized.h"
-#include "Common/Solids.h"
+#include "Common/ShapeTruth.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <palpate/FeaturePairs.h>
 #include <palpate/OctreeBasedCD.h>
@@ -22,47 +22,18 @@
 namespace palpate::testing {
 namespace {
 
-using Eigen::Vector3d;
-
 Mesh moved(Mesh mesh, const Vector3d& shift) {
   for (Vector3d& p : mesh.positions) p += shift;
   return mesh;
 }
 
-Mesh turned(Mesh mesh, const Eigen::Matrix3d& rotation) {
+Mesh turned(Mesh mesh, const Matrix3d& rotation) {
   for (Vector3d& p : mesh.positions) p = rotation * p;
   return mesh;
 }
 
 Mesh scaledBy(Mesh mesh, double factor) {
   for (Vector3d& p : mesh.positions) p *= factor;
-  return mesh;
-}
-
-Eigen::Matrix3d anyTurn(Random& random) {
-  return Eigen::Quaterniond(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1),
-                            uniform(random, -1, 1))
-      .normalized()
-      .toRotationMatrix();
-}
-
-Mesh torus(std::uint32_t around, std::uint32_t across, double radius, double thickness) {
-  Mesh mesh;
-  constexpr double kTurn = 6.283185307179586;
-  for (std::uint32_t i = 0; i < around; ++i)
-    for (std::uint32_t j = 0; j < across; ++j) {
-      const double u = kTurn * i / around, v = kTurn * j / across,
-                   r = radius + thickness * std::cos(v);
-      mesh.positions.emplace_back(r * std::cos(u), r * std::sin(u), thickness * std::sin(v));
-    }
-  const auto at = [&](std::uint32_t i, std::uint32_t j) {
-    return i % around * across + j % across;
-  };
-  for (std::uint32_t i = 0; i < around; ++i)
-    for (std::uint32_t j = 0; j < across; ++j) {
-      mesh.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      mesh.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
   return mesh;
 }
 
@@ -138,13 +109,9 @@ void expectApart(const Mesh& a, const Mesh& b) {
 }
 
 std::vector<Mesh> bodiesOfAllKinds(Random& random) {
-  const Solid solid = bracket(random);
-  OctreeBasedCD collisions;
-  const GeometryId id = collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  const auto surface = collisions.surface(id).triangles;
-  return {cube(-1, 1), sphere(6, 8, {0, 0, 0}, 1.2), torus(16, 8, 1.0, 0.3),
+  return {cube(-1, 1), sphere(6, 8, {0, 0, 0}, 1.2), torusMesh(16, 8),
           boxMesh({-1.5, -1, -0.05}, {1.5, 1, 0.05}),
-          moved(scaledBy({solid.positions, {surface.begin(), surface.end()}}, 0.7), {-1, -1, -1})};
+          moved(scaledBy(surfaceOf(bracket(random)), 0.7), {-1, -1, -1})};
 }
 
 TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
@@ -154,8 +121,8 @@ TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
   for (const Mesh& first : kinds)
     for (const Mesh& second : kinds)
       for (int i = 0; i < casesOf(4); ++i) {
-        const Mesh a = turned(first, anyTurn(random)),
-                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -1.2, 1.2));
+        const Mesh a = turned(first, randomTurn(random)),
+                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -1.2, 1.2));
         const Penetration p = Bodies(a, b).penetration();
         EXPECT_EQ(p.intersecting, !areApart(a, b));
         if (!p.intersecting) continue;
@@ -169,24 +136,18 @@ TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
 TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
   Random random(2);
   for (int i = 0; i < 20; ++i) {
-    const Mesh a = torus(12, 6, 1.0, 0.3), b = sphere(6, 8, {0, 0, 0}, 1.0);
-    const Eigen::Matrix3d turn = anyTurn(random);
+    const Mesh a = torusMesh(12, 6), b = sphere(6, 8, {0, 0, 0}, 1.0);
+    const Matrix3d turn = randomTurn(random);
     const Vector3d shift = randomPoint(random, 100, 101), place = shift + Vector3d(0.6, 0.3, 0.2);
     Bodies bodies(a, b);
     bodies.collisions.setTransform(bodies.a, {turn, shift});
-    bodies.collisions.setTransform(bodies.b, {Eigen::Matrix3d::Identity(), place});
+    bodies.collisions.setTransform(bodies.b, {Matrix3d::Identity(), place});
     const Penetration p = bodies.penetration();
     ASSERT_TRUE(p.intersecting);
-    const auto at = [](const Mesh& mesh, const Eigen::Matrix3d& r, const Vector3d& t) {
-      Mesh world = mesh;
-      for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-        const Vector3d& q = mesh.positions[v];
-        for (int k = 0; k < 3; ++k)
-          world.positions[v][k] = ((r(k, 0) * q[0] + r(k, 1) * q[1]) + r(k, 2) * q[2]) + t[k];
-      }
-      return world;
+    const auto at = [](const Mesh& mesh, const Matrix3d& r, const Vector3d& t) {
+      return Mesh{placed(mesh.positions, r, t), mesh.triangles};
     };
-    const Mesh fixed = at(b, Eigen::Matrix3d::Identity(), place);
+    const Mesh fixed = at(b, Matrix3d::Identity(), place);
     EXPECT_FALSE(areApart(at(a, turn, shift), fixed));
     EXPECT_TRUE(areApart(at(a, turn, shift + p.depth * p.direction), fixed));
   }
@@ -242,8 +203,8 @@ TEST(Penetration, OfConvexBodiesNoTranslationIsShorter) {
   for (const Mesh& first : kinds)
     for (const Mesh& second : kinds)
       for (int i = 0; i < 5; ++i) {
-        const Mesh a = turned(first, anyTurn(random)),
-                   b = moved(turned(second, anyTurn(random)), randomPoint(random, -0.6, 0.6));
+        const Mesh a = turned(first, randomTurn(random)),
+                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -0.6, 0.6));
         const Penetration p = Bodies(a, b).penetration();
         if (!p.intersecting) continue;
         EXPECT_NEAR(p.depth, leastTranslation(a, b), 1e-9);
@@ -305,9 +266,7 @@ TEST(Penetration, ABodyInsideAnotherIntersectsItUnlessItIsInAHollow) {
   EXPECT_LE(p.depth, 2.0 + 1e-9);
   const Penetration other = Bodies(outer, inner).penetration();
   expectSeparates(outer, inner, other, 2.0);
-  Mesh hollow = outer, cavity = cube(-1.5, 1.5);
-  for (Triangle& t : cavity.triangles) std::swap(t[1], t[2]);
-  append(hollow, cavity);
+  const Mesh hollow = joined(outer, insideOut(cube(-1.5, 1.5)));
   expectApart(inner, hollow);
   expectApart(hollow, inner);
 }
@@ -376,7 +335,7 @@ TEST(Penetration, ShapesAndMeshesAreSeparated) {
            Sphere{{1.5, 0.5, 0.5}, 0.5}, Box{{1.5, 0.5, 0.5}, {0.5, 2, 2}},
            Plane{{0, 0, 0}, {0, 0, 1}}, Sphere{{1.6, 0.5, 0.5}, 0.5}, Sphere{{0.5, 0.5, 0.5}, 0.0}})
     EXPECT_FALSE(withShape(unit, apart).intersecting);
-  const Mesh ring = torus(24, 12, 1.0, 0.3);
+  const Mesh ring = torusMesh(24, 12);
   for (const AnalyticalGeometry& concave : std::vector<AnalyticalGeometry>{
            Sphere{{0.05, 0.02, 0.1}, 0.75}, Capsule{{1, 0, -1}, {1, 0.1, 1}, 0.1},
            Cylinder{{1, 0, -1}, {1, 0.1, 1}, 0.1}, Box{{1, 0, 0}, {0.1, 0.1, 1}}}) {

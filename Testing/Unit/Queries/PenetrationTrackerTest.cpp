@@ -149,25 +149,16 @@ Tally expectDefined(const Story& story, const Answers& all) {
   return tally;
 }
 
-/// The surface of some cells, each side n long.
-Mesh blocks(int n, Random& random, const std::function<bool(const std::array<int, 3>&)>& filled) {
-  const Solid solid = cells(n, random, filled);
-  OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const auto surface =
-      detection.surface(detection.addTetrahedralMesh(solid.positions, solid.tetrahedra));
-  return {solid.positions, {surface.triangles.begin(), surface.triangles.end()}};
-}
-
 /// Bodies with sharp edges, notches and a hollow, round ones, and two slabs with a crack between.
 std::vector<Mesh> bodies(Random& random) {
-  Mesh slabs = blocks(3, random, [](const auto& c) { return c[2] != 1; });
+  Mesh slabs = surfaceOf(cells(3, random, [](const auto& c) { return c[2] != 1; }));
   for (Vector3d& p : slabs.positions) p.z() -= p.z() > 1.5 ? 0.9 : 0.0;
-  return {slabs, blocks(2, random, [](const auto&) { return true; }),
-          blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }),
-          blocks(3, random,
-                 [](const auto& c) {
-                   return c != std::array{1, 1, 1};
-                 }),
+  return {slabs, surfaceOf(cells(2, random)),
+          surfaceOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; })),
+          surfaceOf(cells(3, random,
+                          [](const auto& c) {
+                            return c != std::array{1, 1, 1};
+                          })),
           sphere(8, 12, {1.5, 1.5, 1.5}, 1.4)};
 }
 
@@ -231,8 +222,7 @@ TEST(PenetrationTracker, ReportsLargeChangesInBodiesThatTurnAndDeform) {
 /// is twice as far as ahead, then ahead. It changes once for each vertex.
 TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   Random random(3);
-  const Mesh slab = blocks(1, random, [](const auto&) { return true; }),
-             block = blocks(2, random, [](const auto&) { return true; });
+  const Mesh slab = surfaceOf(cells(1, random)), block = surfaceOf(cells(2, random));
   Story story{slab.triangles, {}, {}};
   for (int frame = 0; frame < 400; ++frame) {
     Positions body = slab.positions, points = block.positions;
@@ -263,7 +253,8 @@ TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
 /// A body moves by a transform, its probes by the same: nothing changes but the directions turn.
 TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
   Random random(4);
-  const Mesh mesh = blocks(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; });
+  const Mesh mesh =
+      surfaceOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }));
   Positions points;
   for (int i = 0; i < 100; ++i) points.push_back(randomPoint(random, 0, 3));
   OctreeBasedCD detection(settingsOf(Engine::Octree));

@@ -22,18 +22,9 @@ std::vector<ShapeContact> frameContacts(const Both::Add& add, const PlacedShape&
   return {contacts.begin(), contacts.end()};
 }
 
-std::vector<PlacedShape> shapes(Random& random) {
-  std::vector<Vector3d> cloud;
-  for (int i = 0; i < 7; ++i) cloud.push_back(randomPoint(random, -0.3, 0.3));
+std::vector<PlacedShape> queriedShapes(Random& random) {
   std::vector<PlacedShape> all;
-  for (const AnalyticalGeometry& geometry :
-       {AnalyticalGeometry(Sphere{{0.1, 0, 0}, 0.2}),
-        AnalyticalGeometry(Capsule{{-0.3, 0, 0}, {0.2, 0.1, 0}, 0.1}),
-        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, false}),
-        AnalyticalGeometry(Plane{{0, 0.1, 0}, {1, 2, 3}, true}),
-        AnalyticalGeometry(Box{{0, 0.1, 0}, {0.3, 0.2, 0.1}}),
-        AnalyticalGeometry(Cylinder{{-0.2, 0, 0}, {0.3, 0.1, 0}, 0.15}),
-        AnalyticalGeometry(ConvexHull{cloud}), AnalyticalGeometry(Sphere{{0, 0, 0}, 0.0})})
+  for (const AnalyticalGeometry& geometry : shapesOfEveryKind(random))
     all.push_back({geometry, randomTurn(random), randomPoint(random, 0.3, 0.7)});
   return all;
 }
@@ -41,7 +32,7 @@ std::vector<PlacedShape> shapes(Random& random) {
 void expectFrame(const Both::Add& add, const Both& both, Random& random, std::size_t& count) {
   const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
   std::vector<ShapeContact> found(1), expected;
-  for (const PlacedShape& shape : shapes(random))
+  for (const PlacedShape& shape : queriedShapes(random))
     for (const double thickness : {0.0, 0.04}) {
       fast.contacts(both.id, shape.geometry, {shape.rotation, shape.translation}, thickness, found);
       truth.contacts(both.id, shape.geometry, {shape.rotation, shape.translation}, thickness,
@@ -56,13 +47,7 @@ void expectFrame(const Both::Add& add, const Both& both, Random& random, std::si
 
 TEST(QueryContacts, AreThoseOfTheFrame) {
   Random random(701);
-  const TestGeometry geometries[] = {testGeometry(sphere(12, 16, {0.5, 0.5, 0.5}, 0.4)),
-                                     testGeometry(soup(random, 150, 0.15)),
-                                     thread(random, 120, 0.1, 0.02, true),
-                                     particles(random, 200, 0.01),
-                                     tapered(random, thread(random, 120, 0.1, 0.0, false), 0.04),
-                                     tapered(random, particles(random, 200, 0.0), 0.05)};
-  for (const TestGeometry& geometry : geometries) {
+  for (const TestGeometry& geometry : geometriesOfEveryType(random)) {
     std::size_t count = 0;
     const Positions now = moved(random, geometry.positions, 0.03);
     const Matrix3d turn = randomTurn(random);
@@ -96,19 +81,6 @@ TEST(QueryContacts, OfTetrahedralMeshes) {
   };
   expectFrame(add, Both(add), random, count);
   EXPECT_GT(count, 100u);
-}
-
-TEST(QueryContacts, EmptyGeometriesHaveNone) {
-  for (const GeometryType type :
-       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
-    TestGeometry empty;
-    empty.type = type;
-    const Both both(empty);
-    std::vector<ShapeContact> found(1);
-    both.octree.queries().contacts(both.id, Sphere{{0, 0, 0}, 1}, {Matrix3d::Identity(), {0, 0, 0}},
-                                   1.0, found);
-    EXPECT_TRUE(found.empty());
-  }
 }
 
 // ---- Contacts of a RigidMesh at thickness 0 ----

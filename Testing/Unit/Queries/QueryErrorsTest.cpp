@@ -314,5 +314,51 @@ TEST(QueryErrors, Batches) {
                 [&] { queries.firstHits(scene.ball, rays, hits); });
 }
 
+TEST(QueryErrors, TwoGeometries) {
+  ErrorScene scene;
+  const GeometryId plane = scene.collisions.addAnalyticalGeometry(Plane{}),
+                   other =
+                       scene.collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {1, 0, 0}, true});
+  const SpatialQueries queries = scene.collisions.queries();
+  const GeometryId ball = scene.ball, line = scene.line;
+  std::vector<InsideVertex> inside(1);
+  std::vector<EmbeddedVertex> embedded(1);
+  const auto distance = [&](GeometryId a, GeometryId b) {
+    return [&, a, b] { queries.distance(a, b); };
+  };
+  const auto findInside = [&](GeometryId a, GeometryId b, const InsideSettings& settings) {
+    return [&, a, b, settings] { queries.findInsideVertices(a, b, inside, settings); };
+  };
+  const auto findEmbedded = [&](GeometryId a, GeometryId b) {
+    return [&, a, b] { queries.findEmbeddedVertices(a, b, embedded); };
+  };
+  const auto byNumber = [](double margin) {
+    return InsideSettings{InsideRule::WindingNumber, margin};
+  };
+  const std::string both = "geometry 0 is both the body and the owner of the vertices";
+  const struct {
+    ErrorCode code;
+    std::string words;
+    std::function<void()> call;
+  } rows[] = {
+      {InvalidSettings, "geometry 0 twice", distance(ball, ball)},
+      {UnsupportedMethod, "both planes", distance(plane, other)},
+      {UnknownGeometry, "geometry 9", distance(ball, GeometryId{9})},
+      {InvalidSettings, "margin is -0.1", findInside(line, ball, byNumber(-0.1))},
+      {InvalidSettings, "margin is 0.5", findInside(line, ball, byNumber(0.5))},
+      {InvalidSettings, "margin is nan", findInside(line, ball, byNumber(kNan))},
+      {InvalidSettings, "rule is 7", findInside(line, ball, {static_cast<InsideRule>(7), 0})},
+      {NotClosed, "geometry 2 is a line mesh", findInside(ball, line, byNumber(0))},
+      {InvalidSettings, both, findInside(ball, ball, byNumber(0))},
+      {InvalidSettings, both, findEmbedded(ball, ball)},
+      {UnsupportedMethod, "geometry 2 is a line mesh; findEmbeddedVertices() is for tetrahedral",
+       findEmbedded(ball, line)},
+      {UnsupportedMethod, "geometry 2 is a line mesh; findTetrahedron() is for tetrahedral meshes",
+       [&] { queries.findTetrahedron(line, Vector3d::Zero()); }},
+  };
+  for (const auto& [code, words, call] : rows) expectRefused(code, words, call);
+  EXPECT_TRUE(inside.size() == 1 && embedded.size() == 1);
+}
+
 }  // namespace
 }  // namespace palpate::testing

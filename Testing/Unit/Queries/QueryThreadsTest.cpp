@@ -52,13 +52,16 @@ struct Answers {
   std::vector<std::uint32_t> elements;
   std::vector<ShapeContact> contacts;
   std::vector<bool> flags;
+  std::vector<InsideVertex> inside, byNumber;
+  std::vector<EmbeddedVertex> embedded;
 
   friend bool operator==(const Answers& a, const Answers& b) {
     return isSame(a.points, b.points) && isSame(a.batchOfPoints, b.batchOfPoints) &&
            isSame(a.distances, b.distances) && isSame(a.batchOfDistances, b.batchOfDistances) &&
            isSame(a.hits, b.hits) && isSame(a.batchOfHits, b.batchOfHits) &&
            isSame(a.picks, b.picks) && a.elements == b.elements && a.contacts == b.contacts &&
-           a.flags == b.flags;
+           a.flags == b.flags && a.inside == b.inside && a.byNumber == b.byNumber &&
+           a.embedded == b.embedded;
   }
 };
 
@@ -114,6 +117,9 @@ Answers ask(const SharedScene& scene, const SpatialQueries& queries) {
   queries.closestPoints(scene.closed, scene.probes, all.batchOfPoints);
   queries.signedDistances(scene.solid, scene.probes, all.batchOfDistances);
   queries.firstHits(scene.closed, scene.rays, all.batchOfHits);
+  queries.findInsideVertices(scene.points, scene.closed, all.inside);
+  queries.findInsideVertices(scene.points, scene.open, all.byNumber, kByNumber);
+  queries.findEmbeddedVertices(scene.points, scene.solid, all.embedded);
   return all;
 }
 
@@ -123,6 +129,7 @@ TEST(QueryThreads, ManyThreadsGetTheAnswersOfOne) {
   EXPECT_GT(expected.hits.size(), alone.probes.size());
   EXPECT_GT(expected.elements.size(), alone.probes.size());
   EXPECT_GT(expected.contacts.size(), alone.probes.size());
+  EXPECT_GT(std::min(expected.inside.size(), expected.embedded.size()), 10u);
   for (const int threads : {1, 3}) {
     SharedScene scene(threads);
     for (int repeat = 0; repeat < 3; ++repeat) {

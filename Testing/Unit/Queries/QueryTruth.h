@@ -32,6 +32,9 @@ inline GeometryId addTo(OctreeBasedCD& collisions, const Mesh& mesh) {
 inline GeometryId addTo(OctreeBasedCD& collisions, const Solid& solid) {
   return collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra);
 }
+inline GeometryId addTo(OctreeBasedCD& collisions, const Positions& points) {
+  return collisions.addPointSet(points);
+}
 inline GeometryId addTo(OctreeBasedCD& collisions, const AnalyticalGeometry& shape) {
   return collisions.addAnalyticalGeometry(shape);
 }
@@ -87,6 +90,53 @@ template <class T>
 bool isSame(const std::vector<T>& a, const std::vector<T>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(),
                     [](const T& one, const T& two) { return isSame(one, two); });
+}
+
+/// Expects that all queries of one ray agree with each other and with brute force. Returns all
+/// hits.
+inline std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
+  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
+  std::vector<RayHit> hits, expected;
+  fast.allHits(both.id, ray, hits);
+  truth.allHits(both.id, ray, expected);
+  EXPECT_TRUE(isSame(hits, expected));
+  std::optional<RayHit> first;
+  if (!hits.empty()) first = hits[0];
+  EXPECT_TRUE(isSame(fast.firstHit(both.id, ray), first));
+  EXPECT_TRUE(isSame(truth.firstHit(both.id, ray), first));
+  EXPECT_TRUE(isSame(fast.firstHit(ray), first));  // of all geometries
+  EXPECT_EQ(fast.anyHit(both.id, ray), !hits.empty());
+  EXPECT_EQ(truth.anyHit(both.id, ray), !hits.empty());
+  for (std::size_t i = 1; i < hits.size(); ++i) EXPECT_LE(hits[i - 1].t, hits[i].t);
+  return hits;
+}
+
+/// The vertices of one geometry that are inside another one.
+template <class Vertices, class Body>
+std::vector<InsideVertex> insideOf(const Vertices& vertices, const Body& body,
+                                   const InsideSettings& inside = {},
+                                   const Settings& settings = settingsOf(Engine::Octree)) {
+  OctreeBasedCD collisions(settings);
+  const GeometryId id = addTo(collisions, vertices), around = addTo(collisions, body);
+  std::vector<InsideVertex> found;
+  collisions.queries().findInsideVertices(id, around, found, inside);
+  return found;
+}
+
+/// The points of [-1, n + 1]³ whose coordinates are multiples of the step, as a geometry of a type.
+inline TestGeometry lattice(GeometryType type, int n, double step) {
+  TestGeometry all;
+  all.type = type;
+  const int count = static_cast<int>((n + 2) / step) + 1;
+  for (int x = 0; x < count; ++x)
+    for (int y = 0; y < count; ++y)
+      for (int z = 0; z < count; ++z)
+        all.positions.push_back(step * Vector3d(x, y, z) - Vector3d(1, 1, 1));
+  for (std::uint32_t v = 0; v + 2 < all.positions.size(); ++v) {
+    if (type == GeometryType::Triangles) all.triangles.push_back({v, v + 1, v + 2});
+    if (type == GeometryType::Lines) all.segments.push_back({v, v + 1});
+  }
+  return all;
 }
 
 /// Positions of a placed body in the world, rounded as the library documents it.

@@ -19,27 +19,6 @@
 namespace palpate::testing {
 namespace {
 
-/// Expects that all queries of one ray agree with each other and with brute force. Returns all
-/// hits.
-std::vector<RayHit> consistentHits(const Both& both, const Ray& ray) {
-  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
-  std::vector<RayHit> hits, expected;
-  fast.allHits(both.id, ray, hits);
-  truth.allHits(both.id, ray, expected);
-  EXPECT_TRUE(isSame(hits, expected));
-  const auto first = fast.firstHit(both.id, ray);
-  EXPECT_EQ(first.has_value(), !hits.empty());
-  if (first && !hits.empty()) {
-    EXPECT_TRUE(isSame(*first, hits[0]));
-  }
-  EXPECT_TRUE(isSame(first, truth.firstHit(both.id, ray)));
-  EXPECT_TRUE(isSame(first, fast.firstHit(ray)));  // of all geometries
-  EXPECT_EQ(fast.anyHit(both.id, ray), !hits.empty());
-  EXPECT_EQ(truth.anyHit(both.id, ray), !hits.empty());
-  for (std::size_t i = 1; i < hits.size(); ++i) EXPECT_LE(hits[i - 1].t, hits[i].t);
-  return hits;
-}
-
 /// Expects the hits of rational arithmetic. `elements` at `positions` are those of the geometry.
 std::size_t expectExact(const Both& both, const Positions& positions,
                         std::span<const Triangle> elements, const Ray& ray) {
@@ -356,33 +335,6 @@ TEST(RayHits, NoRayLeaksOutOfPublishedMeshes) {
 
 // ---- Directions, batches ----
 
-/// A power of two times the direction divides every parameter by it.
-TEST(RayHits, DirectionsOfAnyLength) {
-  Random random(205);
-  const TestGeometry ball = testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4));
-  const Both both(ball);
-  std::size_t hits = 0;
-  for (int i = 0; i < 40; ++i) {
-    Ray ray{randomPoint(random, 0, 1), Vector3d::Zero()};
-    for (double& x : ray.direction) x = std::round(uniform(random, -64, 64)) / 64;
-    if (ray.direction == Vector3d::Zero()) continue;
-    const std::vector<RayHit> expected = consistentHits(both, ray);
-    hits += expected.size();
-    for (const int exponent : {-1020, -600, -40, 40, 600, 990}) {
-      const Ray scaled{ray.origin, std::ldexp(1.0, exponent) * ray.direction};
-      const std::vector<RayHit> found = consistentHits(both, scaled);
-      ASSERT_EQ(found.size(), expected.size()) << exponent;
-      for (std::size_t h = 0; h < found.size(); ++h) {
-        EXPECT_EQ(found[h].element, expected[h].element);
-        EXPECT_EQ(found[h].frontFace, expected[h].frontFace);
-        EXPECT_EQ(found[h].crosses, expected[h].crosses);
-        EXPECT_NEAR(std::ldexp(found[h].t, exponent), expected[h].t, 1e-14);
-      }
-    }
-  }
-  EXPECT_GE(hits, leastOf(10));
-}
-
 /// Rays through a cube with exact parameters, cut at each hit: on faces, edges and corners. No ray
 /// lies in a face.
 TEST(RayHits, CrossAtTheEndsOfTheRangeAsTheEndlessRay) {
@@ -420,27 +372,39 @@ TEST(RayHits, CrossAtTheEndsOfTheRangeAsTheEndlessRay) {
 /// Meshes and directions in denormal numbers, and in huge ones.
 TEST(RayHits, AnyMagnitude) {
   Random random(206);
-  for (const int exponent : {-1060, -500, 500, 900}) {
+  for (const auto& [exponent, ofDirection] : {std::pair(-1060, 0),
+                                              {-1060, -1060},
+                                              {-500, 0},
+                                              {-500, -500},
+                                              {0, -1020},
+                                              {0, -600},
+                                              {0, 600},
+                                              {0, 990},
+                                              {500, 0},
+                                              {500, 500},
+                                              {900, 0},
+                                              {900, 900}}) {
+    SCOPED_TRACE(std::to_string(exponent) + ", directions " + std::to_string(ofDirection));
     TestGeometry mesh = latticeSoup(random, 40, 4);
     for (Vector3d& p : mesh.positions) p *= std::ldexp(1.0, exponent);
     const Both both(mesh);
     std::size_t hits = 0;
     for (int i = 0; i < 40; ++i) {
-      Ray ray{std::ldexp(1.0, exponent) * onLattice(random, 4),
-              onLattice(random, 4) - onLattice(random, 4)};
-      if (ray.direction == Vector3d::Zero()) continue;
-      for (const bool isScaled : {false, true}) {
-        if (isScaled) ray.direction *= std::ldexp(1.0, exponent);
-        const std::vector<RayHit> found = consistentHits(both, ray);
-        const std::vector<RationalHit> truth = hitsOf(ray, mesh.positions, mesh.triangles);
-        ASSERT_EQ(found.size(), truth.size()) << exponent << ' ' << i << ' ' << isScaled;
-        hits += found.size();
-        for (std::size_t h = 0; h < found.size(); ++h) {
-          EXPECT_EQ(found[h].element, truth[h].element);
-          const double t = truth[h].first.get_d();
-          EXPECT_NEAR(found[h].t, t, 1e-15 * std::abs(t) + 5e-324);
-          EXPECT_TRUE(found[h].weights.allFinite());
-        }
+      const Vector3d direction = onLattice(random, 4) - onLattice(random, 4);
+      const Ray ray{std::ldexp(1.0, exponent) * onLattice(random, 4),
+                    std::ldexp(1.0, ofDirection) * direction};
+      if (direction == Vector3d::Zero()) continue;
+      const std::vector<RayHit> found = consistentHits(both, ray);
+      const std::vector<RationalHit> truth = hitsOf(ray, mesh.positions, mesh.triangles);
+      std::size_t finite = 0;  // beyond the largest double there are no hits
+      while (finite < truth.size() && std::isfinite(truth[finite].first.get_d())) ++finite;
+      ASSERT_EQ(found.size(), finite) << i;
+      hits += found.size();
+      for (std::size_t h = 0; h < found.size(); ++h) {
+        EXPECT_EQ(found[h].element, truth[h].element);
+        const double t = truth[h].first.get_d();
+        EXPECT_NEAR(found[h].t, t, 1e-15 * std::abs(t) + 5e-324);
+        EXPECT_TRUE(found[h].weights.allFinite());
       }
     }
     EXPECT_GE(hits, leastOf(10));
@@ -505,41 +469,6 @@ TEST(RayHits, AscendAtAnyMagnitude) {
         consistentHits(both, {origin, 3 * (target - origin), -100});
       }
     }
-  }
-}
-
-TEST(RayHits, BatchesEqualSingleCalls) {
-  Random random(207);
-  const TestGeometry geometry = testGeometry(sphere(20, 30, {0.5, 0.5, 0.5}, 0.4));
-  const std::vector<Triangle> elements = geometry.elements();
-  for (const int threads : {1, 3}) {
-    OctreeBasedCD collisions(settingsOf(Engine::Octree, threads));
-    const GeometryId id = geometry.addTo(collisions);
-    const SpatialQueries queries = collisions.queries();
-    std::vector<Ray> rays;
-    for (int i = 0; i < 500; ++i) rays.push_back(hardRay(random, geometry.positions, elements));
-    std::vector<RayHit> out(rays.size());
-    queries.firstHits(id, rays, out);
-    std::size_t missed = 0;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      const auto hit = queries.firstHit(id, rays[i]);
-      missed += !hit;
-      if (hit)
-        EXPECT_TRUE(isSame(out[i], *hit));
-      else
-        EXPECT_EQ(out[i].element, kNoElement);
-    }
-    EXPECT_GE(missed, leastOf(10));
-    queries.firstHits(id, {}, {});
-  }
-}
-
-TEST(RayHits, EmptyGeometriesHaveNone) {
-  for (const GeometryType type :
-       {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
-    TestGeometry empty;
-    empty.type = type;
-    EXPECT_TRUE(consistentHits(Both(empty), {{0, 0, 0}, {1, 0, 0}}).empty());
   }
 }
 

@@ -1,3 +1,4 @@
+#include "Common/BallTruth.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Unit/Queries/QueryTruth.h"
@@ -16,37 +17,7 @@
 namespace palpate::testing {
 namespace {
 
-using Wide = Eigen::Matrix<long double, 3, 1>;
 using Depth = std::function<long double(const Wide&)>;
-
-Wide wide(const Vector3d& p) { return p.cast<long double>(); }
-
-/// The weight of q at the nearest of the balls along a segment: the minimum of a convex function.
-long double nearestBallOf(const Wide& x, const Wide& p, const Wide& q, long double radiusP,
-                          long double radiusQ) {
-  const auto gap = [&](long double t) {
-    return (x - p - t * (q - p)).norm() - (radiusP + t * (radiusQ - radiusP));
-  };
-  long double low = 0, high = 1;
-  for (int i = 0; i < 70; ++i) {
-    const long double l = low + (high - low) * 0.382L, r = low + (high - low) * 0.618L;
-    (gap(l) < gap(r) ? high : low) = gap(l) < gap(r) ? r : l;
-  }
-  for (const long double end : {0.0L, 1.0L})
-    if (gap(end) < gap(low)) low = end;
-  return low;
-}
-
-/// The distance from that ball.
-long double roundDistance(const Wide& x, const Wide& p, const Wide& q, long double radiusP,
-                          long double radiusQ) {
-  const Wide along = q - p;
-  const long double square = along.squaredNorm();
-  const long double t = radiusP != radiusQ ? nearestBallOf(x, p, q, radiusP, radiusQ)
-                        : square > 0       ? std::clamp((x - p).dot(along) / square, 0.0L, 1.0L)
-                                           : 0.0L;
-  return (x - p - t * along).norm() - (radiusP + t * (radiusQ - radiusP));
-}
 
 /// Of lines and points with radii.
 Depth depthOf(const TestGeometry& geometry, const Positions& positions) {
@@ -66,72 +37,14 @@ Depth depthOf(const TestGeometry& geometry, const Positions& positions) {
   };
 }
 
-/// Of a shape in its body's frame: the sign is right, and the magnitude tells how certain it is.
-long double depthOf(const AnalyticalGeometry& shape, const Wide& x) {
-  if (const auto* s = std::get_if<Sphere>(&shape)) return (x - wide(s->centre)).norm() - s->radius;
-  if (const auto* c = std::get_if<Capsule>(&shape))
-    return roundDistance(x, wide(c->p0), wide(c->p1), c->radius, c->radius);
-  if (const auto* b = std::get_if<Box>(&shape))
-    return ((x - wide(b->centre)).cwiseAbs() - wide(b->halfExtents)).maxCoeff();
-  if (const auto* p = std::get_if<Plane>(&shape)) {
-    const long double height = wide(p->normal).normalized().dot(x - wide(p->point));
-    return p->twoSided ? std::abs(height) : height;
-  }
-  if (const auto* c = std::get_if<Cylinder>(&shape)) {
-    const Wide u = (wide(c->p1) - wide(c->p0)).normalized(),
-               from = x - (wide(c->p0) + wide(c->p1)) / 2;
-    return std::max(u.cross(from).norm() - c->radius,
-                    std::abs(u.dot(from)) - (wide(c->p1) - wide(c->p0)).norm() / 2);
-  }
-  // Each three points of a hull with all others on one side span a face.
-  const auto& points = std::get<ConvexHull>(shape).points;
-  long double most = -INFINITY;
-  for (std::size_t i = 0; i < points.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      for (std::size_t k = 0; k < j; ++k) {
-        Wide normal = (wide(points[j]) - wide(points[i])).cross(wide(points[k]) - wide(points[i]));
-        if (normal.norm() < 1e-12L) continue;
-        normal.normalize();
-        long double above = 0, below = 0;
-        for (const Vector3d& p : points) {
-          const long double height = normal.dot(wide(p) - wide(points[i]));
-          above = std::max(above, height);
-          below = std::min(below, height);
-        }
-        if (std::min(above, -below) > 1e-12L) continue;
-        most = std::max(most, (above > -below ? -1 : 1) * normal.dot(x - wide(points[i])));
-      }
-  return most;
-}
-
-Depth depthOf(const PlacedShape& shape) {
-  return [&](const Wide& x) {
-    const Wide from = x - wide(shape.translation);
-    return depthOf(shape.geometry, shape.rotation.cast<long double>().transpose() * from);
-  };
-}
-
-/// The hits of a ray, consistent in all calls and both engines.
-std::vector<RayHit> consistentHitsOfBalls(const Both& both, const Ray& ray) {
-  const SpatialQueries fast = both.octree.queries(), truth = both.bruteForce.queries();
-  std::vector<RayHit> hits, expected;
-  fast.allHits(both.id, ray, hits);
-  truth.allHits(both.id, ray, expected);
-  EXPECT_TRUE(isSame(hits, expected));
-  std::optional<RayHit> first;
-  if (!hits.empty()) first = hits[0];
-  EXPECT_TRUE(isSame(fast.firstHit(both.id, ray), first));
-  EXPECT_TRUE(isSame(truth.firstHit(both.id, ray), first));
-  EXPECT_TRUE(isSame(fast.firstHit(ray), first));
-  EXPECT_EQ(fast.anyHit(both.id, ray), !hits.empty());
-  EXPECT_EQ(truth.anyHit(both.id, ray), !hits.empty());
-  return hits;
+Depth depthOf(const MeasuredShape& shape) {
+  return [&](const Wide& x) { return shape.signedDistance(x.cast<double>()); };
 }
 
 /// Expects hits on the surface, and the body between them. error: L.
 std::size_t expectBodyBetween(const Both& both, const Ray& ray, const Depth& depth, double length,
                               double error = 1e-9) {
-  const std::vector<RayHit> hits = consistentHitsOfBalls(both, ray);
+  const std::vector<RayHit> hits = consistentHits(both, ray);
   const auto at = [&](double t) -> Wide {
     return wide(ray.origin) + static_cast<long double>(t) * wide(ray.direction);
   };
@@ -219,7 +132,7 @@ TEST(RoundRays, WeightsAreOfTheNearestPointOfTheElement) {
           line.positions[1] +
           uniform(random, -1, 1) * (line.positions[i % 2 ? 0 : 2] - line.positions[1]);
       const Vector3d direction = randomPoint(random, -1, 1);
-      for (const RayHit& hit : consistentHitsOfBalls(both, {through - 2 * direction, direction})) {
+      for (const RayHit& hit : consistentHits(both, {through - 2 * direction, direction})) {
         const auto& [p, q, _] = hit.vertices;
         const Vector3d at = through + (hit.t - 2) * direction;
         const auto along = static_cast<double>(nearestBallOf(wide(at), wide(line.positions[p]),
@@ -239,7 +152,7 @@ TEST(RoundRays, OverlappingElementsAreOneBody) {
   const TestGeometry row{
       GeometryType::Points, {{0, 0, 0}, {1.5, 0, 0}, {3, 0, 0}, {10, 0, 0}}, {}, {}, {1.0}};
   const Both both(row);
-  const auto hits = consistentHitsOfBalls(both, {{-3, 0, 0}, {1, 0, 0}});
+  const auto hits = consistentHits(both, {{-3, 0, 0}, {1, 0, 0}});
   ASSERT_EQ(hits.size(), 4u);
   const double expected[] = {2, 7, 12, 14};
   const std::uint32_t elements[] = {0, 2, 3, 3};
@@ -250,41 +163,37 @@ TEST(RoundRays, OverlappingElementsAreOneBody) {
     EXPECT_TRUE(hits[i].crosses);
   }
   // From inside, with ends inside, between two bodies.
-  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 0, 5}).size(), 1u);
-  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 0, 3}).size(), 0u);
-  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 5, 8}).size(), 0u);
-  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 0, 0}, {1, 0, 0}, 4, 9}).size(),
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 5}).size(), 1u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 0, 3}).size(), 0u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 5, 8}).size(), 0u);
+  EXPECT_EQ(consistentHits(both, {{0, 0, 0}, {1, 0, 0}, 4, 9}).size(),
             2u);  // both ends included
-  EXPECT_EQ(consistentHitsOfBalls(both, {{0, 5, 0}, {1, 0, 0}}).size(), 0u);
+  EXPECT_EQ(consistentHits(both, {{0, 5, 0}, {1, 0, 0}}).size(), 0u);
 }
 
-std::vector<PlacedShape> roundShapes(Random& random) {
-  std::vector<PlacedShape> all;
-  const auto add = [&](const AnalyticalGeometry& geometry) {
-    all.push_back({geometry});
-    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.2, 0.8)});
-  };
-  add(Sphere{{0.4, 0.5, 0.5}, 0.4});
-  add(Capsule{{0.1, 0.2, 0.3}, {0.8, 0.7, 0.6}, 0.25});
-  add(Box{{0.5, 0.4, 0.5}, {0.4, 0.3, 0.2}});
-  add(Cylinder{{0.1, 0.2, 0.3}, {0.8, 0.7, 0.6}, 0.25});
-  add(Plane{{0, 0, 0.5}, {1, 2, 3}, false});
-  std::vector<Vector3d> frustum;
+/// Those with a volume, in their own frame and in another one.
+std::vector<MeasuredShape> roundShapes(Random& random) {
+  ConvexHull frustum;
   for (const double x : {-1, 1})
     for (const double y : {-1, 1}) {
-      frustum.push_back({0.5 + 0.2 * x, 0.5 + 0.1 * y, 0.2});
-      frustum.push_back({0.5 + 0.5 * x, 0.5 + 0.3 * y, 0.9});
+      frustum.points.push_back({0.2 * x, 0.1 * y, -0.3});
+      frustum.points.push_back({0.5 * x, 0.3 * y, 0.4});
     }
-  add(ConvexHull{frustum});
-  std::vector<Vector3d> cloud;
-  for (int i = 0; i < 9; ++i) cloud.push_back(randomPoint(random, 0, 1));
-  add(ConvexHull{cloud});
+  std::vector<AnalyticalGeometry> kinds = shapesOfEveryKind(random);
+  kinds.resize(7);
+  kinds.erase(kinds.begin() + 3);  // the plane with two sides
+  kinds.push_back(frustum);
+  std::vector<MeasuredShape> all;
+  for (const AnalyticalGeometry& geometry : kinds) {
+    all.push_back({geometry, Matrix3d::Identity(), {0.5, 0.5, 0.5}});
+    all.push_back({geometry, randomTurn(random), randomPoint(random, 0.2, 0.8)});
+  }
   return all;
 }
 
 TEST(RoundRays, EnterAndLeaveShapes) {
   Random random(302);
-  for (const PlacedShape& shape : roundShapes(random)) {
+  for (const MeasuredShape& shape : roundShapes(random)) {
     const Both both([&](OctreeBasedCD& each) {
       const GeometryId id = each.addAnalyticalGeometry(shape.geometry);
       each.setTransform(id, {shape.rotation, shape.translation});
@@ -294,12 +203,12 @@ TEST(RoundRays, EnterAndLeaveShapes) {
     std::size_t hits = 0;
     for (int i = 0; i < casesOf(60); ++i) {
       Ray ray = randomRay(random);
-      if (i % 4 == 1) ray.origin = shape.rotation * Vector3d(0.5, 0.5, 0.5) + shape.translation;
+      if (i % 4 == 1) ray.origin = shape.translation;
       if (i % 4 == 2) ray.tMin = 0.5, ray.tMax = 0.9;
       if (i % 4 == 3) ray.tMin = -1.0;
       if (i % 5 == 0) ray.direction = Vector3d::Unit(i % 3);
       hits += expectBodyBetween(both, ray, depth, 4.0);
-      for (const RayHit& hit : consistentHitsOfBalls(both, ray)) {
+      for (const RayHit& hit : consistentHits(both, ray)) {
         EXPECT_EQ(hit.element, kNoElement);
         EXPECT_TRUE(hit.crosses);
       }
@@ -313,20 +222,20 @@ TEST(RoundRays, PlanesWithTwoSidesHaveOneHit) {
   const Both both([](OctreeBasedCD& each) {
     return each.addAnalyticalGeometry(Plane{{0, 0, 1}, {0, 0, 2}, true});
   });
-  const auto down = consistentHitsOfBalls(both, {{0, 0, 3}, {0, 0, -1}}),
-             up = consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 4}}),
-             along = consistentHitsOfBalls(both, {{0, 0, 1}, {1, 0, 0}}),
-             away = consistentHitsOfBalls(both, {{0, 0, 3}, {1, 0, 0}});
+  const auto down = consistentHits(both, {{0, 0, 3}, {0, 0, -1}}),
+             up = consistentHits(both, {{0, 0, 0}, {0, 0, 4}}),
+             along = consistentHits(both, {{0, 0, 1}, {1, 0, 0}}),
+             away = consistentHits(both, {{0, 0, 3}, {1, 0, 0}});
   ASSERT_TRUE(down.size() == 1 && up.size() == 1 && along.size() == 1);
   EXPECT_TRUE(down[0].t == 2 && down[0].frontFace && down[0].crosses);
   EXPECT_TRUE(up[0].t == 0.25 && !up[0].frontFace && up[0].crosses);
   EXPECT_TRUE(along[0].t == 0 && !along[0].crosses);
   EXPECT_TRUE(away.empty());
-  const auto point = consistentHitsOfBalls(both, {{0, 0, 1}, {1, 0, 0}, 1, 1});
+  const auto point = consistentHits(both, {{0, 0, 1}, {1, 0, 0}, 1, 1});
   ASSERT_EQ(point.size(), 1u);
   EXPECT_TRUE(point[0].t == 1 && !point[0].crosses);
   for (const double z : {-1, 1}) {  // from the plane: t is not -0
-    const auto from = consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, z}});
+    const auto from = consistentHits(both, {{0, 0, 1}, {0, 0, z}});
     ASSERT_EQ(from.size(), 1u);
     EXPECT_TRUE(from[0].t == 0 && !std::signbit(from[0].t) && from[0].crosses);
   }
@@ -344,7 +253,7 @@ TEST(RoundRays, FarAwayAndOfAnyLength) {
     const Vector3d target = 0.4 * randomPoint(random, -0.5, 0.5);
     for (const int exponent : {-900, 0, 300}) {
       const Ray ray{origin, std::ldexp(1.0, exponent) * (target - origin)};
-      const std::vector<RayHit> hits = consistentHitsOfBalls(both, ray);
+      const std::vector<RayHit> hits = consistentHits(both, ray);
       ASSERT_EQ(hits.size(), depth(wide(origin)) < 0 ? 1u : 2u);
       for (const RayHit& hit : hits) {
         const Vector3d at = std::ldexp(hit.t, exponent) * (target - origin) + origin;
@@ -364,12 +273,12 @@ TEST(RoundRays, StartsAndEndsOnSurfacesInsideOtherElements) {
       std::swap(balls.radii[0], balls.radii[1]);
     }
     const Both both(balls);
-    const auto hits = consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 1}});
+    const auto hits = consistentHits(both, {{0, 0, 0}, {0, 0, 1}});
     ASSERT_EQ(hits.size(), 1u);
     EXPECT_TRUE(hits[0].t == 5 && !hits[0].frontFace && hits[0].crosses);
-    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, 1}, 0, 1}).empty());
-    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 1}, {0, 0, 1}, 1, 1}).empty());
-    EXPECT_TRUE(consistentHitsOfBalls(both, {{0, 0, 0}, {0, 0, 1}, 1, 1}).empty());
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 0, 1}).empty());
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 1}, {0, 0, 1}, 1, 1}).empty());
+    EXPECT_TRUE(consistentHits(both, {{0, 0, 0}, {0, 0, 1}, 1, 1}).empty());
   }
 }
 
@@ -396,7 +305,7 @@ std::vector<Both> bodiesAboutTheOrigin() {
 TEST(RoundRays, NoHitsBeyondTheLargestDouble) {
   for (const Both& body : bodiesAboutTheOrigin()) {
     const auto hits = [&](const Vector3d& origin, double length) {
-      return consistentHitsOfBalls(body, {origin, {0, 0, -length}});
+      return consistentHits(body, {origin, {0, 0, -length}});
     };
     const Vector3d above(0, 0, 1e10), inside(0, 0, 0);
     EXPECT_EQ(hits(above, 1e-290).size(), hits(above, 1).size());
@@ -417,7 +326,7 @@ TEST(RoundRays, StartsAndEndsOnSurfaces) {
   for (std::size_t i = 0; i < std::size(bodies); ++i) {
     SCOPED_TRACE(i);
     const auto expectOne = [&](const Ray& ray, double t, bool frontFace) {
-      const auto hits = consistentHitsOfBalls(bodies[i], ray);
+      const auto hits = consistentHits(bodies[i], ray);
       ASSERT_EQ(hits.size(), 1u);
       EXPECT_TRUE(hits[0].t == t && hits[0].frontFace == frontFace && hits[0].crosses);
       EXPECT_EQ(bodies[i].octree.queries().pick(ray, true).has_value(), frontFace);
@@ -429,7 +338,7 @@ TEST(RoundRays, StartsAndEndsOnSurfaces) {
     expectOne({{0, 0, 3}, {0, 0, -1}, 2, 2}, 2, true);
     expectOne({{0, 0, 0}, {0, 0, 1}, 1, 1}, 1, false);
     if (i != 0 && i != 5) continue;
-    const auto touch = consistentHitsOfBalls(bodies[i], {{1, 0, 5}, {0, 0, -1}});
+    const auto touch = consistentHits(bodies[i], {{1, 0, 5}, {0, 0, -1}});
     ASSERT_EQ(touch.size(), 1u);
     EXPECT_TRUE(touch[0].t == 5 && !touch[0].crosses);
   }
@@ -463,8 +372,8 @@ TEST(RoundRays, AnyMagnitude) {
     const std::vector<Both> bodies = scaledBodies(s);
     for (std::size_t i = 0; i < bodies.size(); ++i)
       for (const Ray& ray : rays) {
-        const auto expected = consistentHitsOfBalls(unscaled[i], ray),
-                   hits = consistentHitsOfBalls(bodies[i], {s * ray.origin, s * ray.direction});
+        const auto expected = consistentHits(unscaled[i], ray),
+                   hits = consistentHits(bodies[i], {s * ray.origin, s * ray.direction});
         ASSERT_EQ(hits.size(), expected.size()) << exponent << ' ' << i;
         for (std::size_t k = 0; k < hits.size(); ++k)
           EXPECT_NEAR(hits[k].t, expected[k].t, 1e-14) << exponent << ' ' << i;

@@ -9,7 +9,7 @@
 #include <vector>
 
 // Signs of distances: the winding number by rational rays, for meshes that cross themselves, too;
-// tetrahedra by rational volumes; solid angles in long double for meshes with holes.
+// tetrahedra by rational volumes. WindingNumberTest has meshes with holes.
 namespace palpate::testing {
 namespace {
 
@@ -109,15 +109,6 @@ Positions probesOf(Random& random, const Positions& positions, std::span<const T
   return points;
 }
 
-Mesh joined(const Mesh& a, const Mesh& b) {
-  Mesh both = a;
-  const auto first = static_cast<std::uint32_t>(a.positions.size());
-  both.positions.insert(both.positions.end(), b.positions.begin(), b.positions.end());
-  for (const auto& [p, q, r] : b.triangles)
-    both.triangles.push_back({p + first, q + first, r + first});
-  return both;
-}
-
 std::vector<Mesh> closedMeshes(Random& random) {
   std::vector<Mesh> all{sphere(8, 12, {0, 0, 0}, 1.0)};
   // Pushed through itself: a part has the winding number -1.
@@ -130,8 +121,7 @@ std::vector<Mesh> closedMeshes(Random& random) {
   // Two bodies that cross: numbers of 2. A body in a body, and the hollow in it.
   all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), sphere(8, 10, {0.7, 0.2, 0.1}, 0.8)));
   all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), sphere(8, 10, {0, 0, 0}, 0.5)));
-  Mesh hollow = sphere(8, 10, {0, 0, 0}, 0.5);
-  for (Triangle& t : hollow.triangles) std::swap(t[0], t[1]);
+  const Mesh hollow = insideOut(sphere(8, 10, {0, 0, 0}, 0.5));
   all.push_back(joined(sphere(8, 10, {0, 0, 0}, 1), hollow));
   // Inside out.
   all.push_back(hollow);
@@ -170,66 +160,6 @@ TEST(SignedDistances, NoWrongSignNearSelfCrossings) {
     points.push_back(mesh.positions[random() % mesh.positions.size()] +
                      randomPoint(random, -0.05, 0.05));
   EXPECT_GE(expectSigns(both, mesh.positions, mesh.triangles, points), leastOf(50));
-}
-
-/// The rules agree on closed bodies, except on the surface.
-TEST(SignedDistances, RulesAgreeOnClosedBodies) {
-  Random random(404);
-  for (const Mesh& mesh : closedMeshes(random)) {
-    const Both both(testGeometry(mesh));
-    const SpatialQueries queries = both.octree.queries();
-    for (const Vector3d& p : probesOf(random, mesh.positions, mesh.triangles, 200)) {
-      const InsideSettings byNumber{.rule = InsideRule::WindingNumber};
-      const SignedDistance closed = queries.signedDistance(both.id, p),
-                           open = queries.signedDistance(both.id, p, byNumber);
-      EXPECT_TRUE(isSame(open, both.bruteForce.queries().signedDistance(both.id, p, byNumber)));
-      EXPECT_TRUE(isSame(closed.nearest, open.nearest));
-      if (closed.nearest.distance > 1e-9) {
-        EXPECT_EQ(closed.distance, open.distance);
-      }
-    }
-  }
-}
-
-using Wide = Eigen::Matrix<long double, 3, 1>;
-
-/// The sum of solid angles, over 4 pi.
-double solidAngle(const Mesh& mesh, const Vector3d& p) {
-  long double sum = 0;
-  for (const auto& t : mesh.triangles) {
-    std::array<Wide, 3> u;
-    for (std::size_t i = 0; i < 3; ++i)
-      u[i] = (mesh.positions[t[i]].cast<long double>() - p.cast<long double>()).normalized();
-    const long double volume = u[0].dot(u[1].cross(u[2])),
-                      rest = 1 + u[0].dot(u[1]) + u[1].dot(u[2]) + u[2].dot(u[0]);
-    sum += 2 * std::atan2(volume, rest);
-  }
-  return static_cast<double>(std::abs(sum) / (4 * std::numbers::pi_v<long double>));
-}
-
-TEST(SignedDistances, OpenBodiesByWindingNumber) {
-  Random random(405);
-  Mesh open = sphere(16, 20, {0, 0, 0}, 1.0);
-  open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 60);
-  for (std::size_t t = 0; t < open.triangles.size(); t += 11)
-    std::swap(open.triangles[t][0], open.triangles[t][1]);
-  const Both both(testGeometry(open));
-  const SpatialQueries queries = both.octree.queries();
-  EXPECT_THROW(queries.signedDistance(both.id, {0, 0, 0}), Error);
-  std::size_t inside = 0;
-  for (int i = 0; i < casesOf(400); ++i) {
-    const Vector3d p = randomPoint(random, -1.1, 1.1);
-    for (const double margin : {0.0, 0.2}) {
-      const InsideSettings settings{InsideRule::WindingNumber, margin};
-      const SignedDistance found = queries.signedDistance(both.id, p, settings);
-      EXPECT_TRUE(isSame(found, both.bruteForce.queries().signedDistance(both.id, p, settings)));
-      const double number = solidAngle(open, p);
-      if (std::abs(number - 0.5 + margin) < 1e-9) continue;
-      EXPECT_EQ(found.distance<0, number> 0.5 - margin);
-      inside += found.distance < 0;
-    }
-  }
-  EXPECT_GE(inside, leastOf(100));
 }
 
 /// Inside, boundary included: in a tetrahedron, of any winding.

@@ -190,26 +190,6 @@ TEST(SpatialQueries, ThrowWithinACallbackOfTheirOwner) {
   ask(scene, queries);
 }
 
-/// The thread that needs them first builds octrees, octrees of tetrahedra and winding numbers.
-TEST(SpatialQueries, ManyThreadsGetTheResultsOfOne) {
-  for (const int threads : {1, 3}) {
-    const Scene alone;
-    const Answers expected = ask(alone, alone.collisions.queries());
-    Scene scene({.threads = threads});
-    for (int repeat = 0; repeat < 10; ++repeat) {
-      std::vector<Answers> answers(4);
-      {
-        std::vector<std::jthread> askers;
-        for (Answers& each : answers)
-          askers.emplace_back([&] { each = ask(scene, scene.collisions.queries()); });
-      }
-      for (const Answers& each : answers) EXPECT_EQ(each, expected);
-      scene.collisions.setPositions(scene.ball, scene.ballRest);
-      scene.collisions.advance();
-    }
-  }
-}
-
 /// Outdated queries throw, also while another thread updates the octrees.
 TEST(SpatialQueries, OutdatedOnesThrowBesideNewOnes) {
   Scene scene;

@@ -78,7 +78,9 @@ TEST(SurfaceNormals, TellTheSide) {
     const Vector3d point = randomPoint(random, 0, 1);
     const SignedDistance found = queries.signedDistance(id, point);
     const double side = found.nearest.normal.dot(point - found.nearest.position);
-    if (std::abs(found.distance) > 1e-9) EXPECT_EQ(side > 0.0, found.distance > 0.0) << repeat;
+    if (std::abs(found.distance) > 1e-9) {
+      EXPECT_EQ(side > 0.0, found.distance > 0.0) << repeat;
+    }
   }
 }
 

@@ -1,8 +1,7 @@
-#include <palpate/OctreeBasedCD.h>
-
+#include "Common/BallTruth.h"
 #include "Common/QueryCalls.h"
-#include "Common/PairRun.h"
-#include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
+#include "Unit/Queries/QueryTruth.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -16,18 +15,8 @@
 
 // findInsideVertices() of bodies that are not closed, against the sum of all solid angles.
 
-namespace palpate {
+namespace palpate::testing {
 namespace {
-
-using Eigen::Vector3d;
-using testing::Mesh;
-using testing::Random;
-using testing::randomPoint;
-using testing::settingsOf;
-using testing::sphere;
-using testing::uniform;
-using Positions = std::vector<Vector3d>;
-using Wide = Eigen::Matrix<long double, 3, 1>;
 
 /// The solid angle by the angles of the spherical triangle, in 64 bits.
 long double solidAngle(const Wide& a, const Wide& b, const Wide& c) {
@@ -51,16 +40,6 @@ double truth(const Mesh& body, const Vector3d& p) {
   return static_cast<double>(std::abs(sum) / (4 * std::numbers::pi_v<long double>));
 }
 
-std::vector<InsideVertex> find(const Positions& points, const Mesh& body,
-                               const InsideSettings& inside,
-                               const Settings& settings = settingsOf(Engine::Octree)) {
-  OctreeBasedCD detection(settings);
-  const GeometryId asked = detection.addPointSet(points),
-                   id = detection.addTriangleMesh(body.positions, body.triangles);
-  const auto found = testing::insideVertices(detection, asked, id, inside);
-  return {found.begin(), found.end()};
-}
-
 constexpr InsideSettings byNumber(double margin = 0) { return {InsideRule::WindingNumber, margin}; }
 
 Positions pointsAround(Random& random, std::size_t count, double half) {
@@ -72,9 +51,11 @@ Positions pointsAround(Random& random, std::size_t count, double half) {
 /// The vertices and `decided` match the exact values, except within rounding. Brute force and any
 /// threads give the same. Returns how many are found.
 std::size_t expectTrue(const Positions& points, const Mesh& body, double margin = 0) {
-  const std::vector<InsideVertex> found = find(points, body, byNumber(margin));
-  EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::BruteForce)), found);
-  EXPECT_EQ(find(points, body, byNumber(margin), settingsOf(Engine::Octree, 3)), found);
+  const std::vector<InsideVertex> found = insideOf(points, body, byNumber(margin));
+  EXPECT_EQ(insideOf(points, body, byNumber(margin), settingsOf(Engine::BruteForce)), found);
+  EXPECT_EQ(insideOf(points, body, byNumber(margin), settingsOf(Engine::Octree, 3)), found);
+  const Both both(body);
+  const SpatialQueries fast = both.octree.queries(), slow = both.bruteForce.queries();
   auto next = found.begin();
   for (std::uint32_t v = 0; v < points.size(); ++v) {
     const bool isFound = next != found.end() && next->vertex == v;
@@ -85,6 +66,10 @@ std::size_t expectTrue(const Positions& points, const Mesh& body, double margin 
     if (isFound && std::abs(off) > 1e-9) {
       EXPECT_EQ(next->decided, off > 0) << v << ": " << number;
     }
+    const SignedDistance signedDistance = fast.signedDistance(both.id, points[v], byNumber(margin));
+    EXPECT_TRUE(isSame(signedDistance, slow.signedDistance(both.id, points[v], byNumber(margin))));
+    EXPECT_EQ(signedDistance.distance < 0, isFound);
+    EXPECT_EQ(fast.contains(both.id, points[v], byNumber(margin)), isFound);
     next += isFound;
   }
   EXPECT_EQ(next, found.end());
@@ -98,32 +83,23 @@ Mesh lump(Random& random, std::uint32_t rings, std::uint32_t segments) {
   return mesh;
 }
 
-/// With another body inside, turned inside out.
-void add(Mesh& mesh, const Mesh& hollow) {
-  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-  mesh.positions.insert(mesh.positions.end(), hollow.positions.begin(), hollow.positions.end());
-  for (const auto& [a, b, c] : hollow.triangles)
-    mesh.triangles.push_back({first + a, first + c, first + b});
-}
-
 TEST(WindingNumber, MatchesExactContainmentInClosedBodies) {
   Random random(1);
   for (int run = 0; run < 6; ++run) {
     Mesh body = lump(random, 12, 16);
     if (run % 3 == 1)  // with a hollow
-      add(body, sphere(9, 12, {0.1, 0, 0}, 0.5));
-    if (run % 3 == 2)
-      for (Triangle& t : body.triangles) std::swap(t[0], t[1]);
+      append(body, insideOut(sphere(9, 12, {0.1, 0, 0}, 0.5)));
+    if (run % 3 == 2) body = insideOut(body);
     Positions points = pointsAround(random, 200, 1.1);
     points.insert(points.end(), body.positions.begin(), body.positions.end());  // on it
     for (const Vector3d& p : body.positions) points.push_back(0.999 * p);
     const double scale = run % 2 ? 1e-3 : 1, far = run % 2 ? 1e3 : 0;
     for (Positions* positions : {&points, &body.positions})
       for (Vector3d& p : *positions) p = scale * p + Vector3d(far, -far, far);
-    const std::vector<InsideVertex> exact = find(points, body, {});
-    EXPECT_EQ(find(points, body, byNumber()), exact);
-    EXPECT_EQ(find(points, body, byNumber(0.4)), exact);
-    EXPECT_EQ(find(points, body, byNumber(), settingsOf(Engine::BruteForce)), exact);
+    const std::vector<InsideVertex> exact = insideOf(points, body);
+    EXPECT_EQ(insideOf(points, body, byNumber()), exact);
+    EXPECT_EQ(insideOf(points, body, byNumber(0.4)), exact);
+    EXPECT_EQ(insideOf(points, body, byNumber(), settingsOf(Engine::BruteForce)), exact);
     EXPECT_GT(exact.size(), 50u);
   }
 }
@@ -143,7 +119,8 @@ TEST(WindingNumber, FewerPointsAreInsideAsHolesGrow) {
     const std::size_t found = expectTrue(points, open);
     EXPECT_LE(found, before);
     before = found;
-    const std::vector<InsideVertex> deep = find({{0, 0, height - 0.5}}, open, byNumber());
+    const std::vector<InsideVertex> deep =
+        insideOf(Positions{{0, 0, height - 0.5}}, open, byNumber());
     EXPECT_EQ(deep.size(), height >= 0 ? 1u : 0u) << height;
   }
 }
@@ -176,7 +153,7 @@ TEST(WindingNumber, WorksOnATriangleSoup) {
   expectTrue(points, soup);
   expectTrue(points, soup, 0.25);
   std::set<std::uint32_t> found;
-  for (const InsideVertex& v : find(points, soup, byNumber())) found.insert(v.vertex);
+  for (const InsideVertex& v : insideOf(points, soup, byNumber())) found.insert(v.vertex);
   for (std::uint32_t v = 0; v < points.size(); ++v)
     if (std::abs(points[v].norm() - 1) > 0.1) {
       EXPECT_EQ(found.contains(v), points[v].norm() < 1) << points[v].norm();
@@ -194,11 +171,11 @@ TEST(WindingNumber, NearOneHalfIsUndecided) {
   face(0, 2, 3, 1), face(0, 1, 5, 4), face(1, 3, 7, 5), face(3, 2, 6, 7), face(2, 0, 4, 6);
   const Positions points{
       {0.5, 0.5, 1}, {0.5, 0.5, 1 - 1e-6}, {0.5, 0.5, 1 + 1e-6}, {0.5, 0.5, 0.9}};
-  const std::vector<InsideVertex> found = find(points, cube, byNumber());
+  const std::vector<InsideVertex> found = insideOf(points, cube, byNumber());
   ASSERT_EQ(found.size(), 3u);
   for (const InsideVertex& v : found) EXPECT_EQ(v.decided, v.vertex != 0);
   EXPECT_EQ(found[0].depth, 0.5);
-  const std::vector<InsideVertex> within = find(points, cube, byNumber(0.01));
+  const std::vector<InsideVertex> within = insideOf(points, cube, byNumber(0.01));
   ASSERT_EQ(within.size(), 4u);
   for (const InsideVertex& v : within) EXPECT_EQ(v.decided, v.vertex == 3);
 }
@@ -215,9 +192,9 @@ TEST(WindingNumber, DoesNotDependOnTheOctree) {
   for (int frame = 0; frame < 3; ++frame) {
     for (Vector3d& p : body.positions) p += randomPoint(random, -0.02, 0.02);
     detection.setPositions(id, body.positions);
-    const auto found = testing::insideVertices(detection, asked, id, byNumber(0.1));
+    const auto found = insideVertices(detection, asked, id, byNumber(0.1));
     EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()),
-              find(points, body, byNumber(0.1)));
+              insideOf(points, body, byNumber(0.1)));
   }
   const double angle = 0.7;
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Vector3d(1, 2, 3).normalized()).matrix();
@@ -225,8 +202,9 @@ TEST(WindingNumber, DoesNotDependOnTheOctree) {
   Mesh moved = body;
   for (Vector3d& p : moved.positions)
     p = (turn.col(0) * p[0] + turn.col(1) * p[1]) + turn.col(2) * p[2] + Vector3d(0.1, 0.2, 0.3);
-  const auto found = testing::insideVertices(detection, asked, id, byNumber());
-  EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()), find(points, moved, byNumber()));
+  const auto found = insideVertices(detection, asked, id, byNumber());
+  EXPECT_EQ(std::vector<InsideVertex>(found.begin(), found.end()),
+            insideOf(points, moved, byNumber()));
 }
 
 TEST(WindingNumber, WorksAtAnySizeAndWithoutArea) {
@@ -234,41 +212,20 @@ TEST(WindingNumber, WorksAtAnySizeAndWithoutArea) {
   for (const double scale : {0x1p-1000, 0x1p-400, 0x1p-100, 0x1p100, 0x1p300}) {
     Mesh body = lump(random, 8, 10);
     const Positions points = pointsAround(random, 60, 1.1);
-    const std::vector<InsideVertex> truth = find(points, body, byNumber());
+    const std::vector<InsideVertex> truth = insideOf(points, body, byNumber());
     Positions scaled = points;
     body.triangles.push_back({3, 3, 3});
     body.triangles.push_back({3, 9, 3});
     for (Positions* positions : {&scaled, &body.positions})
       for (Vector3d& p : *positions) p *= scale;
-    const std::vector<InsideVertex> found = find(scaled, body, byNumber());
+    const std::vector<InsideVertex> found = insideOf(scaled, body, byNumber());
     ASSERT_EQ(found.size(), truth.size());
     for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(found[i].vertex, truth[i].vertex);
   }
   Mesh flat;
   flat.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   flat.triangles = {{0, 1, 2}};
-  EXPECT_TRUE(find({{0, 1, 0}, {3, 0, 0}, {0.5, 0, 0}}, flat, byNumber()).empty());
-}
-
-TEST(WindingNumber, BadCallsThrow) {
-  const Mesh body = sphere(4, 5, {0, 0, 0}, 1);
-  OctreeBasedCD detection;
-  const GeometryId id = detection.addTriangleMesh(body.positions, body.triangles),
-                   points = detection.addPointSet(body.positions);
-  const auto refused = [&](GeometryId asked, GeometryId around, const InsideSettings& settings) {
-    try {
-      testing::insideVertices(detection, asked, around, settings);
-    } catch (const Error& error) {
-      return error.code();
-    }
-    ADD_FAILURE() << "accepted";
-    return ErrorCode::UnknownGeometry;
-  };
-  for (const double margin : {-0.1, 0.5, std::numeric_limits<double>::quiet_NaN()})
-    EXPECT_EQ(refused(points, id, byNumber(margin)), ErrorCode::InvalidSettings);
-  EXPECT_EQ(refused(points, id, {static_cast<InsideRule>(7), 0}), ErrorCode::InvalidSettings);
-  EXPECT_EQ(refused(id, points, byNumber()), ErrorCode::NotClosed);
-  EXPECT_EQ(refused(id, id, byNumber()), ErrorCode::InvalidSettings);
+  EXPECT_TRUE(insideOf(Positions{{0, 1, 0}, {3, 0, 0}, {0.5, 0, 0}}, flat, byNumber()).empty());
 }
 
 /// Points within ulps of the faces, edges and vertices of closed meshes: the vertices are those of
@@ -276,12 +233,11 @@ TEST(WindingNumber, BadCallsThrow) {
 TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
   Random random(11);
   std::size_t inside = 0, outside = 0;
-  for (int run = 0; run < (testing::kShareOfCases == 1 ? 8 : 4); ++run) {
+  for (int run = 0; run < (kShareOfCases == 1 ? 8 : 4); ++run) {
     Mesh body = lump(random, 6, 8);
     const Vector3d offset = run % 2 ? randomPoint(random, -100, 100) : Vector3d(0, 0, 0);
     for (Vector3d& p : body.positions) p += offset;
-    if (run % 4 > 1)
-      for (Triangle& t : body.triangles) std::swap(t[0], t[1]);
+    if (run % 4 > 1) body = insideOut(body);
     Positions points;
     for (const Triangle& t : body.triangles)
       for (int kind = 0; kind < 3; ++kind)
@@ -297,16 +253,16 @@ TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
               x = std::nextafter(x, up ? 1e9 : -1e9);
           points.push_back(p);
         }
-    const std::vector<InsideVertex> truth = find(points, body, {}),
-                                    found = find(points, body, byNumber());
+    const std::vector<InsideVertex> truth = insideOf(points, body),
+                                    found = insideOf(points, body, byNumber());
     ASSERT_EQ(found, truth) << run;
-    ASSERT_EQ(find(points, body, byNumber(0.25)), truth) << run;
-    ASSERT_EQ(find(points, body, byNumber(), settingsOf(Engine::BruteForce)), truth) << run;
+    ASSERT_EQ(insideOf(points, body, byNumber(0.25)), truth) << run;
+    ASSERT_EQ(insideOf(points, body, byNumber(), settingsOf(Engine::BruteForce)), truth) << run;
     inside += truth.size();
     outside += points.size() - truth.size();
   }
-  EXPECT_GT(inside, testing::leastOf(5000));
-  EXPECT_GT(outside, testing::leastOf(5000));
+  EXPECT_GT(inside, leastOf(5000));
+  EXPECT_GT(outside, leastOf(5000));
 }
 
 /// Without a face the mesh is open. Faces far from the hole decide the side of points within
@@ -326,8 +282,8 @@ TEST(WindingNumber, PointsWithinRoundingOfAnOpenSurfaceAreNotDecidedWrongly) {
       for (double& x : p) x += (static_cast<int>(random() % 5) - 2) * std::abs(x) * 0x1p-52;
       points.push_back(p);
     }
-  const std::vector<InsideVertex> truth = find(points, closed, {}),
-                                  found = find(points, open, byNumber());
+  const std::vector<InsideVertex> truth = insideOf(points, closed),
+                                  found = insideOf(points, open, byNumber());
   std::vector<std::uint32_t> expected, decided;
   for (const InsideVertex& each : truth) expected.push_back(each.vertex);
   for (const InsideVertex& each : found)
@@ -337,4 +293,4 @@ TEST(WindingNumber, PointsWithinRoundingOfAnOpenSurfaceAreNotDecidedWrongly) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::testing
