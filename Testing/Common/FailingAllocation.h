@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <new>
 
 namespace palpate::testing {
 
@@ -21,6 +22,19 @@ class FailingAllocation {
   /// counted.
   static void arm(std::size_t n, Failures failures = Failures::One);
   static void disarm();
+  /// Calls f while the n-th allocation fails. Returns whether it threw std::bad_alloc.
+  template <class F>
+  static bool throwsAt(std::size_t n, F&& f, Failures failures = Failures::One) {
+    bool threw = false;
+    arm(n, failures);
+    try {
+      f();
+    } catch (const std::bad_alloc&) {
+      threw = true;
+    }
+    disarm();
+    return threw;
+  }
   /// Allocations between the last arm() and the disarm() after it, or until now. Failed ones count.
   static std::size_t count();
   /// Whether an allocation failed since the last arm().

@@ -242,24 +242,20 @@ TEST(SurfaceProxy, ListsAnswerExactlyFarFromTheOrigin) {
 }
 
 TEST(SurfaceProxy, RefusesWhatIsTooLarge) {
-  const auto codeOf = [](const Mesh& body, const ProxySettings& settings) {
-    try {
-      SurfaceProxy(meshOf(body), settings, Threads(2));
-    } catch (const Error& error) {
-      return error.code();
-    }
-    return ErrorCode::InvalidSettings;
+  const auto expectTooLarge = [](const Mesh& body, const ProxySettings& settings) {
+    expectRefused(ErrorCode::TooLarge, "",
+                  [&] { SurfaceProxy(meshOf(body), settings, Threads(2)); });
   };
   const Mesh ball = sphere(12, 18, Vector3d::Zero(), 1.0);
   ProxySettings settings{0.1, 0.02, 0.5};
   EXPECT_NO_THROW(SurfaceProxy(meshOf(ball), settings, Threads(2)));
   settings.reach = 0x1p401;
-  EXPECT_EQ(codeOf(ball, settings), ErrorCode::TooLarge);
+  expectTooLarge(ball, settings);
   // A thickness of ten times the body's size. The work that is allowed is less here.
   settings = {20.0, 1e-6, 0.5, 1u << 22};
-  EXPECT_EQ(codeOf(ball, settings), ErrorCode::TooLarge);
+  expectTooLarge(ball, settings);
   settings = {0.1, 1e-9, 0.5, ProxySettings{}.mostWork, 1u << 10};
-  EXPECT_EQ(codeOf(ball, settings), ErrorCode::TooLarge);
+  expectTooLarge(ball, settings);
 }
 
 /// 512 entries for each triangle, but from 2^23 to 2^26.

@@ -87,19 +87,6 @@ TEST(Predicates, UnderflowDoesNotFlipAVolume) {
   }
 }
 
-TEST(Predicates, UnderflowDoesNotFlipAnArea) {
-  Random random(6);
-  SignCounts counts;
-  for (int exponent = -545; exponent <= -490; ++exponent) {
-    for (int repeat = 0; repeat < 1500; ++repeat) {
-      const Eigen::Vector3d a = scaled(random.inCube(), exponent),
-                            b = scaled(random.inCube(), exponent);
-      const Eigen::Vector3d c = a + random.unit() * (b - a);
-      ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
-    }
-  }
-}
-
 /// Products that round to multiples of the least double, of differences that are rounded
 /// themselves. The relative error alone is no bound.
 TEST(Predicates, UnderflowDoesNotFlipAnAreaOfRoundedDifferences) {
@@ -110,24 +97,12 @@ TEST(Predicates, UnderflowDoesNotFlipAnAreaOfRoundedDifferences) {
     for (double& x : p) x = std::ldexp(x, -random.below(8));
     return p;
   };
-  for (int exponent = -516; exponent <= -506; ++exponent) {
-    for (int repeat = 0; repeat < 6000; ++repeat) {
+  for (int exponent = -545; exponent <= -490; ++exponent) {
+    for (int repeat = 0; repeat < (std::abs(exponent + 511) < 6 ? 6000 : 1500); ++repeat) {
       const Eigen::Vector3d a = scaled(uneven(), exponent), b = scaled(uneven(), exponent);
       const Eigen::Vector3d c = a + random.unit() * (b - a);
       ASSERT_EQ(orient2d(repeat % 3, a, b, c, counts), areaSign(repeat % 3, a, b, c)) << exponent;
     }
-  }
-}
-
-TEST(Predicates, SwappingTwoPositionsFlipsTheSign) {
-  Random random(3);
-  SignCounts counts;
-  for (int repeat = 0; repeat < 20000; ++repeat) {
-    const auto [a, b] = makePair(static_cast<Kind>(repeat % static_cast<int>(Kind::Count)), random);
-    const int sign = orient3d(a[0], a[1], a[2], b[0], counts);
-    ASSERT_EQ(orient3d(a[1], a[0], a[2], b[0], counts), -sign);
-    ASSERT_EQ(orient3d(a[0], a[2], a[1], b[0], counts), -sign);
-    ASSERT_EQ(orient3d(a[0], a[1], b[0], a[2], counts), -sign);
   }
 }
 

@@ -28,16 +28,11 @@ TEST(LooseOctree, ListsTheNodesOfEachGeometryFromTheRoot) {
   for (const GeometryId id : ids) {
     const std::vector<LooseOctree::Node> list = octree.nodes(id);
     ASSERT_FALSE(list.empty());
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      EXPECT_EQ(list[i].geometry, id);
-      elements += list[i].elements.size();
-      if (i == 0) {
-        EXPECT_EQ(list[i].parent, kNoElement);
-        EXPECT_EQ(list[i].depth, 0);
-      } else {
-        ASSERT_LT(list[i].parent, i);
-        EXPECT_EQ(list[i].depth, list[list[i].parent].depth + 1);
-      }
+    EXPECT_EQ(list.front().parent, kNoElement);
+    EXPECT_EQ(list.front().depth, 0);
+    for (const LooseOctree::Node& node : list) {
+      EXPECT_EQ(node.geometry, id);
+      elements += node.elements.size();
     }
     nodes += list.size();
   }

@@ -1,5 +1,4 @@
 #include "BoxOctree.h"
-#include "Octree/BoxMap.h"
 #include "Octree/Keys.h"
 
 #include <gtest/gtest.h>
@@ -138,24 +137,6 @@ TEST(Octree, PartsThatAreFittedOneByOneEqualAWholeFit) {
       EXPECT_EQ(tree.octree.box(node).lower, fresh.octree.box(node).lower);
       EXPECT_EQ(tree.octree.box(node).upper, fresh.octree.box(node).upper);
     }
-  }
-}
-
-TEST(BoxMap, KeepsEmptyBoxesAndAllBoxesWithoutEnds) {
-  const FloatBox box = boxAbout({1, 2, 3}, 0.5);
-  BoxMap map;
-  EXPECT_EQ(map(box).lower, box.lower);
-  EXPECT_EQ(map(box).upper, box.upper);
-  map.count = 1;
-  setEnd(map.ends[0], {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}}, {10, 20, 30}, 0.0, 0.0);
-  EXPECT_TRUE(map(FloatBox()).empty());
-  const FloatBox turned = map(box);
-  const double expected[] = {8, 21, 33};
-  for (std::size_t k = 0; k < 3; ++k) {
-    EXPECT_NEAR(turned.lower[k], expected[k] - 0.25, 1e-3);
-    EXPECT_NEAR(turned.upper[k], expected[k] + 0.25, 1e-3);
-    EXPECT_LE(turned.lower[k], expected[k] - 0.25);
-    EXPECT_GE(turned.upper[k], expected[k] + 0.25);
   }
 }
 

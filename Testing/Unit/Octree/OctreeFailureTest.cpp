@@ -84,14 +84,8 @@ void failEach(const Case& c, const Threads& threads, bool smaller) {
     BoxOctree tree;
     if (smaller) tree.build(part, c.settings, threads);
     tree.prepare(c.boxes);
-    bool threw = false;
-    FailingAllocation::arm(n);
-    try {
-      tree.build(c.boxes, c.settings, threads);
-    } catch (const std::bad_alloc&) {
-      threw = true;
-    }
-    FailingAllocation::disarm();
+    const bool threw =
+        FailingAllocation::throwsAt(n, [&] { tree.build(c.boxes, c.settings, threads); });
     ASSERT_EQ(threw, FailingAllocation::failed());
     if (!threw) {
       EXPECT_TRUE(tree.octree.isBuilt());
@@ -169,15 +163,9 @@ TEST_P(OctreeFailure, NextUpdateCompletesAFailedOne) {
       SCOPED_TRACE(n);
       GeometryTable table;
       start(table, settings);
-      bool threw = false;
-      FailingAllocation::arm(
-          n, n % 2 ? FailingAllocation::Failures::One : FailingAllocation::Failures::All);
-      try {
-        table.updateOctrees(settings, threads);
-      } catch (const std::bad_alloc&) {
-        threw = true;
-      }
-      FailingAllocation::disarm();
+      const bool threw = FailingAllocation::throwsAt(
+          n, [&] { table.updateOctrees(settings, threads); },
+          n % 2 ? FailingAllocation::Failures::One : FailingAllocation::Failures::All);
       failures += threw;
       if (threw) table.updateOctrees(settings, threads);
       for (std::size_t i = 0; i < table.all().size(); ++i) {
@@ -220,14 +208,7 @@ TEST_P(OctreeFailure, OctreesWithoutNodesAreListedAsEmpty) {
         detection.setTriangles(ids[0], second.positions, second.triangles);
         detection.setTriangles(ids[1], first.positions, first.triangles);
       }
-      FailingAllocation::arm(n);
-      bool threw = false;
-      try {
-        detection.update();
-      } catch (const std::bad_alloc&) {
-        threw = true;
-      }
-      FailingAllocation::disarm();
+      const bool threw = FailingAllocation::throwsAt(n, [&] { detection.update(); });
       const LooseOctree& octree = detection.octree();
       std::size_t with = 0;
       for (const GeometryId id : ids) {
@@ -284,14 +265,8 @@ TEST(OctreeFailure, FailedQueryDoesNotAffectTheNext) {
       std::size_t overlapping;
       TraversalStack pairs;
       PairSink sink;
-      bool threw = false;
-      FailingAllocation::arm(n);
-      try {
-        ofPairs ? pairsOf(pairs, sink) : query(stack, overlapping);
-      } catch (const std::bad_alloc&) {
-        threw = true;
-      }
-      FailingAllocation::disarm();
+      const bool threw = FailingAllocation::throwsAt(
+          n, [&] { ofPairs ? pairsOf(pairs, sink) : query(stack, overlapping); });
       failures += threw;
       if (ofPairs) {
         pairsOf(pairs, sink);

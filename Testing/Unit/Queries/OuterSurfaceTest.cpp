@@ -177,14 +177,8 @@ TEST(OuterSurface, SurvivesFailingAllocations) {
   std::size_t failures = 0;
   for (bool hasFailed = true; hasFailed; ++failures) {
     std::vector<InsideVertex> found;
-    hasFailed = false;
-    FailingAllocation::arm(failures + 1);
-    try {
-      queries.findInsideVertices(vertices, id, found);
-    } catch (const std::bad_alloc&) {
-      hasFailed = true;
-    }
-    FailingAllocation::disarm();
+    hasFailed = FailingAllocation::throwsAt(
+        failures + 1, [&] { queries.findInsideVertices(vertices, id, found); });
     EXPECT_EQ(found, hasFailed ? std::vector<InsideVertex>() : expected);
   }
   EXPECT_GT(failures, 10u);
