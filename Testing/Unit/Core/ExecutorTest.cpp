@@ -1,6 +1,7 @@
 #include <palpate/Executor.h>
 
 #include "Core/Threads.h"
+#include "Executors.h"
 
 #include <palpate/Capture.h>
 #include <palpate/Error.h>
@@ -28,57 +29,6 @@
 
 namespace palpate {
 namespace {
-
-/// Runs tasks as the function does.
-class FunctionExecutor : public Executor {
- public:
-  using Run = std::function<void(std::size_t count, Task task, void* context)>;
-  FunctionExecutor(int concurrency, Run run) : m_concurrency(concurrency), m_run(std::move(run)) {}
-  int concurrency() const noexcept override { return m_concurrency; }
-  void run(std::size_t count, Task task, void* context) override {
-    ++calls;
-    m_run(count, task, context);
-  }
-  std::atomic<int> calls{0};
-
- private:
-  int m_concurrency;
-  Run m_run;
-};
-
-std::shared_ptr<FunctionExecutor> executorOf(int concurrency, FunctionExecutor::Run run) {
-  return std::make_shared<FunctionExecutor>(concurrency, std::move(run));
-}
-
-void backwards(std::size_t count, Executor::Task task, void* context) {
-  while (count-- > 0) task(context, count);
-}
-
-/// One thread for each task, other than the caller's.
-void onThreads(std::size_t count, Executor::Task task, void* context) {
-  std::vector<std::thread> threads;
-  for (std::size_t i = 0; i < count; ++i) threads.emplace_back([=] { task(context, i); });
-  for (std::thread& thread : threads) thread.join();
-}
-
-struct Named {
-  std::string name;
-  std::shared_ptr<Executor> executor;
-};
-
-std::vector<Named> executors() {
-  return {{"the library's pool", makeThreadPool(3)},
-          {"backwards", executorOf(4, backwards)},
-          {"a thread for each task", executorOf(3, onThreads)},
-          {"first half on a thread, the rest here",
-           executorOf(5, [](std::size_t count, Executor::Task task, void* context) {
-             std::thread other([=] {
-               for (std::size_t i = 0; i < count / 2; ++i) task(context, i);
-             });
-             for (std::size_t i = count / 2; i < count; ++i) task(context, i);
-             other.join();
-           })}};
-}
 
 /// Two meshes that move: contacts of each method in a few frames.
 std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed, int frames = 4) {
@@ -173,37 +123,6 @@ TEST(Executor, NoMoreThreadsThanRequested) {
       --now;
     });
     EXPECT_LE(most, 2);
-  }
-}
-
-TEST(Executor, NestedLoopsAreComplete) {
-  for (const auto& [name, executor] : executors()) {
-    const Threads threads(0, executor);
-    std::vector<std::vector<int>> runs(20, std::vector<int>(30, 0));
-    threads.forEach(runs.size(), [&](std::size_t i) {
-      threads.forEach(runs[i].size(), [&](std::size_t j) { ++runs[i][j]; });
-    });
-    for (const auto& row : runs) EXPECT_EQ(row, std::vector<int>(30, 1)) << name;
-  }
-}
-
-TEST(Executor, ExceptionOfTheLowestIndexIsRethrown) {
-  for (const auto& [name, executor] : executors()) {
-    for (const int count : {0, 2}) {
-      const Threads threads(count, executor);
-      for (int repeat = 0; repeat < 20; ++repeat) {
-        std::string message;
-        try {
-          threads.forEach(100, [](std::size_t i) {
-            if (i % 30 == 17) throw std::runtime_error(std::to_string(i));
-          });
-        } catch (const std::runtime_error& error) {
-          message = error.what();
-        }
-        EXPECT_EQ(message, "17") << name;
-        EXPECT_TRUE(allRun(threads));
-      }
-    }
   }
 }
 

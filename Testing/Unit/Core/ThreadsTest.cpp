@@ -1,4 +1,5 @@
 #include "Core/Threads.h"
+#include "Executors.h"
 
 #include <gtest/gtest.h>
 
@@ -45,11 +46,10 @@ TEST(Threads, ChunksDependOnSizeAndGrainOnly) {
 }
 
 TEST(Threads, EachIndexRunsOnceAndItsWritesAreVisible) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     std::vector<int> runs(10'000, 0);
     threads.forEach(runs.size(), [&](std::size_t i) { ++runs[i]; });
-    EXPECT_TRUE(std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; })) << count;
+    EXPECT_TRUE(std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; }));
   }
 }
 
@@ -70,8 +70,7 @@ TEST(Threads, OnePoolRunsManySmallLoops) {
 }
 
 TEST(Threads, ExceptionIsRethrownAndThePoolStaysUsable) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     for (int run = 0; run < 50; ++run) {
       EXPECT_THROW(threads.forEach(100,
                                    [](std::size_t i) {
@@ -86,8 +85,7 @@ TEST(Threads, ExceptionIsRethrownAndThePoolStaysUsable) {
 }
 
 TEST(Threads, NestedLoopsAreComplete) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     for (int run = 0; run < 20; ++run) {
       std::vector<std::vector<int>> runs(20, std::vector<int>(30, 0));
       threads.forEach(runs.size(), [&](std::size_t i) {
@@ -112,8 +110,7 @@ TEST(Threads, LoopsOfConcurrentCallersAreComplete) {
 }
 
 TEST(Threads, NestedExceptionIsRethrown) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     EXPECT_THROW(threads.forEach(4,
                                  [&](std::size_t) {
                                    threads.forEach(4, [](std::size_t j) {
@@ -125,8 +122,7 @@ TEST(Threads, NestedExceptionIsRethrown) {
 }
 
 TEST(Threads, ExceptionOfTheLowestIndexIsRethrown) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     for (int run = 0; run < 100; ++run) {
       std::string message;
       try {
@@ -136,14 +132,13 @@ TEST(Threads, ExceptionOfTheLowestIndexIsRethrown) {
       } catch (const std::runtime_error& error) {
         message = error.what();
       }
-      EXPECT_EQ(message, "60") << count;
+      EXPECT_EQ(message, "60");
     }
   }
 }
 
 TEST(Threads, NestedLoopsWithExceptionsLeaveThePoolUsable) {
-  for (int count : kCounts) {
-    const Threads threads(count);
+  for (const Threads& threads : threadsOfEveryKind()) {
     for (int run = 0; run < 50; ++run) {
       std::atomic<int> caught{0};
       EXPECT_THROW(threads.forEach(8,

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 /// Distances in rational numbers. It tries every feature instead of deciding the region, so that it
 /// cannot share a mistake of the region logic. Roots have 400 bits.
@@ -126,6 +127,81 @@ inline Closest vertexTriangle(const Eigen::Vector3d& p, const Eigen::Vector3d& a
 inline Closest edgeEdge(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1,
                         const Eigen::Vector3d& q0, const Eigen::Vector3d& q1) {
   return edgeEdge(toRational(p0), toRational(p1), toRational(q0), toRational(q1));
+}
+
+/// An interval of a line's parameter.
+struct Range {
+  Rational first, last;
+
+  /// Keeps the part in which t * slope + height >= 0. Returns whether there is one.
+  bool cut(const Rational& height, const Rational& slope) {
+    if (slope == 0) return height >= 0;
+    const Rational zero = -height / slope;
+    if (slope > 0)
+      first = std::max(first, zero);
+    else
+      last = std::min(last, zero);
+    return first <= last;
+  }
+};
+
+/// What a line shares with a triangle. It is cut by the planes through the edges, across the
+/// triangle, and meets its plane at one parameter or everywhere. A triangle without area is cut by
+/// the planes at the ends of its longest edge, and by three that hold it.
+inline std::optional<Range> lineOn(const Vector& origin, const Vector& direction,
+                                   const std::array<Vector, 3>& c) {
+  const Rational far(mpz_class(1) << 5000);  // beyond all parameters of doubles
+  Range range{-far, far};
+  const auto isOnPlane = [&](const Vector& normal) {
+    const Rational height = dot(origin - c[0], normal), slope = dot(direction, normal);
+    return range.cut(height, slope) && range.cut(-height, -slope);
+  };
+  const auto edge = [&](std::size_t i) { return c[(i + 1) % 3] - c[i]; };
+  const Vector normal = cross(edge(0), c[2] - c[0]);
+  if (dot(normal, normal) != 0) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vector inwards = cross(normal, edge(i));
+      if (!range.cut(dot(origin - c[i], inwards), dot(direction, inwards))) return {};
+    }
+    if (!isOnPlane(normal)) return {};
+    return range;
+  }
+  std::size_t longest = 0;
+  for (std::size_t i = 1; i < 3; ++i)
+    if (dot(edge(i), edge(i)) > dot(edge(longest), edge(longest))) longest = i;
+  const Vector along = edge(longest);
+  const bool isPoint = dot(along, along) == 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    Vector axis;
+    axis[k] = 1;
+    if (!isOnPlane(isPoint ? axis : cross(along, axis))) return {};
+  }
+  const Vector &p = c[longest], &q = c[(longest + 1) % 3];
+  if (!range.cut(dot(origin - p, along), dot(direction, along)) ||
+      !range.cut(dot(q - origin, along), -dot(direction, along)))
+    return {};
+  return range;
+}
+
+/// The weights of a point in a tetrahedron. None outside, and none without volume.
+inline std::optional<std::array<Rational, 4>> tetrahedronWeights(
+    const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 4>& corners) {
+  std::array<Rational, 4> weights;
+  Rational sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    std::array<Eigen::Vector3d, 4> with = corners;
+    with[i] = p;
+    const Vector a = toRational(with[0]);
+    const auto edge = [&](std::size_t k) { return toRational(with[k]) - a; };
+    weights[i] = dot(cross(edge(1), edge(2)), edge(3));
+    sum += weights[i];
+  }
+  if (sum == 0) return {};
+  for (Rational& weight : weights) {
+    weight /= sum;
+    if (weight < 0) return {};
+  }
+  return weights;
 }
 
 /// One unit in the last place of the largest coordinate difference among four positions.

@@ -13,76 +13,25 @@
 #include <optional>
 #include <utility>
 
-// Intersections of rays and triangles in rational numbers. A ray in the triangle's plane is cut at
-// the lines of its edges.
+// Intersections of rays and triangles, beside those in rational numbers.
 
 namespace palpate::test {
 namespace {
 
-using oracle::Rational, oracle::Vector, oracle::operator-, oracle::cross, oracle::dot;
+using oracle::Rational;
 
-struct Shared {
-  Rational first, last;
-};
-
-/// What the ray shares with the half space in which t * slope + height >= 0.
-bool cut(Shared& shared, const Rational& height, const Rational& slope) {
-  if (slope == 0) return height >= 0;
-  const Rational zero = -height / slope;
-  if (slope > 0)
-    shared.first = std::max(shared.first, zero);
-  else
-    shared.last = std::min(shared.last, zero);
-  return shared.first <= shared.last;
-}
-
-/// The ray is cut by the planes through the edges, across the triangle, and meets its plane at one
-/// parameter or everywhere. A triangle without area is cut by the planes at the ends of its longest
-/// edge, and by two that hold it.
-std::optional<Shared> sharedByRay(const RaySegment& ray, const Corners& corners) {
-  const Vector o = oracle::toRational(ray.origin), d = oracle::toRational(ray.direction);
-  const std::array<Vector, 3> c{oracle::toRational(corners[0]), oracle::toRational(corners[1]),
-                                oracle::toRational(corners[2])};
-  const Vector normal = cross(c[1] - c[0], c[2] - c[0]);
-  Shared shared{Rational(ray.tMin), Rational(ray.tMax)};
-  const auto onPlane = [&](const Vector& of) {
-    const Rational height = dot(o - c[0], of), slope = dot(d, of);
-    return cut(shared, height, slope) && cut(shared, -height, -slope);
-  };
-  if (dot(normal, normal) != 0) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vector inwards = cross(normal, c[(i + 1) % 3] - c[i]);
-      if (!cut(shared, dot(o - c[i], inwards), dot(d, inwards))) return {};
-    }
-    if (!onPlane(normal)) return {};
-    return shared;
-  }
-  std::size_t longest = 0;
-  const auto edge = [&](std::size_t i) { return c[(i + 1) % 3] - c[i]; };
-  for (std::size_t i = 1; i < 3; ++i)
-    if (dot(edge(i), edge(i)) > dot(edge(longest), edge(longest))) longest = i;
-  const Vector along = edge(longest);
-  if (dot(along, along) == 0) {
-    for (int k = 0; k < 3; ++k) {
-      Vector axis;
-      axis[static_cast<std::size_t>(k)] = 1;
-      if (!onPlane(axis)) return {};
-    }
-    return shared;
-  }
-  for (std::size_t k = 0; k < 3; ++k) {
-    Vector axis;
-    axis[k] = 1;
-    if (!onPlane(cross(along, axis))) return {};
-  }
-  const Vector &p = c[longest], &q = c[(longest + 1) % 3];
-  if (!cut(shared, dot(o - p, along), dot(d, along))) return {};
-  if (!cut(shared, dot(q - o, along), -dot(d, along))) return {};
-  return shared;
+/// Of the ray's own range.
+std::optional<oracle::Range> sharedByRay(const RaySegment& ray, const Corners& corners) {
+  auto range = oracle::lineOn(oracle::toRational(ray.origin), oracle::toRational(ray.direction),
+                              {oracle::toRational(corners[0]), oracle::toRational(corners[1]),
+                               oracle::toRational(corners[2])});
+  if (!range || !range->cut(-Rational(ray.tMin), 1) || !range->cut(Rational(ray.tMax), -1))
+    return {};
+  return range;
 }
 
 void expectShared(const RaySegment& ray, const Corners& t, int& hits) {
-  const std::optional<Shared> truth = sharedByRay(ray, t);
+  const std::optional<oracle::Range> truth = sharedByRay(ray, t);
   const std::optional<RayInterval> found = intersectRay(ray, t[0], t[1], t[2]);
   ASSERT_EQ(found.has_value(), truth.has_value());
   if (!truth) return;
@@ -164,7 +113,7 @@ TEST(RayTriangle, FirstPointsAreWithinTheStatedError) {
     const std::optional<RayInterval> found = intersectRay(ray, t[0], t[1], t[2]);
     if (!found) continue;
     ++hits;
-    const std::optional<Shared> truth = sharedByRay(ray, t);
+    const std::optional<oracle::Range> truth = sharedByRay(ray, t);
     ASSERT_TRUE(truth) << i;
     const RayPoint point = firstPoint(ray, *found, t[0], t[1], t[2]);
     double extent = 0.0;

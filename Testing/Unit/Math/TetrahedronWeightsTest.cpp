@@ -15,27 +15,6 @@ using Eigen::Vector3d;
 using oracle::Rational;
 using testing::Random;
 
-/// The weights in rational numbers. None outside, and none without volume.
-std::optional<std::array<Rational, 4>> truth(const Vector3d& p,
-                                             const std::array<Vector3d, 4>& corners) {
-  std::array<Rational, 4> volumes;
-  Rational sum = 0;
-  for (int i = 0; i < 4; ++i) {
-    std::array<Vector3d, 4> with = corners;
-    with[i] = p;
-    const auto a = oracle::toRational(with[0]);
-    const auto edge = [&](int k) { return oracle::operator-(oracle::toRational(with[k]), a); };
-    volumes[i] = oracle::dot(oracle::cross(edge(1), edge(2)), edge(3));
-    sum += volumes[i];
-  }
-  if (sum == 0) return {};
-  for (Rational& v : volumes) {
-    v /= sum;
-    if (v < 0) return {};
-  }
-  return volumes;
-}
-
 void expectExact(const Vector3d& p, std::array<Vector3d, 4> corners, std::size_t& inside,
                  std::size_t& zeros) {
   SignCounts counts;
@@ -43,7 +22,7 @@ void expectExact(const Vector3d& p, std::array<Vector3d, 4> corners, std::size_t
   do {
     const std::array<Vector3d, 4> at{corners[order[0]], corners[order[1]], corners[order[2]],
                                      corners[order[3]]};
-    const auto expected = truth(p, at);
+    const auto expected = oracle::tetrahedronWeights(p, at);
     const auto found = tetrahedronWeights(p, at[0], at[1], at[2], at[3], counts);
     ASSERT_EQ(found.has_value(), expected.has_value());
     if (!found) continue;

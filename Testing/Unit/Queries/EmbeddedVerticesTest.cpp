@@ -178,47 +178,6 @@ TEST(EmbeddedVertices, UseTheLastPositions) {
   EXPECT_GT(sizes.size(), 4u);
 }
 
-TEST(EmbeddedVertices, WeightsReproduceThePoint) {
-  Random random(3);
-  Solid solid = cells(3, random);
-  for (Vector3d& p : solid.positions) p = 40.0 * p + randomPoint(random, -15, 15);
-  TestGeometry probes = particles(random, 2000, 0);
-  for (Vector3d& p : probes.positions) p *= 120;
-  const auto found = embedded(settingsOf(Engine::Octree), probes, solid);
-  EXPECT_GT(found.size(), 1000u);
-  for (const auto& [vertex, at] : found) {
-    Vector3d sum = Vector3d::Zero();
-    double one = 0;
-    for (int i = 0; i < 4; ++i) {
-      EXPECT_GE(at.weights[i], 0);
-      sum += at.weights[i] * solid.positions[at.vertices[i]];
-      one += at.weights[i];
-    }
-    EXPECT_NEAR(one, 1, 0x1p-50);
-    EXPECT_LT((sum - probes.positions[vertex]).norm(), 1e-12);
-  }
-}
-
-TEST(EmbeddedVertices, DoNotDependOnTheOrderOfCorners) {
-  Random random(4);
-  Solid solid = cells(3, random), turned = solid;
-  for (Tetrahedron& t : turned.tetrahedra) std::shuffle(t.begin(), t.end(), random);
-  const TestGeometry probes = lattices(3)[0];
-  const auto expected = embedded(settingsOf(Engine::Octree), probes, solid),
-             found = embedded(settingsOf(Engine::Octree), probes, turned);
-  ASSERT_EQ(found.size(), expected.size());
-  EXPECT_EQ(found.size(), 64u);
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    EXPECT_EQ(found[i].vertex, expected[i].vertex);
-    EXPECT_EQ(found[i].at.tetrahedron, expected[i].at.tetrahedron);
-    for (int k = 0; k < 4; ++k)
-      for (int l = 0; l < 4; ++l)
-        if (found[i].at.vertices[k] == expected[i].at.vertices[l]) {
-          EXPECT_EQ(found[i].at.weights[k], expected[i].at.weights[l]);
-        }
-  }
-}
-
 // ---- Inside, by tetrahedra ----
 
 /// Where the surface is not closed and oriented, and where it is turned inside out.

@@ -153,18 +153,6 @@ TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
   }
 }
 
-TEST(Penetration, BoxesAreSeparatedAlongTheLeastOverlap) {
-  for (const double overlap : {0.1, 0.3, 0.6})
-    for (const Vector3d& aside : {Vector3d(0, 0, 0), Vector3d(0, 0.05, 0.03)}) {
-      const Mesh a = cube(0, 1), b = moved(a, Vector3d(1 - overlap, 0, 0) + aside);
-      const Penetration p = Bodies(a, b).penetration();
-      expectSeparates(a, b, p, 1.0);
-      EXPECT_NEAR(p.depth, overlap, 1e-11);
-      EXPECT_LE((p.direction - Vector3d(-1, 0, 0)).norm(), 1e-12);
-      EXPECT_TRUE(p.minimal);
-    }
-}
-
 /// The least translation of convex bodies: over the normals of all faces and of all pairs of edges.
 double leastTranslation(const Mesh& a, const Mesh& b) {
   double least = std::numeric_limits<double>::infinity();

@@ -168,44 +168,6 @@ inline Rational squaredDistance(const Vector3d& p, const Positions& positions, c
   return oracle::vertexTriangle(p, positions[t[0]], positions[t[1]], positions[t[2]]).square;
 }
 
-/// What a ray shares with an element: an interval of its parameter.
-struct RationalRange {
-  Rational first, last;
-};
-
-/// Every common point is an end of the interval, or between two ends. Ends are where the ray passes
-/// the triangle's plane, or where it meets an edge.
-inline std::optional<RationalRange> rayOn(const oracle::Vector& origin,
-                                          const oracle::Vector& direction,
-                                          const std::array<oracle::Vector, 3>& corners) {
-  using namespace oracle;
-  std::optional<RationalRange> range;
-  const auto takeIfOn = [&](const Rational& t, const oracle::Vector& p, const oracle::Vector& q,
-                            const oracle::Vector& r) {
-    if (vertexTriangle(origin + t * direction, p, q, r).square != 0) return;
-    if (!range) range = {t, t};
-    if (t < range->first) range->first = t;
-    if (t > range->last) range->last = t;
-  };
-  const auto& [a, b, c] = corners;
-  const oracle::Vector normal = cross(b - a, c - a);
-  const Rational slope = dot(direction, normal), height = dot(a - origin, normal);
-  if (slope != 0) {
-    takeIfOn(height / slope, a, b, c);
-    return range;
-  }
-  if (height != 0) return range;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const oracle::Vector &p = corners[i], &q = corners[(i + 1) % 3];
-    for (const oracle::Vector& end : {p, q})
-      takeIfOn(dot(end - origin, direction) / dot(direction, direction), p, q, q);
-    const oracle::Vector across = cross(q - p, direction);
-    if (const Rational square = dot(across, across); square != 0)
-      takeIfOn(dot(cross(q - p, p - origin), across) / square, p, q, q);
-  }
-  return range;
-}
-
 inline oracle::Vector pointOf(const Ray& ray, const Rational& t) {
   using namespace oracle;
   return toRational(ray.origin) + t * toRational(ray.direction);
@@ -244,7 +206,7 @@ inline std::vector<RationalHit> hitsOf(const Ray& ray, const Positions& position
     if (certainlyMisses(ray, positions, elements[e])) continue;
     std::array<oracle::Vector, 3> corners;
     for (std::size_t i = 0; i < 3; ++i) corners[i] = oracle::toRational(positions[elements[e][i]]);
-    auto range = rayOn(origin, direction, corners);
+    auto range = oracle::lineOn(origin, direction, corners);
     if (!range) continue;
     if (range->first < ray.tMin) range->first = ray.tMin;
     if (ray.tMax < kInfinity && range->last > ray.tMax) range->last = ray.tMax;

@@ -180,19 +180,8 @@ TEST(SignedDistances, TetrahedralMeshes) {
       if (i % 3 == 1) p = now[random() % now.size()];
       const bool expected =
           std::any_of(solid.tetrahedra.begin(), solid.tetrahedra.end(), [&](const Tetrahedron& t) {
-            std::array<oracle::Vector, 4> corners;
-            for (std::size_t k = 0; k < 4; ++k) {
-              corners[k] = oracle::toRational(now[t[k]]);
-              for (int x = 0; x < 3; ++x) corners[k][static_cast<std::size_t>(x)] -= p[x];
-            }
-            const auto volume = [&](int a, int b, int c) {
-              return sgn(oracle::dot(corners[a], oracle::cross(corners[b], corners[c])));
-            };
-            // Signs of the point's weights; their sum has the sign of the volume.
-            const int w[] = {volume(1, 2, 3), -volume(0, 2, 3), volume(0, 1, 3), -volume(0, 1, 2)};
-            const bool positive = std::any_of(w, w + 4, [](int s) { return s > 0; }),
-                       negative = std::any_of(w, w + 4, [](int s) { return s < 0; });
-            return positive != negative;
+            return oracle::tetrahedronWeights(p, {now[t[0]], now[t[1]], now[t[2]], now[t[3]]})
+                .has_value();
           });
       EXPECT_EQ(queries.contains(both.id, p), expected) << i;
       EXPECT_EQ(both.bruteForce.queries().contains(both.id, p), expected);
