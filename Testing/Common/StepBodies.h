@@ -63,13 +63,17 @@ inline StepBody placed(std::string name, const TestGeometry& geometry, double an
   return body;
 }
 
-inline StepBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
+inline StepBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Pose& before,
+                        const Pose& now) {
   return {std::move(name), GeometryType::Shape,
           [shape](OctreeBasedCD& collisions) { return collisions.addAnalyticalGeometry(shape); },
-          [motion](OctreeBasedCD& collisions, GeometryId id) {
-            const Eigen::Matrix3d none = Eigen::Matrix3d::Identity();
-            collisions.setTransform(id, {none, Vector3d::Zero()}, {none, motion});
+          [before, now](OctreeBasedCD& collisions, GeometryId id) {
+            collisions.setTransform(id, before, now);
           }};
+}
+
+inline StepBody shapeOf(std::string name, const AnalyticalGeometry& shape, const Vector3d& motion) {
+  return shapeOf(std::move(name), shape, Pose{}, Pose{Eigen::Matrix3d::Identity(), motion});
 }
 
 /// Every geometry type but fields in the unit cube, with steps of about `motion`.

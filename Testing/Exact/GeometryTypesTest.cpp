@@ -7,8 +7,6 @@
 
 #include <cmath>
 #include <map>
-#include <string>
-#include <utility>
 #include <vector>
 
 // Lines and points against rational arithmetic: which features are within the thickness, and their

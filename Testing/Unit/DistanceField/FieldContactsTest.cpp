@@ -203,6 +203,16 @@ TEST(FieldContacts, AreWithinTheErrorBound) {
         EXPECT_LE(deepest, sampled + tolerance + 1e-9) << t;
       }
     }
+    // With all contacts, none is less deep than a vertex of its element.
+    detection.setPairSettings(other, body, byField(Contacts::All));
+    detection.detectCollision();
+    std::size_t edges = 0;
+    for (const ShapeContact& c : detection.collisionData(other, body).shape()) {
+      edges += c.element == ShapeElement::Edge;
+      for (const std::uint32_t v : c.vertices)
+        EXPECT_LE(c.distance, valueAt(mesh.positions[v]) + 1e-9) << static_cast<int>(c.element);
+    }
+    EXPECT_GT(edges, 10u);
   }
 }
 

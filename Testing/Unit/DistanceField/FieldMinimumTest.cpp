@@ -11,8 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <optional>
-#include <span>
 #include <vector>
 
 namespace palpate::testing {

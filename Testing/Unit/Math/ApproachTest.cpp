@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <string>
 
 // Impacts with a minimum distance. Rational arithmetic decides the distances.
 

@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 /// Results of Distance.h compared with rational arithmetic. Failures are GoogleTest's.

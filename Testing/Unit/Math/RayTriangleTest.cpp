@@ -9,9 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
-#include <utility>
 
 // Intersections of rays and triangles, beside those in rational numbers.
 

@@ -8,9 +8,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 
 namespace palpate::test {
 namespace {

@@ -2,7 +2,6 @@
 
 #include "Math/TriangleIntersection.h"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>

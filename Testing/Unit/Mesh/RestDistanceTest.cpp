@@ -8,7 +8,6 @@
 #include <functional>
 #include <limits>
 #include <queue>
-#include <set>
 #include <utility>
 
 namespace palpate {

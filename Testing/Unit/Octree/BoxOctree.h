@@ -5,7 +5,6 @@
 #include "Octree/Octree.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <vector>
 

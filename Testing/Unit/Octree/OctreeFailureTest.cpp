@@ -10,9 +10,6 @@
 
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <new>
-#include <optional>
 #include <string>
 #include <type_traits>
 

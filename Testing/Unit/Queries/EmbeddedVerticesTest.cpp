@@ -4,11 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <functional>
 #include <limits>
 #include <optional>
 #include <set>
-#include <string>
 
 namespace palpate::testing {
 namespace {

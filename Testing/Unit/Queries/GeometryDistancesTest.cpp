@@ -2,6 +2,7 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Core/SimdPath.h"
+#include "Unit/Math/IntersectionOracle.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -10,7 +11,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -232,50 +232,31 @@ TEST(GeometryDistances, ClampedBoxesDoNotHideTheNearestPair) {
   }
 }
 
-/// Distances of the elements of two small meshes in rational arithmetic.
-struct RationalDistance {
-  Rational square = -1;  ///< of the least distance; 0 if the elements meet
-
-  RationalDistance(const TestGeometry& a, const Positions& nowA, const TestGeometry& b,
-                   const Positions& nowB) {
-    for (const Triangle& s : a.triangles)
-      for (const Triangle& t : b.triangles)
-        add({oracle::toRational(nowA[s[0]]), oracle::toRational(nowA[s[1]]),
-             oracle::toRational(nowA[s[2]])},
-            {oracle::toRational(nowB[t[0]]), oracle::toRational(nowB[t[1]]),
-             oracle::toRational(nowB[t[2]])});
-  }
-
- private:
-  using Corners = std::array<oracle::Vector, 3>;
-  void take(const Rational& other) {
-    if (square < 0 || other < square) square = other;
-  }
-  void add(const Corners& a, const Corners& b) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      take(oracle::vertexTriangle(a[i], b[0], b[1], b[2]).square);
-      take(oracle::vertexTriangle(b[i], a[0], a[1], a[2]).square);
-      for (std::size_t j = 0; j < 3; ++j)
-        take(oracle::edgeEdge(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]).square);
-      if (crosses(a[i], a[(i + 1) % 3], b) || crosses(b[i], b[(i + 1) % 3], a)) take(0);
+/// The square of the least distance of two small meshes in rational arithmetic; 0 if they meet.
+Rational squareOf(const TestGeometry& a, const TestGeometry& b) {
+  Rational least = -1;
+  const auto take = [&](const Rational& other) {
+    if (least < 0 || other < least) least = other;
+  };
+  for (const Triangle& s : a.triangles)
+    for (const Triangle& t : b.triangles) {
+      const std::array<Vector3d, 6> x{a.positions[s[0]], a.positions[s[1]], a.positions[s[2]],
+                                      b.positions[t[0]], b.positions[t[1]], b.positions[t[2]]};
+      if (intersection::trianglesIntersect(x)) return 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        take(oracle::vertexTriangle(x[i], x[3], x[4], x[5]).square);
+        take(oracle::vertexTriangle(x[3 + i], x[0], x[1], x[2]).square);
+        for (std::size_t j = 0; j < 3; ++j)
+          take(oracle::edgeEdge(x[i], x[(i + 1) % 3], x[3 + j], x[3 + (j + 1) % 3]).square);
+      }
     }
-  }
-  /// Whether a segment passes through a triangle's interior.
-  static bool crosses(const oracle::Vector& p, const oracle::Vector& q, const Corners& t) {
-    using oracle::operator-;
-    const oracle::Vector normal = oracle::cross(t[1] - t[0], t[2] - t[0]), along = q - p;
-    if (sgn(oracle::dot(normal, p - t[0])) * sgn(oracle::dot(normal, q - t[0])) >= 0) return false;
-    const auto side = [&](std::size_t i) {
-      return sgn(oracle::dot(along, oracle::cross(t[i] - p, t[(i + 1) % 3] - p)));
-    };
-    return side(0) != 0 && side(0) == side(1) && side(1) == side(2);
-  }
-};
+  return least;
+}
 
-void expectRational(const TwoBodies& both, const RationalDistance& truth, double size) {
+void expectRational(const TwoBodies& both, const Rational& square, double size) {
   const GeometryDistance found = expectSameAnswers(both, 0.0, size);
-  EXPECT_EQ(found.distance == 0.0, truth.square == 0) << found.distance;
-  EXPECT_NEAR(found.distance, oracle::root(truth.square).get_d(), 4e-15 * size);
+  EXPECT_EQ(found.distance == 0.0, square == 0) << found.distance;
+  EXPECT_NEAR(found.distance, oracle::root(square).get_d(), 4e-15 * size);
 }
 
 /// Few small integers, so that triangles often touch, overlap in a plane or have no area.
@@ -297,10 +278,10 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
     };
     const TestGeometry a = onGrid(Vector3d::Zero()),
                        b = onGrid(Vector3d(static_cast<double>(round % 5), 0, 0));
-    const RationalDistance truth(a, a.positions, b, b.positions);
+    const Rational square = squareOf(a, b);
     const TwoBodies both(a, b);
-    expectRational(both, truth, 10.0);
-    (truth.square == 0 ? meet : apart) += 1;
+    expectRational(both, square, 10.0);
+    (square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
   }
   EXPECT_GT(meet, leastOf(80));
@@ -335,10 +316,10 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticWhereTrianglesNearlyTouch) {
                              normal.dot(b.positions[i] - target)) *
                             normal;
     }
-    const RationalDistance truth(a, a.positions, b, b.positions);
+    const Rational square = squareOf(a, b);
     const TwoBodies both(a, b);
-    expectRational(both, truth, 4.0);
-    (truth.square == 0 ? meet : apart) += 1;
+    expectRational(both, square, 4.0);
+    (square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
   }
   EXPECT_GT(meet, 100u);

@@ -9,10 +9,8 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <vector>
 
 namespace palpate::testing {

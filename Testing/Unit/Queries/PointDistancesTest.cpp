@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 // Closest points, nearest elements and elements within a radius: octrees answer as brute force, bit

@@ -8,12 +8,9 @@
 
 #include <Eigen/Geometry>
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <optional>
-#include <utility>
 #include <vector>
 
 /// What the tests of queries share: one geometry in both engines, and what queries answer in

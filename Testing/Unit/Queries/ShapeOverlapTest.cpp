@@ -1,6 +1,6 @@
-#include "Common/BallTruth.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Unit/Math/IntersectionOracle.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
@@ -10,8 +10,8 @@
 #include <functional>
 #include <vector>
 
-// Elements in shapes. Spheres and capsules are compared with rational distances, polytopes with the
-// separating axes of both bodies, and all shapes with a search for the least distance.
+// Elements in shapes. Spheres and capsules are compared with rational distances, polytopes with
+// exact intersections of triangles, and other shapes with a search for the least distance.
 namespace palpate::testing {
 namespace {
 
@@ -129,88 +129,49 @@ TEST(ShapeOverlap, SpheresAreDecidedExactly) {
   }
 }
 
-// ---- Boxes and hulls: separating axes ----
+// ---- Boxes and hulls: the triangles of their surfaces, in exact arithmetic ----
 
-std::vector<Wide> wideCorners(const PlacedShape& shape) {
-  std::vector<Wide> corners;
-  if (const auto* box = std::get_if<Box>(&shape.geometry))
-    for (int v = 0; v < 8; ++v)
-      corners.push_back(
-          (box->centre +
-           Vector3d(v & 1 ? 1 : -1, v & 2 ? 1 : -1, v & 4 ? 1 : -1).cwiseProduct(box->halfExtents))
-              .cast<long double>());
-  else
-    for (const Vector3d& p : std::get<ConvexHull>(shape.geometry).points)
-      corners.push_back(p.cast<long double>());
-  for (Wide& p : corners)
-    p = shape.rotation.cast<long double>() * p + shape.translation.cast<long double>();
-  return corners;
-}
+/// A box or a hull as the triangles of its surface. scale: about the middle of its corners.
+class SurfaceTruth {
+ public:
+  explicit SurfaceTruth(const PlacedShape& shape, double scale = 1.0)
+      : m_facets(scaledCorners(shape, scale)) {}
 
-/// Directions in which the corners' hull may be separated from a triangle: normals of all faces and
-/// products of all edges; and those within planes, for flat bodies.
-std::vector<Wide> axesOf(const std::vector<Wide>& hull, const std::vector<Wide>& triangle) {
-  const auto edgesOf = [](const std::vector<Wide>& corners) {
-    std::vector<Wide> edges;
-    for (std::size_t i = 0; i < corners.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j) edges.push_back(corners[i] - corners[j]);
-    return edges;
-  };
-  const std::vector<Wide> u = edgesOf(hull), v = edgesOf(triangle);
-  std::vector<Wide> axes;
-  const auto addProducts = [&](const std::vector<Wide>& as, const std::vector<Wide>& bs) {
-    for (const Wide& a : as)
-      for (const Wide& b : bs) axes.push_back(a.cross(b));
-  };
-  addProducts(u, v);
-  addProducts(v, v);
-  for (std::size_t i = 0; i < hull.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      for (std::size_t k = 0; k < j; ++k)
-        axes.push_back((hull[j] - hull[i]).cross(hull[k] - hull[i]));
-  for (const Wide& normal : {Wide(v[0].cross(v[1]))})
-    for (const Wide& edge : v) axes.push_back(normal.cross(edge));
-  for (const Wide& a : u)  // segments in one plane, and points on the line of a segment
-    for (const Wide& b : v) {
-      axes.push_back(a.cross(a.cross(b)));
-      axes.push_back(b.cross(a.cross(b)));
-    }
-  const Wide between = hull[0] - triangle[0];
-  axes.push_back(between);
-  for (const auto* edges : {&u, &v})
-    for (const Wide& edge : *edges) axes.push_back(edge.cross(between.cross(edge)));
-  axes.insert(axes.end(), u.begin(), u.end());
-  axes.insert(axes.end(), v.begin(), v.end());
-  return axes;
-}
-
-/// The largest gap along an axis: bodies overlap if none is positive. isUnit: as a length.
-long double separation(const std::vector<Wide>& hull, const std::vector<Wide>& triangle,
-                       bool isUnit) {
-  long double most = -INFINITY;
-  for (Wide axis : axesOf(hull, triangle)) {
-    const long double length = axis.norm();
-    if (isUnit ? length < 1e-9L : axis == Wide::Zero()) continue;
-    if (isUnit) axis /= length;
-    const auto range = [&](const std::vector<Wide>& corners) {
-      long double low = INFINITY, high = -INFINITY;
-      for (const Wide& p : corners) {
-        low = std::min(low, axis.dot(p));
-        high = std::max(high, axis.dot(p));
-      }
-      return std::pair{low, high};
-    };
-    const auto [a, b] = range(hull);
-    const auto [c, d] = range(triangle);
-    most = std::max({most, c - b, a - d});
+  bool overlaps(const Positions& at, const Triangle& t) const {
+    const Vector3d &a = at[t[0]], &b = at[t[1]], &c = at[t[2]];
+    const Eigen::AlignedBox3d box(a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c));
+    if (m_facets.isBody && m_facets.signedDistance(a) < 0) return true;
+    return std::ranges::any_of(m_facets.all, [&](const Facets::Facet& facet) {
+      const auto& [p, q, r] = facet.corners;
+      return box.intersects({p.cwiseMin(q).cwiseMin(r), p.cwiseMax(q).cwiseMax(r)}) &&
+             intersection::trianglesIntersect({p, q, r, a, b, c});
+    });
   }
-  return most;
-}
 
-std::vector<Wide> wideCorners(const Positions& at, const Triangle& t) {
-  std::vector<Wide> corners;
-  for (const std::uint32_t v : t) corners.push_back(at[v].cast<long double>());
-  return corners;
+ private:
+  static Positions scaledCorners(const PlacedShape& shape, double scale) {
+    double radius = 0;
+    Positions corners = cornersOf(shape, radius);
+    Vector3d middle = Vector3d::Zero();
+    for (const Vector3d& p : corners) middle += p / static_cast<double>(corners.size());
+    for (Vector3d& p : corners)
+      if (scale != 1.0) p = middle + scale * (p - middle);
+    return corners;
+  }
+  Facets m_facets;
+};
+
+/// Expects the elements of exact arithmetic. Those that only a body larger or smaller by the error
+/// overlaps are not judged. Returns how many are found.
+std::size_t expectOverlaps(const Both& both, const PlacedShape& shape, const Positions& at,
+                           const std::vector<Triangle>& elements, double error) {
+  const std::vector<std::uint32_t> found = overlapping(both, shape);
+  const SurfaceTruth inner(shape, 1 - error), outer(shape, 1 + error);
+  for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    const bool isFound = std::binary_search(found.begin(), found.end(), e);
+    EXPECT_TRUE(isFound ? outer.overlaps(at, elements[e]) : !inner.overlaps(at, elements[e])) << e;
+  }
+  return found.size();
 }
 
 Positions frustum() {
@@ -223,8 +184,7 @@ Positions frustum() {
   return corners;
 }
 
-/// Small integers are exact in long double, without a square root: elements that just touch a shape
-/// are in it. Boxes and hulls may be flat.
+/// Elements that just touch a shape are in it. Boxes and hulls may be flat.
 TEST(ShapeOverlap, BoxesAndHullsOnALattice) {
   Random random(503);
   std::size_t found = 0, touching = 0;
@@ -239,11 +199,10 @@ TEST(ShapeOverlap, BoxesAndHullsOnALattice) {
         geometry = hull;
       }
       const PlacedShape shape{geometry};
-      const std::vector<Wide> corners = wideCorners(shape);
-      found += expectGaps(both, shape, soup.triangles, 0.0, [&](const Triangle& t) {
-        const long double gap = separation(corners, wideCorners(soup.positions, t), false);
-        touching += gap == 0;
-        return gap;
+      found += expectOverlaps(both, shape, soup.positions, soup.triangles, 0.0);
+      const SurfaceTruth inner(shape, 1 - 1e-9), whole(shape);
+      touching += std::ranges::count_if(soup.triangles, [&](const Triangle& t) {
+        return whole.overlaps(soup.positions, t) && !inner.overlaps(soup.positions, t);
       });
     }
   }
@@ -270,20 +229,17 @@ TEST(ShapeOverlap, BoxesHullsAndFrustumsPlacedAnywhere) {
           tool = hull;
         }
         const PlacedShape shape{tool, randomTurn(random), randomPoint(random, 0.1, 0.9) + offset};
-        const std::vector<Wide> corners = wideCorners(shape);
-        found += expectGaps(both, shape, elements, error, [&](const Triangle& t) {
-          return separation(corners, wideCorners(now, t), true);
-        });
+        found += expectOverlaps(both, shape, now, elements, error);
       }
     };
-    test(geometry.positions, {0, 0, 0}, 1e-13);
+    test(geometry.positions, {0, 0, 0}, 1e-12);
     const Positions now = moved(random, geometry.positions, 0.05);
     both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
-    test(now, {0, 0, 0}, 1e-13);
+    test(now, {0, 0, 0}, 1e-12);
     const Matrix3d turn = Eigen::AngleAxisd(0.4, Vector3d(1, -2, 3).normalized()).matrix();
     const Vector3d shift(1e3, 0, -1e3);
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
-    test(placed(now, turn, shift), shift, 1e-11);
+    test(placed(now, turn, shift), shift, 1e-10);
     EXPECT_GE(found, leastOf(10));
   }
 }
@@ -309,11 +265,7 @@ TEST(ShapeOverlap, LargeTrianglesAtACornerOfABox) {
     }
     const Both both(large);
     const PlacedShape shape{AnalyticalGeometry(Box{centre, half})};
-    const std::vector<Wide> corners = wideCorners(shape);
-    const std::size_t count =
-        expectGaps(both, shape, large.triangles, 1e-11, [&](const Triangle& t) {
-          return separation(corners, wideCorners(large.positions, t), true);
-        });
+    const std::size_t count = expectOverlaps(both, shape, large.positions, large.triangles, 1e-10);
     found += count;
     left += large.triangles.size() - count;
   }

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 // Signs of distances: the winding number by rational rays, for meshes that cross themselves, too;

@@ -6,16 +6,14 @@
 #include "Common/DistinctTruth.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/StepBodies.h"
 #include "Common/SupportedMethods.h"
 #include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <set>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 // Contacts::Distinct of meshes with shapes, against Contacts::All: All has the least distance of
@@ -184,15 +182,10 @@ TEST(DistinctContacts, MatchTheDefinition) {
         PairSettings settings{steps ? Method::Continuous : Method::Proximity, thickness};
         const auto answerOf = [&](Contacts contacts) {
           settings.contacts = contacts;
-          OctreeBasedCD collisions(settingsOf(Engine::Octree));
-          const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles),
-                           tool = collisions.addAnalyticalGeometry(shape);
-          collisions.addCollisionPair(body, tool, settings);
-          collisions.setPositions(body, mesh.positions, moved);
-          collisions.setTransform(tool, {before.rotation, before.translation},
-                                  {now.rotation, now.translation});
-          collisions.detectCollision();
-          return collisions.collisionData(body, tool);
+          return stepOf(settingsOf(Engine::Octree), bodyOf("mesh", testGeometry(mesh), moved),
+                        shapeOf("shape", shape, {before.rotation, before.translation},
+                                {now.rotation, now.translation}),
+                        settings);
         };
         const CollisionData all = answerOf(Contacts::All), distinct = answerOf(Contacts::Distinct);
         std::vector<ConstraintRow> rows;

@@ -4,12 +4,11 @@
 #include "Common/PairRun.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/StepBodies.h"
 #include "Common/SupportedMethods.h"
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,16 +24,13 @@ constexpr double kFar = 100;
 
 std::optional<ShapeShapeContact> answer(const PlacedShape& a, const PlacedShape& b,
                                         Engine engine = Engine::Octree, double thickness = kFar) {
-  OctreeBasedCD collisions(settingsOf(engine));
-  const GeometryId first = collisions.addAnalyticalGeometry(a.geometry),
-                   second = collisions.addAnalyticalGeometry(b.geometry);
-  collisions.setTransform(first, {a.rotation, a.translation});
-  collisions.setTransform(second, {b.rotation, b.translation});
-  collisions.addCollisionPair(first, second, {Method::Proximity, thickness});
-  collisions.detectCollision();
-  const CollisionData& data = collisions.collisionData(first, second);
+  const auto asBody = [](const PlacedShape& shape) {
+    const Pose pose{shape.rotation, shape.translation};
+    return shapeOf("shape", shape.geometry, pose, pose);
+  };
+  const CollisionData data =
+      stepOf(settingsOf(engine), asBody(a), asBody(b), {Method::Proximity, thickness});
   EXPECT_EQ(data.shape().size() + data.vertexTriangle().size() + data.edgeEdge().size(), 0u);
-  EXPECT_EQ(collisions.statistics().contacts, data.shapeShape().size());
   if (data.shapeShape().empty()) return {};
   EXPECT_EQ(data.shapeShape().size(), 1u);
   return data.shapeShape()[0];

@@ -7,6 +7,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/StepBodies.h"
 #include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
@@ -143,14 +144,9 @@ struct Moving {
 
 CollisionData answer(const Settings& settings, const Moving& body, const Tool& tool,
                      const PairSettings& pair, bool toolFirst = false) {
-  OctreeBasedCD collisions(settings);
-  const GeometryId mesh = body.geometry.addTo(collisions),
-                   shape = collisions.addAnalyticalGeometry(tool.geometry);
-  collisions.addCollisionPair(toolFirst ? shape : mesh, toolFirst ? mesh : shape, pair);
-  collisions.setTransform(shape, tool.ends[0], tool.ends[1]);
-  collisions.setPositions(mesh, body.geometry.positions, body.now);
-  collisions.detectCollision();
-  return collisions.collisionData(toolFirst ? shape : mesh, toolFirst ? mesh : shape);
+  const StepBody mesh = bodyOf("mesh", body.geometry, body.now),
+                 shape = shapeOf("shape", tool.geometry, tool.ends[0], tool.ends[1]);
+  return toolFirst ? stepOf(settings, shape, mesh, pair) : stepOf(settings, mesh, shape, pair);
 }
 
 PairSettings continuous(double thickness, double timeTolerance = 1e-6) {

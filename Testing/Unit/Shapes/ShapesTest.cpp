@@ -7,6 +7,7 @@
 #include "Common/Replayed.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/StepBodies.h"
 #include "Common/TestGeometry.h"
 
 #include <Eigen/Geometry>
@@ -15,11 +16,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
-#include <numeric>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,20 +46,10 @@ std::vector<Placed> shapes(Random& random) {
   return all;
 }
 
-CollisionData answer(const Settings& settings, const TestGeometry& body, const Placed& shape,
-                     const PairSettings& pair, bool shapeFirst = false) {
-  OctreeBasedCD collisions(settings);
-  const GeometryId tool = collisions.addAnalyticalGeometry(shape.geometry),
-                   mesh = body.addTo(collisions);
-  collisions.setTransform(tool, {shape.rotation, shape.translation});
-  collisions.addCollisionPair(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool, pair);
-  collisions.detectCollision();
-  EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
-  return collisions.collisionData(shapeFirst ? tool : mesh, shapeFirst ? mesh : tool);
-}
-
 CollisionData answer(const TestGeometry& body, const Placed& shape, const PairSettings& pair) {
-  return answer(settingsOf(Engine::Octree), body, shape, pair);
+  const Pose pose{shape.rotation, shape.translation};
+  return stepOf(settingsOf(Engine::Octree), bodyOf("body", body, body.positions),
+                shapeOf("shape", shape.geometry, pose, pose), pair);
 }
 
 /// Identifies an element.
