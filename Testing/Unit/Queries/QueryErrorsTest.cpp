@@ -1,11 +1,8 @@
 #include "Common/ExpectRefused.h"
-#include "Unit/Queries/QueryTruth.h"
+#include "Unit/Queries/EveryQuery.h"
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstddef>
-#include <cstring>
 #include <functional>
 #include <limits>
 #include <string>
@@ -18,89 +15,18 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// All queries of one geometry, with valid arguments.
-class AllQueries {
- public:
-  /// A call, and whether shapes answer it.
-  struct Call {
-    std::string name;
-    bool takesShapes;
-    std::function<void(const SpatialQueries&, GeometryId)> call;
-  };
+const Vector3d kPoint(0.1, 0.2, 0.3);
+const Ray kRay{{0, 0, 3}, {0, 0, -1}};
 
-  AllQueries() {
-    const Vector3d p(0.1, 0.2, 0.3);
-    const Ray ray{{0, 0, 3}, {0, 0, -1}};
-    const Matrix3d unit = Matrix3d::Identity();
-    const Sphere ball{{0, 0, 0}, 0.5};
-    using Queries = const SpatialQueries&;
-    m_calls = {
-        {"closestPoint", true, [=](Queries q, GeometryId id) { q.closestPoint(id, p); }},
-        {"closestPoints", true,
-         [=](Queries q, GeometryId id) {
-           std::vector<SurfacePoint> out(1);
-           kept(out, [&] { q.closestPoints(id, std::span(&p, 1), out); });
-         }},
-        {"nearestElements", false,
-         [=](Queries q, GeometryId id) {
-           std::vector<SurfacePoint> out(2);
-           kept(out, [&] { q.nearestElements(id, p, 3, out); });
-         }},
-        {"elementsWithin", false,
-         [=](Queries q, GeometryId id) {
-           std::vector<std::uint32_t> out{7, 8};
-           kept(out, [&] { q.elementsWithin(id, p, 1.0, out); });
-         }},
-        {"contains", false, [=](Queries q, GeometryId id) { (void)q.contains(id, p); }},
-        {"signedDistance", false, [=](Queries q, GeometryId id) { q.signedDistance(id, p); }},
-        {"signedDistances", false,
-         [=](Queries q, GeometryId id) {
-           std::vector<SignedDistance> out(1);
-           kept(out, [&] { q.signedDistances(id, std::span(&p, 1), out); });
-         }},
-        {"firstHit", true, [=](Queries q, GeometryId id) { q.firstHit(id, ray); }},
-        {"anyHit", true, [=](Queries q, GeometryId id) { (void)q.anyHit(id, ray); }},
-        {"firstHits", true,
-         [=](Queries q, GeometryId id) {
-           std::vector<RayHit> out(1);
-           kept(out, [&] { q.firstHits(id, std::span(&ray, 1), out); });
-         }},
-        {"allHits", true,
-         [=](Queries q, GeometryId id) {
-           std::vector<RayHit> out(2);
-           kept(out, [&] { q.allHits(id, ray, out); });
-         }},
-        {"overlapping", false,
-         [=](Queries q, GeometryId id) {
-           std::vector<std::uint32_t> out{7, 8};
-           kept(out, [&] { q.overlapping(id, ball, {unit, p}, out); });
-         }},
-        {"contacts", false, [=](Queries q, GeometryId id) {
-           std::vector<ShapeContact> out(2);
-           kept(out, [&] { q.contacts(id, ball, {unit, p}, 0.1, out); });
-         }}};
-  }
-  const std::vector<Call>& calls() const { return m_calls; }
-
- private:
-  /// Makes the call. If it throws, expects that the vector is as it was, byte by byte.
-  template <class T, class F>
-  static void kept(std::vector<T>& out, F&& call) {
-    std::memset(static_cast<void*>(out.data()), 7, out.size() * sizeof(T));
-    const T* data = out.data();
-    const std::size_t size = out.size();
-    try {
-      call();
-    } catch (...) {
-      EXPECT_TRUE(out.data() == data && out.size() == size);
-      const auto bytes = std::as_bytes(std::span(out));
-      EXPECT_TRUE(std::all_of(bytes.begin(), bytes.end(),
-                              [](std::byte each) { return each == std::byte{7}; }));
-      throw;
-    }
-  }
-  std::vector<Call> m_calls;
-};
+/// Expects that a query is refused, and that its answers are as they were.
+void expectUnanswered(const QueryCall& call, ErrorCode code, const std::string& words,
+                      const SpatialQueries& queries, GeometryId id) {
+  SCOPED_TRACE(call.name);
+  const QueryAnswers before{};
+  QueryAnswers answers = before;
+  expectRefused(code, words, [&] { call.ask(queries, id, kPoint, kRay, answers); });
+  EXPECT_TRUE(isSame(answers, before));
+}
 
 /// A closed ball, a shape, a line mesh and an open sheet.
 struct ErrorScene {
@@ -123,45 +49,38 @@ using enum ErrorCode;
 
 TEST(QueryErrors, ValidCallsThrowNothing) {
   const ErrorScene scene;
-  const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
-  for (const auto& [name, takesShapes, call] : all.calls()) {
-    SCOPED_TRACE(name);
-    EXPECT_NO_THROW(call(queries, scene.ball));
-    if (takesShapes) {
-      EXPECT_NO_THROW(call(queries, scene.shape));
+  QueryAnswers answers;
+  for (const QueryCall& call : queryCalls()) {
+    SCOPED_TRACE(call.name);
+    EXPECT_NO_THROW(call.ask(queries, scene.ball, kPoint, kRay, answers));
+    if (call.needs == Needs::Nothing) {
+      EXPECT_NO_THROW(call.ask(queries, scene.shape, kPoint, kRay, answers));
     }
   }
 }
 
 TEST(QueryErrors, UnknownAndRemovedGeometries) {
   const ErrorScene scene;
-  const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
-  for (const auto& [name, takesShapes, call] : all.calls()) {
-    SCOPED_TRACE(name);
-    expectRefused(UnknownGeometry, "geometry 99",
-                  [&, &call = call] { call(queries, GeometryId{99}); });
-    expectRefused(UnknownGeometry, "geometry 4",
-                  [&, &call = call] { call(queries, scene.removed); });
+  for (const QueryCall& call : queryCalls()) {
+    expectUnanswered(call, UnknownGeometry, "geometry 99", queries, GeometryId{99});
+    expectUnanswered(call, UnknownGeometry, "geometry 4", queries, scene.removed);
   }
 }
 
 TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
   const ErrorScene scene;
-  const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
-  for (const auto& [name, takesShapes, call] : all.calls()) {
-    SCOPED_TRACE(name);
-    const bool needsInside = name == "contains" || name.starts_with("signed");
-    if (!takesShapes)
-      expectRefused(needsInside ? NotClosed : UnsupportedMethod, "geometry 1 is a shape",
-                    [&, &call = call] { call(queries, scene.shape); });
-    if (!needsInside) continue;
-    expectRefused(NotClosed, "geometry 2 is a line mesh",
-                  [&, &call = call] { call(queries, scene.line); });
-    expectRefused(NotClosed, "geometry 3 has no inside",
-                  [&, &call = call] { call(queries, scene.sheetMesh); });
+  for (const QueryCall& call : queryCalls()) {
+    const bool hasSides = call.needs >= Needs::Triangles;
+    if (call.needs > Needs::Nothing)
+      expectUnanswered(call, hasSides ? NotClosed : UnsupportedMethod, "geometry 1 is a shape",
+                       queries, scene.shape);
+    if (hasSides)
+      expectUnanswered(call, NotClosed, "geometry 2 is a line mesh", queries, scene.line);
+    if (call.needs == Needs::Inside)
+      expectUnanswered(call, NotClosed, "geometry 3 has no inside", queries, scene.sheetMesh);
   }
   const TestGeometry empty;
   OctreeBasedCD other;
@@ -174,17 +93,12 @@ TEST(QueryErrors, ShapesAndBodiesWithoutInside) {
 
 TEST(QueryErrors, OutdatedQueries) {
   ErrorScene scene;
-  const AllQueries all;
   const SpatialQueries queries = scene.collisions.queries();
   scene.collisions.setPositions(scene.ball, scene.rest);
-  for (const auto& [name, takesShapes, call] : all.calls()) {
-    SCOPED_TRACE(name);
-    expectRefused(InvalidCall, "call queries() again",
-                  [&, &call = call] { call(queries, scene.ball); });
-  }
-  const Ray ray{{0, 0, 3}, {0, 0, -1}};
-  expectRefused(InvalidCall, "call queries() again", [&] { queries.firstHit(ray); });
-  expectRefused(InvalidCall, "call queries() again", [&] { queries.pick(ray); });
+  for (const QueryCall& call : queryCalls())
+    expectUnanswered(call, InvalidCall, "call queries() again", queries, scene.ball);
+  expectRefused(InvalidCall, "call queries() again", [&] { queries.firstHit(kRay); });
+  expectRefused(InvalidCall, "call queries() again", [&] { queries.pick(kRay); });
 }
 
 TEST(QueryErrors, Points) {
