@@ -51,7 +51,7 @@ inline Solid cells(int n, Random& random) {
 }
 
 /// The surface as a mesh of the same positions.
-inline Mesh surfaceOf(const Solid& solid) {
+inline Mesh surfaceMeshOf(const Solid& solid) {
   OctreeBasedCD collisions;
   const auto surface =
       collisions.surface(collisions.addTetrahedralMesh(solid.positions, solid.tetrahedra));

@@ -1,5 +1,6 @@
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/BallTruth.h"
 #include "Common/TestGeometry.h"
 #include "Unit/Math/RationalOracle.h"
 
@@ -130,36 +131,25 @@ TEST(ExactGeometryTypes, DistancesMatchRationalArithmetic) {
 
 // ---- Impacts ----
 
-using Wide = long double;
-using WideVector = Eigen::Matrix<Wide, 3, 1>;
-
-/// The distance from a point to a segment, or to a point if the segment has no length.
-Wide distanceTo(const WideVector& p, const WideVector& a, const WideVector& b) {
-  const WideVector edge = b - a;
-  const Wide square = edge.squaredNorm();
-  const Wide t = square > 0 ? std::min(Wide(1), std::max(Wide(0), (p - a).dot(edge) / square)) : 0;
-  return (p - a - t * edge).norm();
-}
-
 /// The first time at which a point that moves along a line is `reach` from a segment, or 2. The
 /// distance is convex in time.
-Wide firstTime(const Eigen::Vector3d& before, const Eigen::Vector3d& now, const Eigen::Vector3d& a,
-               const Eigen::Vector3d& b, Wide reach, bool& close) {
-  const auto at = [&](Wide t) {
-    return distanceTo((1 - t) * before.cast<Wide>() + t * now.cast<Wide>(), a.cast<Wide>(),
-                      b.cast<Wide>());
+long double firstTime(const Eigen::Vector3d& before, const Eigen::Vector3d& now,
+                      const Eigen::Vector3d& a, const Eigen::Vector3d& b, long double reach,
+                      bool& close) {
+  const auto at = [&](long double t) {
+    return roundDistance((1 - t) * wide(before) + t * wide(now), wide(a), wide(b), 0, 0);
   };
-  Wide from = 0, to = 1;
+  long double from = 0, to = 1;
   for (int i = 0; i < 200; ++i) {
-    const Wide s = from + (to - from) / 3, t = to - (to - from) / 3;
+    const long double s = from + (to - from) / 3, t = to - (to - from) / 3;
     (at(s) <= at(t) ? to : from) = at(s) <= at(t) ? t : s;
   }
   close = std::abs(at(from) - reach) < 1e-12L;
   if (at(0) <= reach) return 0;
   if (at(from) > reach) return 2;
-  Wide apart = 0, within = from;
+  long double apart = 0, within = from;
   for (int i = 0; i < 100; ++i) {
-    const Wide middle = (apart + within) / 2;
+    const long double middle = (apart + within) / 2;
     (at(middle) <= reach ? within : apart) = middle;
   }
   return within;
@@ -192,10 +182,13 @@ TEST(ExactGeometryTypes, ImpactTimesAreTheEarliest) {
     for (std::uint32_t v = 0; v < now.size(); ++v)
       for (std::uint32_t t = 0; t < elements.size(); ++t) {
         const auto& [i, j, k] = elements[t];
-        const Wide reach = Wide(thickness) + (Wide(radius) + Wide(other.radius(0)));
+        const long double reach =
+            static_cast<long double>(thickness) +
+            (static_cast<long double>(radius) + static_cast<long double>(other.radius(0)));
         bool close = false;
-        const Wide time = firstTime(drops.positions[v], now[v] - (drifted[i] - other.positions[i]),
-                                    other.positions[i], other.positions[k], reach, close);
+        const long double time =
+            firstTime(drops.positions[v], now[v] - (drifted[i] - other.positions[i]),
+                      other.positions[i], other.positions[k], reach, close);
         const auto place = found.find({v, t});
         if (close && reach > 0) continue;
         if (reach == 0) {  // an aimed point may miss by an ulp; a reported contact is near

@@ -48,7 +48,7 @@ TEST(InsideVertices, MatchTheCellsOfTheBody) {
   Random random(12);
   for (const auto& filled : kBodies) {
     const Solid solid = cells(n, random, filled);
-    const Mesh surface = surfaceOf(solid);
+    const Mesh surface = surfaceMeshOf(solid);
     for (const GeometryType type :
          {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
       const TestGeometry points = lattice(type, n, 0.5);
@@ -139,7 +139,7 @@ TEST(InsideVertices, DoNotDependOnThePreviousVertex) {
 /// Cells of 2^-1060. A caller that flushes denormals to zero would find nothing.
 TEST(InsideVertices, DoNotDependOnTheCallersFloatingPoint) {
   Random random(13);
-  Mesh body = surfaceOf(cells(2, random));
+  Mesh body = surfaceMeshOf(cells(2, random));
   Positions points = lattice(GeometryType::Points, 2, 0.5).positions;
   for (Positions* positions : {&body.positions, &points})
     for (Vector3d& p : *positions) p *= 0x1p-1060;

@@ -111,7 +111,7 @@ void expectApart(const Mesh& a, const Mesh& b) {
 std::vector<Mesh> bodiesOfAllKinds(Random& random) {
   return {cube(-1, 1), sphere(6, 8, {0, 0, 0}, 1.2), torusMesh(16, 8),
           boxMesh({-1.5, -1, -0.05}, {1.5, 1, 0.05}),
-          moved(scaledBy(surfaceOf(bracket(random)), 0.7), {-1, -1, -1})};
+          moved(scaledBy(surfaceMeshOf(bracket(random)), 0.7), {-1, -1, -1})};
 }
 
 TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {

@@ -149,14 +149,14 @@ Tally expectDefined(const Story& story, const Answers& all) {
 
 /// Bodies with sharp edges, notches and a hollow, round ones, and two slabs with a crack between.
 std::vector<Mesh> bodies(Random& random) {
-  Mesh slabs = surfaceOf(cells(3, random, [](const auto& c) { return c[2] != 1; }));
+  Mesh slabs = surfaceMeshOf(cells(3, random, [](const auto& c) { return c[2] != 1; }));
   for (Vector3d& p : slabs.positions) p.z() -= p.z() > 1.5 ? 0.9 : 0.0;
-  return {slabs, surfaceOf(cells(2, random)),
-          surfaceOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; })),
-          surfaceOf(cells(3, random,
-                          [](const auto& c) {
-                            return c != std::array{1, 1, 1};
-                          })),
+  return {slabs, surfaceMeshOf(cells(2, random)),
+          surfaceMeshOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; })),
+          surfaceMeshOf(cells(3, random,
+                              [](const auto& c) {
+                                return c != std::array{1, 1, 1};
+                              })),
           sphere(8, 12, {1.5, 1.5, 1.5}, 1.4)};
 }
 
@@ -220,7 +220,7 @@ TEST(PenetrationTracker, ReportsLargeChangesInBodiesThatTurnAndDeform) {
 /// is twice as far as ahead, then ahead. It changes once for each vertex.
 TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
   Random random(3);
-  const Mesh slab = surfaceOf(cells(1, random)), block = surfaceOf(cells(2, random));
+  const Mesh slab = surfaceMeshOf(cells(1, random)), block = surfaceMeshOf(cells(2, random));
   Story story{slab.triangles, {}, {}};
   for (int frame = 0; frame < 400; ++frame) {
     Positions body = slab.positions, points = block.positions;
@@ -252,7 +252,7 @@ TEST(PenetrationTracker, PushedBodyChangesSidesOnce) {
 TEST(PenetrationTracker, DirectionsTurnWithTheBody) {
   Random random(4);
   const Mesh mesh =
-      surfaceOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }));
+      surfaceMeshOf(cells(3, random, [](const auto& c) { return c[2] == 0 || c[0] == 0; }));
   Positions points;
   for (int i = 0; i < 100; ++i) points.push_back(randomPoint(random, 0, 3));
   OctreeBasedCD detection(settingsOf(Engine::Octree));

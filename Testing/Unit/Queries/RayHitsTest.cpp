@@ -427,27 +427,6 @@ TEST(RayHits, AreTheSameOnEverySimdPath) {
   useSimdPath("");
 }
 
-/// setTransform() accepts rotations that are not quite orthonormal. Far from the body's own origin
-/// they stretch more than floats are rounded.
-TEST(RayHits, RotationsThatStretch) {
-  Random random(211);
-  const Vector3d far(4e6, 1e6, -2e6);
-  Mesh ball = sphere(40, 80, {0, 0, 0}, 1);
-  for (Vector3d& p : ball.positions) p += far;
-  Both both(testGeometry(ball));
-  Matrix3d stretch;
-  stretch << 3, 1, 0, 1, -3, 1, 0, 1, 3;
-  const Matrix3d turn = Eigen::AngleAxisd(1.3, Vector3d(1, 2, 2) / 3).matrix() *
-                        (Matrix3d::Identity() + 1.4e-10 * stretch);
-  const Vector3d shift = -turn * far;
-  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
-  std::size_t hits = 0;
-  for (int i = 0; i < casesOf(2000); ++i)
-    hits +=
-        consistentHits(both, {randomPoint(random, -1.5, 1.5), randomPoint(random, -1, 1)}).size();
-  EXPECT_GE(hits, leastOf(500));
-}
-
 /// Rays through placed vertices that triangles share, where roundings of t exceed the gaps of hits.
 TEST(RayHits, AscendAtAnyMagnitude) {
   Random random(207);

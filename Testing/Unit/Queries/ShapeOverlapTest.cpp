@@ -273,26 +273,6 @@ TEST(ShapeOverlap, LargeTrianglesAtACornerOfABox) {
   EXPECT_GE(left, leastOf(300));
 }
 
-/// A rotation that is orthonormal only within the tolerance, of a body far from its own origin.
-TEST(ShapeOverlap, InexactRotationsFarFromTheBodysOrigin) {
-  Random random(508);
-  TestGeometry soupFarAway = testGeometry(soup(random, 500, 0.02));
-  const Vector3d far(2e6, -1e6, 3e6);
-  for (Vector3d& p : soupFarAway.positions) p += far;
-  Both both(soupFarAway);
-  const Matrix3d turn = (1 + 4e-10) * randomTurn(random);
-  both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, -(turn * far)}); });
-  std::size_t found = 0;
-  for (int i = 0; i < casesOf(30); ++i) {
-    const Vector3d p = randomPoint(random, 0, 1), q = randomPoint(random, 0, 1);
-    for (const AnalyticalGeometry& shape :
-         {AnalyticalGeometry(Sphere{p, 0.2}), AnalyticalGeometry(Capsule{p, q, 0.1}),
-          AnalyticalGeometry(Box{p, 0.3 * q})})
-      found += overlapping(both, {shape, turn / 1.0000000004, {0, 0, 0}}).size();
-  }
-  EXPECT_GE(found, leastOf(1000));
-}
-
 /// Elements wholly inside, and a shape wholly between elements.
 TEST(ShapeOverlap, InsideAndBetween) {
   const TestGeometry ball = testGeometry(sphere(10, 14, {0, 0, 0}, 1.0));
