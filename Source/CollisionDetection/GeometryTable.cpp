@@ -3,6 +3,7 @@
 #include "CollisionDetection/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
+#include "Math/StableLength.h"
 #include "Core/Assert.h"
 
 #include <Eigen/Geometry>
@@ -36,18 +37,15 @@ double smallestHeight(const TriangleMesh& mesh) {
   return smallest;
 }
 
-void measureRest(Geometry& geometry) {
-  const TriangleMesh& mesh = geometry.body.mesh;
-  geometry.smallestHeight = smallestHeight(mesh);
-  std::vector<double> lengths;
-  lengths.reserve(mesh.topology.edges.size());
-  for (const auto& [i, j] : mesh.topology.edges)
-    lengths.push_back((mesh.rest[j] - mesh.rest[i]).norm());
-  geometry.shortEdge = 0.0;
-  if (lengths.empty()) return;
-  const auto shortest = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 16);
-  std::nth_element(lengths.begin(), shortest, lengths.end());
-  geometry.shortEdge = *shortest;
+/// L: one edge in 16 is shorter; 0 without edges.
+double shortEdge(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
+  CountedVector<double> lengths;
+  lengths.reserve(topology.edges.size());
+  for (const auto& [i, j] : topology.edges) lengths.push_back(stableLength(rest[j] - rest[i]));
+  if (lengths.empty()) return 0.0;
+  const auto place = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 16);
+  std::nth_element(lengths.begin(), place, lengths.end());
+  return *place;
 }
 
 }  // namespace
@@ -76,7 +74,8 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
   geometry->step.start(mesh, std::move(body));
-  measureRest(*geometry);
+  geometry->smallestHeight = smallestHeight(mesh);
+  geometry->shortEdge = shortEdge(mesh.topology, mesh.rest);
   BodyRevisions& revisions = geometry->body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
@@ -274,12 +273,14 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
                                 const Preparation& prepare) {
   auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
   prepare(topology, rest);
+  const double shortest = shortEdge(topology, rest);
   // Nothing below throws.
   geometry.body.mesh.rest = std::move(rest);
   geometry.body.mesh.topology = std::move(topology);
   geometry.body.solid = std::move(solid);
   geometry.step.start(geometry.body.mesh, std::move(body));
-  measureRest(geometry);
+  geometry.smallestHeight = smallestHeight(geometry.body.mesh);
+  geometry.shortEdge = shortest;
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
   geometry.freeMotion.clear();

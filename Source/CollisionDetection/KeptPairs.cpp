@@ -241,19 +241,16 @@ void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch
 }
 
 std::size_t KeptPairs::countCandidates(const MeshTopology& a, const MeshTopology& b) const {
-  // A search of one tree shifts the box that comes first in its order.
-  CountedVector<std::uint32_t> places;
-  if (m_trees.self()) {
-    const auto order = m_trees.a->order();
-    places.resize(order.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) places[order[i]] = i;
-  }
   std::size_t count = 0;
   for (const Unit& unit : m_units)
-    for (const auto& [first, second] : unit.boxes) {
-      const bool swaps = m_trees.self() && places[second] < places[first];
-      count += overlap(a.elements[swaps ? second : first], b.elements[swaps ? first : second]);
-    }
+    for (const ElementPair& pair : unit.boxes)
+      count += overlap(a.elements[pair.a], b.elements[pair.b]);
+  return count;
+}
+
+std::size_t KeptPairs::listed() const {
+  std::size_t count = 0;
+  for (const Unit& unit : m_units) count += unit.boxes.size();
   return count;
 }
 
@@ -334,11 +331,16 @@ void KeptPairs::sort(Unit& unit, const MeshPair& meshes, std::span<const Element
   const bool isNew = pairs.data() == unit.boxes.data();
   constexpr std::uint8_t kNone = 255;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const float part = std::max((bounds[i] - distance) * parts, 0.0f);
-    classes[i] = isNew && bounds[i] > most
-                     ? kNone
-                     : static_cast<std::uint8_t>(std::min(part, static_cast<float>(kClasses)));
-    if (classes[i] != kNone) ++next[classes[i]];
+    // NaN is the bound of a pair without tests, of one point.
+    if (isNew && !(bounds[i] <= most)) {
+      classes[i] = kNone;
+      continue;
+    }
+    const float part = (bounds[i] - distance) * parts;
+    classes[i] = part >= static_cast<float>(kClasses) ? static_cast<std::uint8_t>(kClasses)
+                 : part > 0.0f                        ? static_cast<std::uint8_t>(part)
+                                                      : std::uint8_t{0};
+    ++next[classes[i]];
   }
   std::uint32_t size = 0;
   for (int c = 0; c <= kClasses; ++c) {

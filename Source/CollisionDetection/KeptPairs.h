@@ -66,7 +66,9 @@ class KeptPairs {
     for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
       use(std::span<const ElementPair>(m_units[i].boxes));
   }
-  /// The number of candidates of all jobs, while the floats are those of this detection.
+  std::size_t listed() const;  ///< number of element pairs in the lists
+  /// The number of candidates of all jobs, while the floats are those of this detection. In
+  /// self-collision it may be off by pairs whose boxes are at the distance within rounding.
   std::size_t countCandidates(const MeshTopology& a, const MeshTopology& b) const;
   void releaseMemory() { *this = KeptPairs(); }
 

@@ -69,7 +69,6 @@ std::size_t MeshWork::startKept(const FrameStart& frame) {
       record.kept.start(a, b, reachOfKept(record), frame.threads.count() > 1 ? kJobsPerPair : 1);
   m_thickness = record.meshes().maxFeatureDistance();
   m_floats = record.kept.floats();
-  record.countIsPending = true;
   return jobs;
 }
 

@@ -254,6 +254,7 @@ const PairSettings& OctreeBasedCD::pairSettings(GeometryId a, GeometryId b) cons
 
 PairStatistics OctreeBasedCD::pairStatistics(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
+  const StandardFloatingPoint standard;
   m_implementation->countCandidates();
   return all.pairs.at(all.geometries, a, b).statistics;
 }
@@ -377,6 +378,7 @@ const LooseOctree& OctreeBasedCD::octree() const {
 
 const FrameStatistics& OctreeBasedCD::statistics() const {
   read();
+  const StandardFloatingPoint standard;
   m_implementation->countCandidates();
   return m_implementation->statistics;
 }

@@ -93,6 +93,14 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   }
   Stopwatch watch;
   const TraceSpan span(traced, "update");
+  // Plans measure placed bodies with their octrees.
+  bool anyIsPlaced = false;
+  for (const auto& geometry : geometries.all())
+    if (geometry->body.isPlaced() && geometry->body.tree.isLagging()) {
+      geometry->mayLag = false;
+      anyIsPlaced = true;
+    }
+  if (anyIsPlaced) geometries.updateOctrees(settings.octree, threads, traced);
   for (const auto& record : records) {
     planStep(*record, detecting);
     if (record->plan.swept())
@@ -213,7 +221,11 @@ void OctreeBasedCD::Implementation::detect() {
                         record->plan);
   bool mustUpdate = false;
   for (PairRecord* record : records) mustUpdate |= reviewKeptPairs(*record);
-  if (mustUpdate) geometries.updateOctrees(settings.octree, threads, traced);
+  if (mustUpdate) {
+    geometries.updateOctrees(settings.octree, threads, traced);
+    updateOctreeView();
+    if (!anyOctreeLags()) octreesState = geometries.state();
+  }
   Stopwatch watch;
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
@@ -223,7 +235,10 @@ void OctreeBasedCD::Implementation::detect() {
     frame.detectByBruteForce(records, next, traced);
   freeMotions.find(geometries, pairs, settings.engine, threads);
   freeMotions.commit(geometries);
-  for (PairRecord* record : records) record->commit();
+  for (PairRecord* record : records) {
+    record->commit();
+    reviewLists(*record);
+  }
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
       record->commitEmpty();

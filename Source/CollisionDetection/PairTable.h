@@ -14,6 +14,7 @@
 #include "Core/MemoryBudget.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -33,10 +34,14 @@ struct PairRecord : CountedObject {
   const SupportedPairs* support = nullptr;  ///< the row of the table that answers the settings
   PairPlan plan;  ///< of this frame; only Auto's may be of another kind than `support`
   KeptPairs kept;
-  bool keeps = false;           ///< this frame's candidates are those of `kept`
-  bool countIsPending = false;  ///< the candidates of `kept` were not counted yet
-  int slowFrames = 0;           ///< consecutive detections in which candidates could be kept
-  double recentSpeed = 0;       ///< L: PairPlan::motion, recently the largest
+  bool keeps = false;                  ///< this frame's candidates are those of `kept`
+  bool countIsPending = false;         ///< the candidates of `kept` were not counted yet
+  int slowFrames = 0;                  ///< consecutive detections in which candidates could be kept
+  double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest
+  std::size_t searchedCandidates = 0;  ///< of the last search
+  int pauseFrames = 0;                 ///< detections for which candidates are not kept
+  int nextPause = 0;                   ///< how many that are the next time
+  std::array<ElementsState, 2> keptElements;  ///< those of a and b in `kept`
   Trust trust;
 
   struct State {

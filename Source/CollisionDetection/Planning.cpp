@@ -33,6 +33,10 @@ void planStep(PairRecord& record, bool detecting) {
   if (detecting && mayUseProxy(record)) record.plan = planByProxy(settings, record.plan);
 }
 
+/// Where floats of the extent have an error that is not small beside an edge, lists would hold
+/// pairs that are far apart.
+constexpr double kMostErrorOfKept = 0x1p-12;
+
 /// L: the length on which the motion of a step is measured.
 static double edgeOf(const PairRecord& record) {
   double edge = 0.0;
@@ -47,12 +51,14 @@ static double edgeOf(const PairRecord& record) {
 static bool canKeep(const PairRecord& record) {
   constexpr std::size_t kFewElements = 256;
   const Body &a = record.a->body, &b = record.b->body;
+  const double extent = a.mesh.now.bounds().merged(b.mesh.now.bounds()).sizes().maxCoeff();
   const auto fits = [](const Geometry& geometry) {
     return !geometry.body.isPlaced() && !geometry.body.tree.isSwept() && !geometry.body.field &&
            !geometry.proxy;
   };
   return record.plan.kind == PairKind::Meshes && record.plan.method == Method::Proximity &&
-         record.collides() && fits(*record.a) && fits(*record.b) &&
+         record.collides() && kMostErrorOfKept * extent <= edgeOf(record) && fits(*record.a) &&
+         fits(*record.b) &&
          a.mesh.topology.elements.size() + b.mesh.topology.elements.size() >= kFewElements;
 }
 
@@ -75,14 +81,24 @@ void planKeptPairs(const GeometryTable& geometries,
   };
   for (const auto& record : records) {
     const double edge = edgeOf(*record), motion = record->plan.motion;
-    record->recentSpeed = std::max(motion, kSpeedDecay * record->recentSpeed);
+    const double most = KeptPairs::kMostSpeed * edge;
+    record->recentSpeed = std::max(std::min(motion, most), kSpeedDecay * record->recentSpeed);
+    record->pauseFrames = std::max(record->pauseFrames - 1, 0);
     const bool isSlow = settings.octree.keepsPairs && settings.engine == Engine::Octree &&
-                        edge > 0.0 && motion <= KeptPairs::kMostSpeed * edge && canKeep(*record);
+                        settings.octree.update == OctreeUpdate::Auto && edge > 0.0 &&
+                        motion <= most && record->pauseFrames == 0 && canKeep(*record);
     record->slowFrames = isSlow ? std::min(record->slowFrames + 1, kSlowFrames) : 0;
     record->keeps = record->slowFrames == kSlowFrames;
-    if (!record->keeps) record->kept.deactivate();
+    const std::array elements{record->a->body.revisions.elements,
+                              record->b->body.revisions.elements};
+    // Other enabled elements own other features.
+    if (!record->keeps || record->keptElements != elements) record->kept.deactivate();
+    record->keptElements = elements;
     if (record->keeps) forBoth(*record, [](Geometry& geometry) { geometry.mayLag = true; });
   }
+  for (const auto& geometry : geometries.all())
+    if (geometry->mayLag) geometry->pieces.reserve(geometry->body.mesh.now.size());
+  // Nothing below throws: all pairs see the same motion.
   for (const auto& geometry : geometries.all())
     if (geometry->mayLag)
       geometry->pieces.advanceTo(geometry->body.mesh.now);
@@ -101,6 +117,19 @@ bool reviewKeptPairs(PairRecord& record) {
   record.keeps = false;
   record.a->mayLag = record.b->mayLag = false;
   return record.a->body.tree.isLagging() || record.b->body.tree.isLagging();
+}
+
+void reviewLists(PairRecord& record) {
+  constexpr std::size_t kMostLonger = 4, kFew = 256;  // any numbers will do
+  constexpr int kFirstPause = 64, kLongestPause = 4096;
+  record.countIsPending = record.keeps;
+  if (!record.keeps) {
+    record.searchedCandidates = record.statistics.candidatePairs;
+    return;
+  }
+  if (record.kept.listed() <= kMostLonger * (record.searchedCandidates + kFew)) return;
+  record.nextPause = std::clamp(2 * record.nextPause, kFirstPause, kLongestPause);
+  record.pauseFrames = record.nextPause;
 }
 
 KeptPairs::Reach reachOfKept(const PairRecord& record) {

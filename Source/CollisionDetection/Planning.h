@@ -27,6 +27,9 @@ void planKeptPairs(const GeometryTable&, std::span<const std::unique_ptr<PairRec
                    const Settings&);
 /// A plan was completed: decides again. Returns whether an octree that lags must be updated.
 bool reviewKeptPairs(PairRecord&);
+/// A detection was completed: stops keeping for a while where the lists are much longer than those
+/// of a search.
+void reviewLists(PairRecord&);
 /// How far the lists of a pair that keeps its candidates reach.
 KeptPairs::Reach reachOfKept(const PairRecord&);
 

@@ -21,6 +21,8 @@ class PieceMotion {
   static constexpr std::size_t kPiece = 128;  ///< vertices; any number will do
   static std::size_t pieceCount(std::size_t vertices) { return (vertices + kPiece - 1) / kPiece; }
 
+  /// Call before advanceTo(), which then does not throw.
+  void reserve(std::size_t vertices) { m_ranges.reserve(pieceCount(vertices)); }
   /// Measures the motion from the positions that were given last, which had as many vertices.
   /// Without any, all is still.
   /// Cost     reads both positions once; none where they are the same.

@@ -41,7 +41,7 @@ class OctreeSettings:
     max_elements_per_leaf: int = 32
     update: OctreeUpdate | OctreeUpdateName = OctreeUpdate.AUTO
     bounds: OctreeBounds | OctreeBoundsName = OctreeBounds.BOX
-    keeps_pairs: bool = True
+    keeps_pairs: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "update", parse(OctreeUpdate, self.update))
