@@ -32,7 +32,7 @@ struct OctreeSettings {
   int maxElementsPerLeaf = 32;  ///< in [1, 1024]; cells with more elements are split
   OctreeUpdate update = OctreeUpdate::Auto;
   OctreeBounds bounds = OctreeBounds::Box;  ///< for pairs of two bodies that do not deform
-  /// Slow meshes keep candidates of Proximity for the next detections. Contacts do not depend on it.
+  /// Slow meshes keep candidates of Proximity for later detections. Contacts do not depend on it.
   bool keepsPairs = false;
 };
 
