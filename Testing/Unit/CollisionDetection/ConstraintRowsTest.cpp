@@ -222,7 +222,9 @@ TEST(ConstraintRows, TooFewPositionsThrowAnErrorThatNamesTheVertex) {
   const CollisionData& beside = collisions.collisionData(points, plane);
   std::vector<ConstraintRow> rows(1);
   const Span all = high, two = all.first(2);
-  for (const auto& [before, now] : {std::pair<Span, Span>{two, all}, {all, two}, {{}, {}}}) {
+  // No structured binding: lambdas cannot capture one in clang 14.
+  for (const auto& ends : {std::pair<Span, Span>{two, all}, {all, two}, {{}, {}}}) {
+    const Span before = ends.first, now = ends.second;
     const std::size_t vertex = before.empty() ? 0 : 2;
     expectRefused(
         ErrorCode::WrongPositionCount, " of b, which has ",

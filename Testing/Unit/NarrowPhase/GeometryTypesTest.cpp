@@ -305,8 +305,9 @@ TEST(GeometryTypes, DegenerateLinesAndPointsMatchBruteForce) {
       for (const PairSettings& pair : settingsFor(run % 3 ? 0.5 : 1.0)) {
         const bool lands = run % 4 > 1 && a == &drops;  // on others
         const Positions& now = lands ? others.positions : a->positions;
+        const TestGeometry &first = *a, &second = *b;  // clang 14 captures no structured binding
         const auto found = [&](Engine engine) {
-          return answer(settingsOf(engine), *a, *b, pair, now, b->positions);
+          return answer(settingsOf(engine), first, second, pair, now, second.positions);
         };
         const CollisionData data = found(Engine::Octree);
         expectSameContacts(data, found(Engine::BruteForce));

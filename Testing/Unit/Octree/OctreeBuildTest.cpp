@@ -98,7 +98,7 @@ TEST(OctreeBuild, ReleasesMemoryAndIsBuiltAgain) {
 }
 
 TEST(Octree, PartsThatAreFittedOneByOneEqualAWholeFit) {
-  Random random(31);
+  testing::Random random(31);
   OctreeSettings few;
   few.maxElementsPerLeaf = 4;
   for (const Boxes& boxes :
