@@ -235,9 +235,10 @@ TEST(FieldContacts, FindASpikeInATriangle) {
 }
 
 TEST(FieldContacts, FollowTheBody) {
-  Random random(8);
   const Mesh mesh = sphere(20, 30, {0.9, 0.1, 0.2}, 0.4);
-  const Eigen::Matrix3d rotation = randomTurn(random);
+  // With this turn no vertex is on a face of cells, where gradients jump.
+  const Eigen::Matrix3d rotation =
+      Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
   const Vector3d translation(3, -2, 5);
   std::vector<Vector3d> moved;
   for (const Vector3d& p : mesh.positions) moved.push_back(rotation * p + translation);
