@@ -30,7 +30,7 @@ namespace palpate {
 /// motion since they were sorted it follows which classes may hold contacts now; only these are
 /// tested. They are sorted again more often than the lists are made.
 ///
-/// Docs/Algorithms/LooseOctree.md has the proof.
+/// Docs/Algorithms/LooseOctree.md has the argument.
 class KeptPairs {
  public:
   /// How far the lists and classes reach.
@@ -119,7 +119,6 @@ class KeptPairs {
   CountedVector<Unit> m_units;                       ///< ascending parts
   Parts m_partsA, m_partsB;                          ///< of one mesh with itself, m_partsA only
   std::size_t m_rangeCountA = 0, m_rangeCountB = 0;  ///< PieceMotion::ranges()
-  std::uint64_t m_layoutA = 0, m_layoutB = 0;        ///< Octree::layout() of the nodes
   double m_reached = 0;  ///< L: further apart, less m_moved, are all pairs of parts without a unit
   double m_moved = 0;    ///< L: the relative motion of all since the units were made
   Turn m_lists, m_classes;

@@ -23,7 +23,6 @@ struct FloatMeshes {
 
 /// For each pair of elements, a lower bound on the distance, in units of the floats, of those of
 /// their features whose test it owns (NarrowPhase/FeatureTests.h). Infinity if it owns none.
-/// Cost     about 15 ns a pair with AVX-512. Memory: none.
 void featureBounds(const FloatMeshes&, std::span<const ElementPair>, float* bounds);
 
 }  // namespace palpate

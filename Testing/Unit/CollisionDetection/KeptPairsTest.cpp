@@ -229,6 +229,42 @@ TEST_P(KeptPairs, ChangesBetweenFramesHaveTheAnswersOfASearch) {
   }
 }
 
+/// The octree of a body that lags has outdated boxes, by which its motion must not be measured.
+TEST(KeptPairsOfTwoSheets, ATransformOfABodyThatLagsHasTheAnswerOfASearch) {
+  Random random(9);
+  const SlowScene scene = slowScenes().front();
+  KeptAndSearched both(scene, 1);
+  for (int frame = 0; frame < 8; ++frame) {
+    both.advance();
+    both.move(random, 1, 0.001 * scene.edge);
+    both.detect();
+  }
+  both.advance();
+  const Pose pose{Eigen::Matrix3d::Identity(), randomPoint(random, -1e-4, 1e-4)};
+  both.forBoth([&](OctreeBasedCD& object) { object.setTransform(both.id(1), pose); });
+  both.detect();
+}
+
+TEST(KeptPairsOfTwoSheets, ADetectionThatThrowsLeavesTheCountsThatWereAskedFor) {
+  Random random(9);
+  const SlowScene scene = slowScenes().front();
+  KeptAndSearched both(scene, 1);
+  for (int frame = 0; frame < 8; ++frame) {
+    both.advance();
+    both.move(random, 1, 0.001 * scene.edge);
+    both.detect();
+  }
+  const std::size_t before = both.kept().statistics().candidatePairs;
+  both.kept().setContactPredicate(both.id(0), both.id(1),
+                                  [](const ContactFeatures&) -> bool { throw 1; });
+  both.advance();
+  both.move(random, 1, 0.001 * scene.edge);
+  EXPECT_THROW(both.kept().detectCollision(), int);
+  EXPECT_EQ(both.kept().statistics().candidatePairs, before);
+  both.kept().setContactPredicate(both.id(0), both.id(1), {});
+  both.detect();
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, KeptPairs, ::testing::ValuesIn(slowScenes()),
                          [](const auto& scene) {
                            std::string name = scene.param.name;
