@@ -19,6 +19,10 @@ constexpr std::size_t kElementsPerPart = 512, kMostParts = 512;
 constexpr double kUnitMargins = 1.0;
 /// By how much more often than needed units are due, so that few have to be handled at once.
 constexpr double kDueEarly = 1.2;
+/// Of the units, when the first lists are made, one in this many is a sample.
+constexpr std::size_t kSample = 64;
+/// ns: about what it costs to make a list, for each of its pairs, and for each list.
+constexpr double kCostOfPair = 40.0, kCostOfUnit = 1000.0;
 /// Margins in edges: these factors times the square root of the speed, in limits.
 constexpr double kListFactor = 2.0, kClassFactor = 1.6, kLeastMargin = 0.02, kMostMargin = 1.0;
 
@@ -92,7 +96,7 @@ void KeptPairs::addMotion(const PieceMotion& a, const PieceMotion& b) {
   const auto& movedB = (self ? m_partsA : m_partsB).moved;
   for (Unit& unit : m_units) {
     const MotionRange &ofA = m_partsA.moved[unit.partA], &ofB = movedB[unit.partB];
-    if (ofA.isZero() && ofB.isZero()) continue;
+    if (!unit.isListed() || (ofA.isZero() && ofB.isZero())) continue;
     const double motion = largestMotion(ofA, ofB);
     for (double* moved : {&unit.movedSinceLists, &unit.movedSinceClasses})
       *moved = (*moved + motion) * kUp;
@@ -102,10 +106,57 @@ void KeptPairs::addMotion(const PieceMotion& a, const PieceMotion& b) {
   }
 }
 
+bool KeptPairs::isWhole() const {
+  return m_isActive &&
+         std::all_of(m_units.begin(), m_units.end(), [](const Unit& u) { return u.isListed(); });
+}
+
+double KeptPairs::cost(double speed) const {
+  PALPATE_ASSERT(speed >= 0.0);
+  double ofListed = 0.0, listed = 0.0;
+  for (const Unit& unit : m_units) {
+    if (!unit.isListed()) continue;
+    ++listed;
+    const double turns = std::min(1.0, kDueEarly * speed / unit.atLists.lists);
+    ofListed += turns * (kCostOfUnit + kCostOfPair * static_cast<double>(unit.boxes.size()));
+  }
+  return listed > 0.0 ? ofListed * static_cast<double>(m_units.size()) / listed : 0.0;
+}
+
 std::size_t KeptPairs::start(const Body& a, const Body& b, const Reach& reach,
                              std::size_t mostJobs) {
-  PALPATE_ASSERT(reach.distance >= 0.0 && reach.lists >= reach.classes && reach.classes > 0.0 &&
-                 mostJobs > 0);
+  startUnits(a, b, reach);
+  chooseUnits();
+  const std::size_t jobs = divide(mostJobs, [](const Unit& unit) { return unit.weight(); });
+  m_isActive = true;
+  return jobs;
+}
+
+std::size_t KeptPairs::startGathering(const Body& a, const Body& b, const Reach& reach,
+                                      std::size_t detections, std::size_t mostJobs) {
+  PALPATE_ASSERT(detections > 0);
+  startUnits(a, b, reach);
+  const std::size_t size = m_units.size();
+  std::size_t wanted = (size + detections - 1) / detections;
+  bool isFirst = true;
+  for (Unit& unit : m_units) {
+    unit.isMade = unit.isSorted = true;
+    isFirst &= !unit.isListed();
+  }
+  const std::size_t stride = isFirst ? std::min(kSample, size) : 1;
+  for (std::size_t i = stride / 2; i < size && wanted > 0; i += stride) {
+    if (m_units[i].isListed()) continue;
+    m_units[i].isMade = false;
+    --wanted;
+  }
+  const std::size_t jobs = divide(mostJobs, [](const Unit& unit) { return unit.isMade ? 0.0 : 1.0; });
+  m_isActive = true;
+  return jobs;
+}
+
+/// What both kinds of detections begin with.
+void KeptPairs::startUnits(const Body& a, const Body& b, const Reach& reach) {
+  PALPATE_ASSERT(reach.distance >= 0.0 && reach.lists >= reach.classes && reach.classes > 0.0);
   const bool self = &a == &b, hasParts = m_isActive &&
                                          m_partsA.layout == a.tree.octree().layout() &&
                                          (self || m_partsB.layout == b.tree.octree().layout());
@@ -128,10 +179,6 @@ std::size_t KeptPairs::start(const Body& a, const Body& b, const Reach& reach,
   if (!hasParts || reach.distance + reach.lists + m_moved > m_reached) makeUnits(a, b);
   m_trees = treesOf(
       a, b, reach.distance + reach.lists + m_reach.error + a.tree.lag() + b.tree.lag(), false);
-  chooseUnits();
-  divide(mostJobs);
-  m_isActive = true;
-  return m_jobs.size() - 1;
 }
 
 void KeptPairs::makeParts(const Body& a, const Body& b) {
@@ -151,9 +198,21 @@ void KeptPairs::makeUnits(const Body& a, const Body& b) {
   const TreePair trees =
       treesOf(a, b, reached + m_reach.error + a.tree.lag() + b.tree.lag(), false);
   const auto &partsA = m_partsA.nodes, &partsB = self ? m_partsA.nodes : m_partsB.nodes;
-  CountedVector<Unit> units;
-  units.reserve(m_units.size());
-  auto old = m_units.begin();
+  std::swap(m_units, m_formerUnits);
+  m_units.clear();
+  CountedVector<Unit>& former = m_formerUnits;
+  std::size_t old = 0, spare = 0;
+  // With the buffers of one that there is not any more.
+  const auto newUnit = [&] {
+    Unit unit;
+    while (spare < old && former[spare].boxes.capacity() == 0) ++spare;
+    if (spare == old) return unit;
+    unit.boxes.swap(former[spare].boxes);
+    unit.near.swap(former[spare++].near);
+    unit.boxes.clear();
+    unit.near.clear();
+    return unit;
+  };
   for (std::uint32_t i = 0; i < partsA.size(); ++i) {
     FloatBox box = trees.a->box(partsA[i] & ~NodePair::kOwn);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -165,14 +224,13 @@ void KeptPairs::makeUnits(const Body& a, const Body& b) {
       const auto isBefore = [&](const Unit& unit) {
         return unit.partA != i ? unit.partA < i : unit.partB < j;
       };
-      while (old != m_units.end() && isBefore(*old)) ++old;
-      const bool isKept = old != m_units.end() && old->partA == i && old->partB == j;
-      units.push_back(isKept ? std::move(*old++) : Unit());
-      units.back().partA = i;
-      units.back().partB = j;
+      while (old < former.size() && isBefore(former[old])) ++old;
+      const bool isKept = old < former.size() && former[old].partA == i && former[old].partB == j;
+      m_units.push_back(isKept ? std::move(former[old++]) : newUnit());
+      m_units.back().partA = i;
+      m_units.back().partB = j;
     }
   }
-  m_units = std::move(units);
   m_reached = reached;
   m_moved = 0.0;
   for (Turn* turn : {&m_lists, &m_classes})
@@ -212,17 +270,26 @@ void KeptPairs::takeTurns(Turn& turn, IsDone&& isDone, Weight&& weight) {
   }
 }
 
-/// Divides the units among jobs of about the same weight.
-void KeptPairs::divide(std::size_t mostJobs) {
+/// Divides the units among jobs of about the same weight. Returns their number.
+template <class Weight>
+std::size_t KeptPairs::divide(std::size_t mostJobs, Weight&& weight) {
+  PALPATE_ASSERT(mostJobs > 0);
   double all = 0.0, sum = 0.0;
-  for (const Unit& unit : m_units) all += unit.weight();
+  for (const Unit& unit : m_units) all += weight(unit);
   m_jobs.assign(1, 0);
   for (std::size_t i = 0; i < m_units.size(); ++i) {
-    sum += m_units[i].weight();
+    sum += weight(m_units[i]);
     if (sum >= all * static_cast<double>(m_jobs.size()) / static_cast<double>(mostJobs) ||
         i + 1 == m_units.size())
       m_jobs.push_back(i + 1);
   }
+  return m_jobs.size() - 1;
+}
+
+void KeptPairs::gather(std::size_t job, const MeshPair& meshes, JobScratch& scratch) {
+  PALPATE_ASSERT(job + 1 < m_jobs.size());
+  for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
+    if (!m_units[i].isMade) make(m_units[i], meshes, scratch);
 }
 
 void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch,
@@ -245,12 +312,6 @@ std::size_t KeptPairs::countCandidates(const MeshTopology& a, const MeshTopology
   for (const Unit& unit : m_units)
     for (const ElementPair& pair : unit.boxes)
       count += overlap(a.elements[pair.a], b.elements[pair.b]);
-  return count;
-}
-
-std::size_t KeptPairs::listed() const {
-  std::size_t count = 0;
-  for (const Unit& unit : m_units) count += unit.boxes.size();
   return count;
 }
 
@@ -302,7 +363,8 @@ void KeptPairs::make(Unit& unit, const MeshPair& meshes, JobScratch& scratch) {
                        (m_trees.self() ? m_partsA : m_partsB).nodes[unit.partB]};
   traverse(m_trees, std::span(&nodes, 1), scratch.stack, scratch.sink);
   const auto found = scratch.sink.kept();
-  unit.boxes.assign(found.begin(), found.end());
+  resizeSparingly(unit.boxes, found.size());
+  std::copy(found.begin(), found.end(), unit.boxes.begin());
   unit.atLists = m_reach;
   sort(unit, meshes, unit.boxes, scratch);
   unit.movedSinceLists = 0.0;
@@ -349,7 +411,7 @@ void KeptPairs::sort(Unit& unit, const MeshPair& meshes, std::span<const Element
     if (c < kClasses) unit.ends[c] = size;
     next[c] = begin;
   }
-  unit.near.resize(size);
+  resizeSparingly(unit.near, size);
   for (std::size_t i = 0; i < pairs.size(); ++i)
     if (classes[i] != kNone) unit.near[next[classes[i]]++] = pairs[i];
   unit.atClasses = m_reach;

@@ -26,6 +26,9 @@ namespace palpate {
 /// the margin. Each detection makes some of the lists again, so that all are made again in turn
 /// before that happens.
 ///
+/// The first lists are made along with searches, some in each detection, so that no detection costs
+/// much more than a search. Their lengths tell early whether keeping them would pay.
+///
 /// Pairs with near features are in classes by a bound on the distance of their features. From the
 /// motion since they were sorted it follows which classes may hold contacts now; only these are
 /// tested. They are sorted again more often than the lists are made.
@@ -53,12 +56,24 @@ class KeptPairs {
   /// are one object in self-collision.
   void addMotion(const PieceMotion& a, const PieceMotion& b);
 
-  /// Begins a detection, and activates the lists. Returns the number of jobs, at most `mostJobs`.
+  /// Begins a detection by lists alone, and activates them. Lists that are missing are made.
+  /// Returns the number of jobs, at most `mostJobs`.
   std::size_t start(const Body& a, const Body& b, const Reach&, std::size_t mostJobs);
+  /// The same along with a search, for gather(): lists are made in this detection so that none is
+  /// missing after about `detections` like it, and few in the first one.
+  std::size_t startGathering(const Body& a, const Body& b, const Reach&, std::size_t detections,
+                             std::size_t mostJobs);
+  /// Whether the lists are active and none is missing.
+  bool isWhole() const;
+  /// ns: about what it will cost to make the lists again in turn, in each detection, at a relative
+  /// motion of `speed`, L. 0 before any list was made.
+  double cost(double speed) const;
   /// The boxes of the elements now, with the distance between them.
   const FloatPair& floats() const { return m_floats; }
   /// Appends the element pairs of a job that may have features in contact to `near`.
   void run(std::size_t job, const MeshPair&, JobScratch&, Buffer<ElementPair>& near);
+  /// After startGathering(): makes the lists of a job.
+  void gather(std::size_t job, const MeshPair&, JobScratch&);
   /// Element pairs of a job, which has run: its candidates, and some whose boxes do not overlap.
   template <class Use>
   void forEachList(std::size_t job, Use&& use) const {
@@ -66,7 +81,6 @@ class KeptPairs {
     for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
       use(std::span<const ElementPair>(m_units[i].boxes));
   }
-  std::size_t listed() const;  ///< number of element pairs in the lists
   /// The number of candidates of all jobs, while the floats are those of this detection. In
   /// self-collision it may be off by pairs whose boxes are at the distance within rounding.
   std::size_t countCandidates(const MeshTopology& a, const MeshTopology& b) const;
@@ -84,6 +98,7 @@ class KeptPairs {
     Buffer<ElementPair> boxes, near;
     std::array<std::uint32_t, kClasses> ends{};  ///< of the classes in `near`; the rest is further
     bool isMade = false, isSorted = false;       ///< false: in this detection
+    bool isListed() const { return movedSinceLists < std::numeric_limits<double>::infinity(); }
     double weight() const { return static_cast<double>(boxes.size()) + 16.0; }
     double weightOfClasses() const { return static_cast<double>(near.size()) + 4.0; }
   };
@@ -93,12 +108,14 @@ class KeptPairs {
     std::size_t next = 0;  ///< the unit that is due next
   };
 
+  void startUnits(const Body& a, const Body& b, const Reach&);
   void makeParts(const Body& a, const Body& b);
   void makeUnits(const Body& a, const Body& b);
   void chooseUnits();
   template <class IsDone, class Weight>
   void takeTurns(Turn&, IsDone&&, Weight&&);
-  void divide(std::size_t mostJobs);
+  template <class Weight>
+  std::size_t divide(std::size_t mostJobs, Weight&&);
   void make(Unit&, const MeshPair&, JobScratch&);
   void sort(Unit&, const MeshPair&, std::span<const ElementPair>, JobScratch&);
   FloatMeshes floatMeshes(const MeshTopology& a, const MeshTopology& b) const;
@@ -117,6 +134,7 @@ class KeptPairs {
 
   bool m_isActive = false;
   CountedVector<Unit> m_units;                       ///< ascending parts
+  CountedVector<Unit> m_formerUnits;                 ///< their buffers are used again
   Parts m_partsA, m_partsB;                          ///< of one mesh with itself, m_partsA only
   std::size_t m_rangeCountA = 0, m_rangeCountB = 0;  ///< PieceMotion::ranges()
   double m_reached = 0;  ///< L: further apart, less m_moved, are all pairs of parts without a unit

@@ -58,18 +58,32 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
 
 std::size_t MeshWork::start(const FrameStart& frame) {
   if (m_record->keeps) return startKept(frame);
-  return startTraversal(frame, true, BoxFrame::Body);
+  m_searchJobs = startTraversal(frame, true, BoxFrame::Body);
+  return m_searchJobs + (m_record->gathers ? startGathering(frame) : 0);
+}
+
+static bool hasElements(const PairRecord& record) {
+  return record.a->body.tree.octree().size() > 0 && record.b->body.tree.octree().size() > 0;
 }
 
 std::size_t MeshWork::startKept(const FrameStart& frame) {
   PairRecord& record = *m_record;
   const Body &a = record.a->body, &b = record.b->body;
-  if (a.tree.octree().size() == 0 || b.tree.octree().size() == 0) return 0;
+  if (!hasElements(record)) return 0;
   const std::size_t jobs =
       record.kept.start(a, b, reachOfKept(record), frame.threads.count() > 1 ? kJobsPerPair : 1);
   m_thickness = record.meshes().maxFeatureDistance();
   m_floats = record.kept.floats();
   return jobs;
+}
+
+std::size_t MeshWork::startGathering(const FrameStart& frame) {
+  PairRecord& record = *m_record;
+  if (!hasElements(record)) return 0;
+  const KeptPairs::Reach reach = reachOfKept(record);
+  return record.kept.startGathering(record.a->body, record.b->body, reach,
+                                    detectionsToGather(record, reach),
+                                    frame.threads.count() > 1 ? kJobsPerPair : 1);
 }
 
 void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
@@ -108,7 +122,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   PairRecord& record = *m_record;
   GeometryOctree &ofA = record.a->body.tree, &ofB = record.b->body.tree;
   const std::size_t elements = ofA.octree().size() + ofB.octree().size();
-  if (ofA.octree().size() == 0 || ofB.octree().size() == 0) return 0;
+  if (!hasElements(record)) return 0;
   const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
                                        ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads)
                                        : nullptr;
@@ -206,6 +220,9 @@ bool MeshWork::hasRound(int round, Jobs jobs) const {
 void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
   if (round == 0 && m_record->keeps) {
     runKept(job, scratch);
+  } else if (job >= m_searchJobs) {
+    if (round == 0)
+      m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) { detect(pairs, scratch); });
     scratch.candidateCount = scratch.sink.total();

@@ -60,6 +60,7 @@ class MeshWork {
   bool hasWiderBoxes() const;
   void keepInWorld(double distance, JobScratch&) const;
   std::size_t startKept(const FrameStart&);
+  std::size_t startGathering(const FrameStart&);
   void runKept(std::size_t job, JobScratch&) const;
   void checkStart(const MeshPair&, std::span<const ElementPair>, JobScratch&) const;
   void detect(std::span<const ElementPair>, JobScratch&) const;
@@ -74,6 +75,7 @@ class MeshWork {
   double m_thickness = 0;  ///< L: of the boxes that the pair's method compares
   const Buffer<NodePair>* m_nodePairs = nullptr;
   std::size_t m_first = 0, m_count = 0, m_grain = 1;  ///< of m_nodePairs
+  std::size_t m_searchJobs = 0;  ///< further jobs make lists of KeptPairs
 };
 
 }  // namespace palpate

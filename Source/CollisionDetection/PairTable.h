@@ -35,6 +35,7 @@ struct PairRecord : CountedObject {
   PairPlan plan;  ///< of this frame; only Auto's may be of another kind than `support`
   KeptPairs kept;
   bool keeps = false;                  ///< this frame's candidates are those of `kept`
+  bool gathers = false;                ///< they are searched, and some go to `kept`
   bool countIsPending = false;         ///< the candidates of `kept` were not counted yet
   int slowFrames = 0;                  ///< consecutive detections in which candidates could be kept
   double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest

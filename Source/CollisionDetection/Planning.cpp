@@ -88,13 +88,15 @@ void planKeptPairs(const GeometryTable& geometries,
                         settings.octree.update == OctreeUpdate::Auto && edge > 0.0 &&
                         motion <= most && record->pauseFrames == 0 && canKeep(*record);
     record->slowFrames = isSlow ? std::min(record->slowFrames + 1, kSlowFrames) : 0;
-    record->keeps = record->slowFrames == kSlowFrames;
+    const bool mayKeep = record->slowFrames == kSlowFrames;
     const std::array elements{record->a->body.revisions.elements,
                               record->b->body.revisions.elements};
     // Other enabled elements own other features.
-    if (!record->keeps || record->keptElements != elements) record->kept.deactivate();
+    if (!mayKeep || record->keptElements != elements) record->kept.deactivate();
     record->keptElements = elements;
-    if (record->keeps) forBoth(*record, [](Geometry& geometry) { geometry.mayLag = true; });
+    record->keeps = mayKeep && record->kept.isWhole();
+    record->gathers = mayKeep && !record->keeps;
+    if (mayKeep) forBoth(*record, [](Geometry& geometry) { geometry.mayLag = true; });
   }
   for (const auto& geometry : geometries.all())
     if (geometry->mayLag) geometry->pieces.reserve(geometry->body.mesh.now.size());
@@ -112,30 +114,46 @@ void planKeptPairs(const GeometryTable& geometries,
 
 bool reviewKeptPairs(PairRecord& record) {
   const PairPlan& plan = record.plan;
-  if (!record.keeps || (canKeep(record) && !plan.runsIntersection && !plan.startsIntersecting))
+  if (!(record.keeps || record.gathers) ||
+      (canKeep(record) && !plan.runsIntersection && !plan.startsIntersecting))
     return false;
-  record.keeps = false;
+  record.keeps = record.gathers = false;
   record.a->mayLag = record.b->mayLag = false;
   return record.a->body.tree.isLagging() || record.b->body.tree.isLagging();
 }
 
+/// ns: about what an update and a search cost in a detection.
+static double costOfSearch(const PairRecord& record) {
+  constexpr double kElement = 7.0, kCandidate = 14.0;
+  double elements = 0.0;
+  for (const Geometry* geometry : {record.a, record.b})
+    elements += static_cast<double>(geometry->body.mesh.topology.elements.size());
+  return kElement * elements + kCandidate * static_cast<double>(record.searchedCandidates);
+}
+
 void reviewLists(PairRecord& record) {
-  constexpr std::size_t kMostLonger = 4, kFew = 256;  // any numbers will do
-  constexpr int kFirstPause = 64, kLongestPause = 4096;
+  constexpr int kFirstPause = 64, kLongestPause = 4096;  // detections; any numbers will do
   record.countIsPending = record.keeps;
-  if (!record.keeps) {
-    record.searchedCandidates = record.statistics.candidatePairs;
+  if (!record.keeps) record.searchedCandidates = record.statistics.candidatePairs;
+  if (!(record.keeps || record.gathers) ||
+      record.kept.cost(record.recentSpeed) <= costOfSearch(record))
     return;
-  }
-  if (record.kept.listed() <= kMostLonger * (record.searchedCandidates + kFew)) return;
   record.nextPause = std::clamp(2 * record.nextPause, kFirstPause, kLongestPause);
   record.pauseFrames = record.nextPause;
 }
 
 KeptPairs::Reach reachOfKept(const PairRecord& record) {
-  PALPATE_ASSERT(record.keeps);
+  PALPATE_ASSERT(record.keeps || record.gathers);
   return KeptPairs::reachFor(record.meshes().maxFeatureDistance(), record.recentSpeed,
                              edgeOf(record));
+}
+
+std::size_t detectionsToGather(const PairRecord& record, const KeptPairs::Reach& reach) {
+  // The first lists should last until the last ones are made.
+  constexpr double kShareOfMargin = 0.25, kMost = 16.0;
+  const double motion = kShareOfMargin * reach.lists, speed = record.recentSpeed;
+  if (motion >= kMost * speed) return static_cast<std::size_t>(kMost);
+  return std::max<std::size_t>(1, static_cast<std::size_t>(motion / speed));
 }
 
 void planByFieldIfProven(PairRecord& record, Engine engine) {

@@ -27,11 +27,12 @@ void planKeptPairs(const GeometryTable&, std::span<const std::unique_ptr<PairRec
                    const Settings&);
 /// A plan was completed: decides again. Returns whether an octree that lags must be updated.
 bool reviewKeptPairs(PairRecord&);
-/// A detection was completed: stops keeping for a while where the lists are much longer than those
-/// of a search.
+/// A detection was completed: stops keeping for a while where lists cost more than searches.
 void reviewLists(PairRecord&);
 /// How far the lists of a pair that keeps its candidates reach.
 KeptPairs::Reach reachOfKept(const PairRecord&);
+/// In how many detections the first lists are made.
+std::size_t detectionsToGather(const PairRecord&, const KeptPairs::Reach&);
 
 /// Auto: plans that an attached field answers, if that is allowed, and if the field proves that
 /// nothing touched in the step. The octrees must be updated.
