@@ -38,7 +38,7 @@ struct PairRecord : CountedObject {
   bool gathers = false;                ///< they are searched, and some go to `kept`
   bool countIsPending = false;         ///< the candidates of `kept` were not counted yet
   int slowFrames = 0;                  ///< consecutive detections in which candidates could be kept
-  double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest
+  double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest that was slow
   std::size_t searchedCandidates = 0;  ///< of the last search
   int pauseFrames = 0;                 ///< detections for which candidates are not kept
   int nextPause = 0;                   ///< how many that are the next time

@@ -82,7 +82,7 @@ void planKeptPairs(const GeometryTable& geometries,
   for (const auto& record : records) {
     const double edge = edgeOf(*record), motion = record->plan.motion;
     const double most = KeptPairs::kMostSpeed * edge;
-    record->recentSpeed = std::max(std::min(motion, most), kSpeedDecay * record->recentSpeed);
+    record->recentSpeed = motion > most ? 0.0 : std::max(motion, kSpeedDecay * record->recentSpeed);
     record->pauseFrames = std::max(record->pauseFrames - 1, 0);
     const bool isSlow = settings.octree.keepsPairs && settings.engine == Engine::Octree &&
                         settings.octree.update == OctreeUpdate::Auto && edge > 0.0 &&
