@@ -149,7 +149,8 @@ std::size_t KeptPairs::startGathering(const Body& a, const Body& b, const Reach&
     m_units[i].isMade = false;
     --wanted;
   }
-  const std::size_t jobs = divide(mostJobs, [](const Unit& unit) { return unit.isMade ? 0.0 : 1.0; });
+  const std::size_t jobs =
+      divide(mostJobs, [](const Unit& unit) { return unit.isMade ? 0.0 : 1.0; });
   m_isActive = true;
   return jobs;
 }

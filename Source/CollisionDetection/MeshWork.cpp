@@ -221,8 +221,7 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
   if (round == 0 && m_record->keeps) {
     runKept(job, scratch);
   } else if (job >= m_searchJobs) {
-    if (round == 0)
-      m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
+    if (round == 0) m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) { detect(pairs, scratch); });
     scratch.candidateCount = scratch.sink.total();

@@ -75,7 +75,7 @@ class MeshWork {
   double m_thickness = 0;  ///< L: of the boxes that the pair's method compares
   const Buffer<NodePair>* m_nodePairs = nullptr;
   std::size_t m_first = 0, m_count = 0, m_grain = 1;  ///< of m_nodePairs
-  std::size_t m_searchJobs = 0;  ///< further jobs make lists of KeptPairs
+  std::size_t m_searchJobs = 0;                       ///< further jobs make lists of KeptPairs
 };
 
 }  // namespace palpate

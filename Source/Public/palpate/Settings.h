@@ -32,8 +32,9 @@ struct OctreeSettings {
   int maxElementsPerLeaf = 32;  ///< in [1, 1024]; cells with more elements are split
   OctreeUpdate update = OctreeUpdate::Auto;
   OctreeBounds bounds = OctreeBounds::Box;  ///< for pairs of two bodies that do not deform
-  /// Slow meshes keep candidates of Proximity for later detections. Contacts do not depend on it.
-  bool keepsPairs = false;
+  /// Slow meshes keep candidates of Proximity for later detections, where that costs less than to
+  /// search them again. Contacts do not depend on it.
+  bool keepsPairs = true;
 };
 
 /// How candidates are found. Contacts do not depend on it.

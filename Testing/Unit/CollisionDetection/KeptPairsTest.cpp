@@ -138,6 +138,10 @@ class KeptAndSearched {
   std::size_t testedByKept() const { return m_tested[0]; }
   std::size_t testedBySearched() const { return m_tested[1]; }
   std::size_t contacts() const { return m_contacts; }
+  /// Whether the last detection tested fewer features than a search.
+  bool testsFewer() const {
+    return m_objects[0].statistics().featurePairs < m_objects[1].statistics().featurePairs;
+  }
   void setAsksStatistics(bool asks) { m_asksStatistics = asks; }
 
  private:
@@ -229,16 +233,37 @@ TEST_P(KeptPairs, ChangesBetweenFramesHaveTheAnswersOfASearch) {
   }
 }
 
+/// Slow frames until candidates are kept.
+void runUntilKept(KeptAndSearched& both, Random& random, double edge) {
+  for (int frame = 0; frame < 30; ++frame) {
+    both.advance();
+    both.move(random, 1, 0.001 * edge);
+    both.detect();
+  }
+  EXPECT_TRUE(both.testsFewer());
+}
+
+TEST(KeptPairsOfTwoSheets, ListsAreMadeAlongWithSearches) {
+  Random random(9);
+  const SlowScene scene = slowScenes().front();
+  KeptAndSearched both(scene, 1);
+  int searches = 0;
+  for (int frame = 0; frame < 30; ++frame) {
+    both.advance();
+    both.move(random, 1, 0.001 * scene.edge);
+    both.detect();
+    searches += !both.testsFewer();
+  }
+  EXPECT_GT(searches, 8);
+  EXPECT_LT(searches, 25);
+}
+
 /// The octree of a body that lags has outdated boxes, by which its motion must not be measured.
 TEST(KeptPairsOfTwoSheets, ATransformOfABodyThatLagsHasTheAnswerOfASearch) {
   Random random(9);
   const SlowScene scene = slowScenes().front();
   KeptAndSearched both(scene, 1);
-  for (int frame = 0; frame < 8; ++frame) {
-    both.advance();
-    both.move(random, 1, 0.001 * scene.edge);
-    both.detect();
-  }
+  runUntilKept(both, random, scene.edge);
   both.advance();
   const Pose pose{Eigen::Matrix3d::Identity(), randomPoint(random, -1e-4, 1e-4)};
   both.forBoth([&](OctreeBasedCD& object) { object.setTransform(both.id(1), pose); });
@@ -249,11 +274,7 @@ TEST(KeptPairsOfTwoSheets, ADetectionThatThrowsLeavesTheCountsThatWereAskedFor) 
   Random random(9);
   const SlowScene scene = slowScenes().front();
   KeptAndSearched both(scene, 1);
-  for (int frame = 0; frame < 8; ++frame) {
-    both.advance();
-    both.move(random, 1, 0.001 * scene.edge);
-    both.detect();
-  }
+  runUntilKept(both, random, scene.edge);
   const std::size_t before = both.kept().statistics().candidatePairs;
   both.kept().setContactPredicate(both.id(0), both.id(1),
                                   [](const ContactFeatures&) -> bool { throw 1; });

@@ -131,6 +131,18 @@ TEST(FeatureBounds, NoFeatureIsNearer) {
   }
 }
 
+/// Each edge of one sheet is parallel to a third of the other one's.
+TEST(FeatureBounds, ParallelSheetsAreAsFarApartAsTheyAre) {
+  constexpr double kGap = 0.03125;
+  Mesh lower = sheet(6, 0.0, 0.0), upper = lower;
+  for (std::size_t v = 0; v < lower.positions.size(); ++v) {
+    lower.positions[v].z() = 0.0;
+    upper.positions[v] = lower.positions[v] + Vector3d(0.01, 0.02, kGap);
+  }
+  for (const float bound : BoundsScene(lower, upper, Vector3d::Zero()).bounds())
+    EXPECT_GT(bound, 0.99 * kGap);
+}
+
 TEST(FeatureBounds, AreTheSameOnAllSimdPaths) {
   for (const BoundsScene& scene : boundsScenes()) {
     const std::vector<float> bounds = scene.bounds();

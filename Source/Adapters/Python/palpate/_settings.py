@@ -34,14 +34,14 @@ class OctreeSettings:
     max_elements_per_leaf  a cell that holds more is split, in [1, 1024]
     update                 an OctreeUpdate or its name
     bounds                 an OctreeBounds or its name, for bodies that set_transform() places
-    keeps_pairs            slow meshes keep candidates for the next detections
+    keeps_pairs            slow meshes keep candidates for later detections, where that pays
     """
 
     max_depth: int = 32
     max_elements_per_leaf: int = 32
     update: OctreeUpdate | OctreeUpdateName = OctreeUpdate.AUTO
     bounds: OctreeBounds | OctreeBoundsName = OctreeBounds.BOX
-    keeps_pairs: bool = False
+    keeps_pairs: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "update", parse(OctreeUpdate, self.update))
