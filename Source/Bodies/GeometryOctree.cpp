@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 namespace palpate {
@@ -94,12 +95,59 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_treeVersion.commit(now);
 }
 
-bool GeometryOctree::canLag(const TriangleMesh& mesh, Revision topology, double scale,
-                            const OctreeSettings& settings, const PieceMotion& motion) const {
+bool GeometryOctree::canRefitSome(const TriangleMesh& mesh, Revision topology, double scale,
+                                  const OctreeSettings& settings) const {
   return settings.update == OctreeUpdate::Auto && isValid() && m_isBuilt && !m_isLoose &&
          !m_swept && !m_treeSwept && !mesh.now.isPlaced() &&
-         m_treeVersion.state().topology == topology && m_frame.scale == scale &&
-         m_lastPositions == motion.from() && mesh.now.bodyRevision() == motion.to();
+         m_treeVersion.state().topology == topology && m_frame.scale == scale;
+}
+
+bool GeometryOctree::canLag(const TriangleMesh& mesh, Revision topology, double scale,
+                            const OctreeSettings& settings, const PieceMotion& motion) const {
+  return canRefitSome(mesh, topology, scale, settings) && m_lastPositions == motion.from() &&
+         mesh.now.bodyRevision() == motion.to();
+}
+
+bool GeometryOctree::updateChanged(const TriangleMesh& mesh, Revision topology, double scale,
+                                   const OctreeSettings& settings, const Threads& threads) {
+  constexpr std::size_t kFew = 8;  // a smaller share of the vertices
+  const auto changed = mesh.now.changesSince(m_lastPositions);
+  if (m_isLagging || !canRefitSome(mesh, topology, scale, settings) || !changed ||
+      changed->size() * kFew > mesh.now.size())
+    return false;
+  const State now = stateOf(mesh, topology);
+  m_treeVersion.invalidate();
+  Stopwatch watch;
+  threads.forChunks(changed->size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+    toFloats(mesh.now.body().subspan(changed->begin + from, to - from), m_frame,
+             m_floats.data() + changed->begin + from);
+  });
+  if (m_slicesLayout != m_octree.layout()) makeSlices(mesh);
+  for (std::size_t i = 0; i < m_slices.size(); ++i) {
+    const auto pieces = m_slicePieces[i];
+    if (std::none_of(pieces.begin(), pieces.end(), [&](std::uint32_t piece) {
+          return changed->contains(piece * PieceMotion::kPiece, (piece + 1) * PieceMotion::kPiece);
+        }))
+      continue;
+    m_slices[i].moved = std::numeric_limits<double>::infinity();
+    refit(mesh, i);
+    ++m_refitted;
+  }
+  if (m_refitted >= m_slices.size()) measureLooseness();
+  lastUpdate = LooseOctree::Update::Refitted;
+  ++m_updates;
+  boxMilliseconds += watch.lap();
+  m_lastPositions = mesh.now.bodyRevision();
+  m_treeVersion.commit(now);
+  return true;
+}
+
+/// After all slices were fitted. A tree that became loose is built again by the next update.
+void GeometryOctree::measureLooseness() {
+  m_refitted = 0;
+  m_octree.addAreas();
+  m_octree.measureLooseness();
+  m_isLoose = !m_octree.isTight();
 }
 
 void GeometryOctree::makeSlices(const TriangleMesh& mesh) {
@@ -148,9 +196,7 @@ void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& mot
     refit(mesh, m_nextSlice);
     if (++m_nextSlice == size) {
       m_nextSlice = 0;
-      m_octree.addAreas();
-      m_octree.measureLooseness();
-      m_isLoose = !m_octree.isTight();
+      measureLooseness();
     }
   }
   m_lag = 0.0;

@@ -36,6 +36,11 @@ class GeometryOctree {
   /// scale: the scale of the float frames, common to all geometries.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
               const Threads&);
+  /// Instead of update(), if few vertices changed since the last one, and it swept no step: brings
+  /// the floats and boxes of these up to date. Returns false if that is not so.
+  /// Cost     linear in the elements near the vertices, by their numbers, and 1/500 of the others.
+  bool updateChanged(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
+                     const Threads&);
   /// Whether updateSome() is possible: the tree was updated to the positions from which the motion
   /// was measured, without sweeping the step, is tight, and is in the body's frame, the world.
   bool canLag(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
@@ -102,7 +107,10 @@ class GeometryOctree {
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
+  bool canRefitSome(const TriangleMesh&, Revision topology, double scale,
+                    const OctreeSettings&) const;
   void makeSlices(const TriangleMesh&);
+  void measureLooseness();
   void refit(const TriangleMesh&, std::size_t slice);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
@@ -125,14 +133,15 @@ class GeometryOctree {
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
   DerivedFrom<State> m_treeVersion;
-  // Of updateSome():
+  // Of updateSome() and updateChanged():
   CountedVector<Slice> m_slices;
   IndexLists m_slicePieces;          ///< of PieceMotion, for each slice
   std::uint64_t m_slicesLayout = 0;  ///< Octree::layout() of the slices
   std::size_t m_nextSlice = 0;
   double m_lag = 0;
   bool m_isLagging = false, m_isLoose = false;
-  Revision m_lastPositions;  ///< of the last update of either kind
+  Revision m_lastPositions;    ///< of the last update of any kind
+  std::size_t m_refitted = 0;  ///< slices that updateChanged() fitted since looseness was measured
   Buffer<Eigen::Vector3d> m_corners;
   Buffer<FloatPoint> m_cornerFloats;
   Buffer<Triangle> m_cornerTriangles;

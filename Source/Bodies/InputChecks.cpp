@@ -36,34 +36,35 @@ void checkIndices(const GeometryLabel& label, const std::string& element, std::s
 Eigen::AlignedBox3d checkPositions(const GeometryLabel& label,
                                    std::span<const Eigen::Vector3d> positions, Eigen::Vector3d* out,
                                    const char* which, const Threads& threads,
-                                   const Eigen::Vector3d* before, MotionRange* moved) {
-  std::atomic<std::size_t> first = positions.size();
+                                   const Eigen::Vector3d* before, MotionRange* moved,
+                                   std::size_t first) {
+  std::atomic<std::size_t> firstBad = positions.size();
   Eigen::AlignedBox3d all;
   std::mutex mutex;
-  threads.forChunks(positions.size(), kCopyGrain,
-                    [&](std::size_t, std::size_t from, std::size_t to) {
-                      MotionRange range;
-                      Eigen::AlignedBox3d bounds;
-                      std::size_t bad = to;
-                      for (std::size_t i = from; i < to && bad == to; i += kPiece) {
-                        const auto part = positions.subspan(i, std::min(kPiece, to - i));
-                        const std::size_t good = copyFinite(part, out + i, bounds);
-                        if (good < part.size()) bad = i + good;
-                        if (before) range.add(motionRange({before + i, good}, {out + i, good}));
-                      }
-                      std::size_t known = first;
-                      while (bad < to && bad < known && !first.compare_exchange_weak(known, bad)) {
-                      }
-                      const std::lock_guard lock(mutex);
-                      all.extend(bounds);
-                      if (before) moved->add(range);
-                    });
-  const std::size_t bad = first;
+  threads.forChunks(
+      positions.size(), kCopyGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        MotionRange range;
+        Eigen::AlignedBox3d bounds;
+        std::size_t bad = to;
+        for (std::size_t i = from; i < to && bad == to; i += kPiece) {
+          const auto part = positions.subspan(i, std::min(kPiece, to - i));
+          const std::size_t good = copyFinite(part, out + i, bounds);
+          if (good < part.size()) bad = i + good;
+          if (before) range.add(motionRange({before + i, good}, {out + i, good}));
+        }
+        std::size_t known = firstBad;
+        while (bad < to && bad < known && !firstBad.compare_exchange_weak(known, bad)) {
+        }
+        const std::lock_guard lock(mutex);
+        all.extend(bounds);
+        if (before) moved->add(range);
+      });
+  const std::size_t bad = firstBad;
   if (bad == positions.size()) return all;
   throw Error(ErrorCode::NonFinitePosition,
-              nameOf(label) + ", vertex " + std::to_string(bad) + ": position" + which + " is " +
-                  textOf(positions[bad]) + "; positions must be " + kRangeRule,
-              label.id, bad);
+              nameOf(label) + ", vertex " + std::to_string(first + bad) + ": position" + which +
+                  " is " + textOf(positions[bad]) + "; positions must be " + kRangeRule,
+              label.id, first + bad);
 }
 
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel& label,

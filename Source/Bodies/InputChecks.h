@@ -15,13 +15,13 @@ namespace palpate {
 
 // Checks of the user's input. Each function throws an Error that describes the fault.
 
-/// Copies the positions to `out` while checking them, and returns their bounds. which: " before",
-/// " now" or nothing, for the message. If `before` is given, `moved` receives the motion from
-/// there; this costs half as much as reading both arrays again.
+/// Copies the positions of vertices from `first` on to `out` while checking them, and returns their
+/// bounds. which: " before", " now" or nothing, for the message. If `before` is given, `moved`
+/// receives the motion from there; this costs half as much as reading both arrays again.
 Eigen::AlignedBox3d checkPositions(const GeometryLabel&, std::span<const Eigen::Vector3d>,
                                    Eigen::Vector3d* out, const char* which, const Threads&,
                                    const Eigen::Vector3d* before = nullptr,
-                                   MotionRange* moved = nullptr);
+                                   MotionRange* moved = nullptr, std::size_t first = 0);
 /// Returns a copy of the positions of a new topology.
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
 void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,

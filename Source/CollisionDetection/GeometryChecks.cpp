@@ -68,7 +68,7 @@ void checkShapeMayChange(const Geometry& geometry, const char* call) {
               geometry.body.id);
 }
 
-void checkPositionCount(const Geometry& geometry, std::size_t count) {
+static void checkHasPositions(const Geometry& geometry) {
   if (geometry.body.shape)
     throw Error(ErrorCode::WrongPositionCount,
                 nameOf(geometry) + " is a shape, which has no positions; setTransform() moves it",
@@ -78,6 +78,10 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
         ErrorCode::WrongPositionCount,
         nameOf(geometry) + " is a distance field, which has no positions; setTransform() moves it",
         geometry.body.id);
+}
+
+void checkPositionCount(const Geometry& geometry, std::size_t count) {
+  checkHasPositions(geometry);
   if (count != geometry.body.mesh.topology.vertexCount)
     throw Error(
         ErrorCode::WrongPositionCount,
@@ -87,6 +91,16 @@ void checkPositionCount(const Geometry& geometry, std::size_t count) {
              : geometry.body.mesh.topology.hasFaces() ? "; setTriangles() changes their number"
                                                       : ""),
         geometry.body.id);
+}
+
+void checkPositionCount(const Geometry& geometry, std::size_t first, std::size_t count) {
+  checkHasPositions(geometry);
+  const std::size_t all = geometry.body.mesh.topology.vertexCount;
+  if (first > all || count > all - first)
+    throw Error(ErrorCode::WrongPositionCount,
+                nameOf(geometry) + ": " + std::to_string(count) + " positions given from vertex " +
+                    std::to_string(first) + " on, but it has " + std::to_string(all) + " vertices",
+                geometry.body.id);
 }
 
 }  // namespace palpate

@@ -15,5 +15,7 @@ void checkProxy(const Geometry&, const SurfaceProxySettings&);
 /// call: for the message.
 void checkShapeMayChange(const Geometry&, const char* call);
 void checkPositionCount(const Geometry&, std::size_t count);
+/// The same for the vertices from `first` on, which may be fewer than all.
+void checkPositionCount(const Geometry&, std::size_t first, std::size_t count);
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include "Bodies/InputChecks.h"
 #include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
+#include "Core/Assert.h"
 
 #include <algorithm>
 #include <cstring>
@@ -27,27 +28,40 @@ void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
 }
 
 void GeometryStep::releaseMemory() {
-  std::erase_if(m_bodies, [](const auto& body) { return body.use_count() == 1; });
+  std::erase_if(m_bodies, [](const auto& body) { return body->isFree(); });
 }
 
 void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = shape; }
+
+/// Memory that nothing uses; if possible, memory from which few vertices of `like` are missing.
+GeometryStep::BodyMemory& GeometryStep::freeBody(const Positions* like) {
+  BodyMemory* found = nullptr;
+  for (const auto& body : m_bodies) {
+    if (!body->isFree()) continue;
+    if (!found) found = body.get();
+    if (!like || (body->revision && like->changesSince(*body->revision))) return *body;
+  }
+  if (found) return *found;
+  auto body = std::make_unique<BodyMemory>();
+  body->positions = std::make_shared<CountedVector<Eigen::Vector3d>>();
+  return *m_bodies.emplace_back(std::move(body));
+}
 
 GeometryStep::CheckedBody GeometryStep::checkedBody(const GeometryLabel& label,
                                                     std::span<const Eigen::Vector3d> positions,
                                                     const char* which, const Threads& threads,
                                                     const Eigen::Vector3d* from,
                                                     MotionRange* moved) {
-  auto free = std::find_if(m_bodies.begin(), m_bodies.end(),
-                           [](const auto& body) { return body.use_count() == 1; });
-  if (free == m_bodies.end())
-    free = m_bodies.insert(free, std::make_shared<CountedVector<Eigen::Vector3d>>());
-  (*free)->resize(positions.size());
+  BodyMemory& free = freeBody();
+  free.revision.reset();
+  free.positions->resize(positions.size());
   const auto bounds =
-      checkPositions(label, positions, (*free)->data(), which, threads, from, moved);
-  return {*free, bounds};
+      checkPositions(label, positions, free.positions->data(), which, threads, from, moved);
+  return {&free, free.positions, bounds};
 }
 
-void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, CheckedBody checked) noexcept {
+void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
+                           const CheckedBody& checked) noexcept {
   const Positions::Body& body = checked.positions;
   // The ends often share one body; it is compared only once.
   const Positions* last = nullptr;
@@ -57,10 +71,59 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end, CheckedBody check
     last = other;
     if (other->size() == body->size() &&
         (body->empty() || std::memcmp(other->body().data(), body->data(),
-                                      body->size() * sizeof(Eigen::Vector3d)) == 0))
+                                      body->size() * sizeof(Eigen::Vector3d)) == 0)) {
+      checked.memory->revision = other->bodyRevision();
       return end.setBodyOf(*other);
+    }
   }
   end.setBody(body, checked.bounds, m_revisions.next());
+  checked.memory->revision = end.bodyRevision();
+}
+
+void GeometryStep::setSomePositions(const GeometryLabel& label, TriangleMesh& mesh,
+                                    std::size_t first, std::span<const Eigen::Vector3d> now,
+                                    const Threads& threads) {
+  const VertexRange changed{first, first + now.size()};
+  const std::span<const Eigen::Vector3d> last = mesh.now.body();
+  PALPATE_ASSERT(!now.empty() && changed.end <= last.size());
+  BodyMemory& memory = freeBody(&mesh.now);
+  VertexRange missing{0, last.size()};
+  if (memory.revision && memory.positions->size() == last.size())
+    missing = mesh.now.changesSince(*memory.revision).value_or(missing);
+  memory.revision.reset();
+  memory.positions->resize(last.size());
+  Eigen::Vector3d* const all = memory.positions->data();
+  std::copy(last.begin() + static_cast<std::ptrdiff_t>(missing.begin),
+            last.begin() + static_cast<std::ptrdiff_t>(missing.end), all + missing.begin);
+  const Eigen::AlignedBox3d part =
+      checkPositions(label, now, all + first, "", threads, nullptr, nullptr, first);
+  // Nothing below throws. Positions that equal those of another end take its revision.
+  for (const Positions* other :
+       {&std::as_const(mesh.now), &std::as_const(m_detected), &std::as_const(mesh.before)}) {
+    if (other->size() != last.size()) continue;
+    VertexRange different =
+        mesh.now.changesSince(other->bodyRevision()).value_or(VertexRange{0, last.size()});
+    different.add(changed);
+    if (std::memcmp(other->body().data() + different.begin, all + different.begin,
+                    different.size() * sizeof(Eigen::Vector3d)) != 0)
+      continue;
+    memory.revision = other->bodyRevision();
+    mesh.now.setBodyOf(*other);
+    if (m_isNew && !m_bodyGiven) mesh.before.setBodyOf(mesh.now);
+    return;
+  }
+  Eigen::AlignedBox3d bounds = mesh.now.bounds(), old;
+  for (std::size_t v = changed.begin; v < changed.end; ++v) old.extend(last[v]);
+  if ((old.min().array() > bounds.min().array()).all() &&
+      (old.max().array() < bounds.max().array()).all()) {
+    bounds.extend(part);
+  } else {
+    bounds.setEmpty();
+    for (std::size_t v = 0; v < last.size(); ++v) bounds.extend(all[v]);
+  }
+  mesh.now.changeBody(memory.positions, bounds, changed, m_revisions.next());
+  memory.revision = mesh.now.bodyRevision();
+  if (m_isNew && !m_bodyGiven) mesh.before.setBodyOf(mesh.now);
 }
 
 void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
@@ -74,13 +137,13 @@ void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
   const Eigen::Vector3d* const from =
       !measures ? nullptr : (before ? *start.positions : mesh.before.body()).data();
   MotionRange motion;
-  auto end = checkedBody(label, now, before ? " now" : "", threads, from, &motion);
+  const auto end = checkedBody(label, now, before ? " now" : "", threads, from, &motion);
   // Nothing below throws.
   if (before) {
     m_bodyGiven = true;
     setBody(mesh, mesh.before, start);
   }
-  setBody(mesh, mesh.now, std::move(end));
+  setBody(mesh, mesh.now, end);
   if (followsNow) mesh.before.setBodyOf(mesh.now);
   if (measures) *moved = motion;
 }

@@ -41,6 +41,10 @@ class GeometryStep {
                     std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&,
                     std::optional<MotionRange>* moved);
+  /// The same for the positions now of some vertices, at least one.
+  /// Cost     linear in them if the last calls were like it, else in all vertices.
+  void setSomePositions(const GeometryLabel&, TriangleMesh&, std::size_t first,
+                        std::span<const Eigen::Vector3d> now, const Threads&);
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
                     const std::optional<Pose>& before, const Pose& now);
@@ -59,23 +63,30 @@ class GeometryStep {
   bool isNew() const { return m_isNew; }
 
  private:
+  /// Positions are checked while they are copied into one of these that nothing else uses.
+  struct BodyMemory {
+    std::shared_ptr<CountedVector<Eigen::Vector3d>> positions;
+    std::optional<Revision> revision;  ///< of its contents, if they were an end of a step
+    bool isFree() const { return positions.use_count() == 1; }
+  };
   struct CheckedBody {
-    Positions::Body positions;
+    BodyMemory* memory = nullptr;
+    Positions::Body positions;  ///< those in it, so that it is not free
     Eigen::AlignedBox3d bounds;
   };
+  BodyMemory& freeBody(const Positions* like = nullptr);
   CheckedBody checkedBody(const GeometryLabel&, std::span<const Eigen::Vector3d>, const char* which,
                           const Threads&, const Eigen::Vector3d* from = nullptr,
                           MotionRange* moved = nullptr);
-  void setBody(TriangleMesh&, Positions& end, CheckedBody) noexcept;
+  void setBody(TriangleMesh&, Positions& end, const CheckedBody&) noexcept;
   void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
 
   Positions m_detected;
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
   Revision::Counter m_revisions;
-  /// Positions are checked while they are copied into one of these that nothing else uses. Three
-  /// ends, two incoming arrays and the copies of snapshots use them.
-  CountedVector<std::shared_ptr<CountedVector<Eigen::Vector3d>>> m_bodies;
+  /// Three ends, two incoming arrays and the copies of snapshots use them.
+  CountedVector<std::unique_ptr<BodyMemory>> m_bodies;
   std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 

@@ -243,6 +243,16 @@ void GeometryTable::setPositions(GeometryId id,
   if (moved) geometry.motion.set(geometry.body.mesh, *moved);
 }
 
+void GeometryTable::setPositions(GeometryId id, std::size_t first,
+                                 std::span<const Eigen::Vector3d> now, const Threads& threads) {
+  Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "setPositions()");
+  checkPositionCount(geometry, first, now.size());
+  if (now.empty()) return;
+  geometry.step.setSomePositions(geometry, geometry.body.mesh, first, now, threads);
+  ++m_state;
+}
+
 void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles, const Preparation& prepare) {
   Geometry& geometry = at(id);
@@ -361,6 +371,9 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     Geometry& geometry = *m_changed[i];
     const TraceSpan span(trace, firstEvent + i, {.name = "octree", .a = geometry.body.id});
     const Threads& shared = size(&geometry) < kSmall ? one : threads;
+    if (geometry.body.tree.updateChanged(
+            geometry.body.mesh, geometry.body.revisions.elements.topology, scale, settings, shared))
+      return;
     if (const double lag = lagFor(geometry);
         lag > 0.0 &&
         geometry.body.tree.canLag(geometry.body.mesh, geometry.body.revisions.elements.topology,

@@ -87,8 +87,17 @@ MotionRange motionRange(std::span<const Vector3d> before, std::span<const Vector
 
 MotionRange motionRange(const Positions& before, const Positions& now) {
   PALPATE_ASSERT(before.size() == now.size());
-  if (!before.isPlaced() && !now.isPlaced()) return motionRange(before.body(), now.body());
   MotionRange range;
+  if (!before.isPlaced() && !now.isPlaced()) {
+    const auto changed = now.changesSince(before.bodyRevision());
+    if (!changed) return motionRange(before.body(), now.body());
+    const auto part = [&](const Positions& all) {
+      return all.body().subspan(changed->begin, changed->size());
+    };
+    range = motionRange(part(before), part(now));
+    if (changed->size() < now.size()) range.add({.isEmpty = false});
+    return range;
+  }
   for (std::size_t i = 0; i < now.size(); ++i)
     range.add({now[i] - before[i], now[i] - before[i], false});
   return range;

@@ -14,9 +14,13 @@ void PieceMotion::advanceTo(const Positions& now) {
   m_from = isKnown ? m_to->bodyRevision() : now.bodyRevision();
   if (isKnown && !m_to->hasSameBody(now)) {
     const auto before = m_to->body(), after = now.body();
+    const VertexRange changed =
+        now.changesSince(m_to->bodyRevision()).value_or(VertexRange{0, size});
     for (std::size_t piece = 0; piece < m_ranges.size(); ++piece) {
       const std::size_t begin = piece * kPiece, count = std::min(kPiece, size - begin);
-      m_ranges[piece] = motionRange(before.subspan(begin, count), after.subspan(begin, count));
+      m_ranges[piece] = changed.contains(begin, begin + count)
+                            ? motionRange(before.subspan(begin, count), after.subspan(begin, count))
+                            : MotionRange{.isEmpty = false};
     }
   } else {
     std::fill(m_ranges.begin(), m_ranges.end(), MotionRange{.isEmpty = false});

@@ -9,9 +9,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -23,6 +27,44 @@ inline bool haveSameBits(const Pose& l, const Pose& r) {
   return std::memcmp(l.rotation.data(), r.rotation.data(), sizeof l.rotation) == 0 &&
          std::memcmp(l.translation.data(), r.translation.data(), sizeof l.translation) == 0;
 }
+
+/// Consecutive vertices.
+struct VertexRange {
+  std::size_t begin = 0, end = 0;
+  std::size_t size() const { return end - begin; }
+  bool contains(std::size_t first, std::size_t last) const { return first < end && begin < last; }
+  void add(const VertexRange& other) {  ///< becomes the range of both and what lies between
+    if (other.size() == 0) return;
+    *this =
+        size() == 0 ? other : VertexRange{std::min(begin, other.begin), std::max(end, other.end)};
+  }
+};
+
+/// In which vertices positions differ from those that they were made from.
+class PositionChanges {
+ public:
+  /// All other vertices are as in the body of that revision. None: that is not known.
+  std::optional<VertexRange> since(Revision earlier) const {
+    for (const Change& change : m_changes)
+      if (change.changed.size() > 0 && change.since == earlier) return change.changed;
+    return {};
+  }
+  /// These vertices differ from `last`.
+  void add(Revision last, const VertexRange& changed) {
+    for (Change& change : m_changes)
+      if (change.changed.size() > 0) change.changed.add(changed);
+    m_changes[m_next] = {last, changed};
+    m_next = (m_next + 1) % m_changes.size();
+  }
+
+ private:
+  struct Change {
+    Revision since;
+    VertexRange changed;
+  };
+  std::array<Change, 8> m_changes{};  ///< any number will do
+  std::size_t m_next = 0;
+};
 
 /// The positions of a geometry's vertices at one end of a step. A rigid body's positions are stored
 /// in its own frame, shared by both ends, and are transformed to the world when they are read.
@@ -60,6 +102,15 @@ class Positions {
     m_data = m_body->data();
     m_bounds = bounds;
     m_bodyRevision = revision;
+    m_changes = {};
+  }
+  /// The same for positions that differ from those now in some vertices only.
+  void changeBody(Body body, const Eigen::AlignedBox3d& bounds, const VertexRange& changed,
+                  Revision revision) noexcept {
+    PositionChanges changes = m_changes;
+    changes.add(m_bodyRevision, changed);
+    setBody(std::move(body), bounds, revision);
+    m_changes = changes;
   }
   void setBody(Body body, Revision revision = {}) noexcept {
     Eigen::AlignedBox3d bounds;
@@ -68,6 +119,11 @@ class Positions {
   }
   void setBodyOf(const Positions& other) noexcept {
     setBody(other.m_body, other.m_bounds, other.m_bodyRevision);
+    m_changes = other.m_changes;
+  }
+  /// The vertices in which body() may differ from the one of an earlier revision, if that is known.
+  std::optional<VertexRange> changesSince(Revision earlier) const {
+    return earlier == m_bodyRevision ? VertexRange() : m_changes.since(earlier);
   }
   const Eigen::AlignedBox3d& bounds() const { return m_bounds; }  ///< of body()
   bool isPlaced() const { return m_placed; }
@@ -97,6 +153,7 @@ class Positions {
   Pose m_transform;
   bool m_placed = false;
   Revision m_bodyRevision, m_transformRevision;
+  PositionChanges m_changes;
 };
 
 }  // namespace palpate

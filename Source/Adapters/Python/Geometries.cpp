@@ -64,10 +64,13 @@ void attachSurfaceProxy(Collisions& self, const py::object& mesh, const py::obje
   self.work([&](OctreeBasedCD& d) { d.attachSurfaceProxy(id, value); });
 }
 
-void setPositions(Collisions& self, const py::object& geometry, const py::object& first,
-                  const py::object& second) {
+void setPositions(Collisions& self, const py::object& geometry, const py::object& positions,
+                  const py::object& second, std::optional<std::uint32_t> first) {
   const GeometryId id = geometryId(geometry);
-  const Positions a(first, "positions");
+  const Positions a(positions, "positions");
+  if (first && !second.is_none())
+    throw py::type_error("set_positions() takes `now` or `first`, not both");
+  if (first) return self.work([&](OctreeBasedCD& d) { d.setPositions(id, *first, a.span()); });
   if (second.is_none()) return self.work([&](OctreeBasedCD& d) { d.setPositions(id, a.span()); });
   const Positions now(second, "positions now");
   self.work([&](OctreeBasedCD& d) { d.setPositions(id, a.span(), now.span()); });
@@ -231,11 +234,12 @@ A copy of the positions now, (n, 3), L; in the body's frame if set_transform() p
 
 The box in the world around the geometry with its radii: (2, 3), lower and upper corner, L.)")
       .def("set_positions", &setPositions, py::arg("geometry"), py::arg("positions"),
-           py::arg("now") = py::none(),
-           R"(set_positions(geometry, positions, now=None) -> None
+           py::arg("now") = py::none(), py::kw_only(), py::arg("first") = py::none(),
+           R"(set_positions(geometry, positions, now=None, *, first=None) -> None
 
 Sets positions, (n, 3), L. One array sets the positions now; two arrays set the positions before and
-now, both ends of the step.)")
+now, both ends of the step. With `first`, one array sets the positions now of vertices from that
+index on; the others keep theirs and cost nothing if few change in each step.)")
       .def(
           "set_triangles",
           [](Collisions& self, const py::object& geometry, const py::object& positions,

@@ -107,6 +107,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> now);
   void setPositions(GeometryId, std::span<const Eigen::Vector3d> before,
                     std::span<const Eigen::Vector3d> now);
+  /// Sets the positions now of vertices from `first` on. The others keep theirs, which are neither
+  /// read nor compared again if few vertices change in each step.
+  /// Errors   WrongPositionCount if there are not as many vertices, or for a shape.
+  void setPositions(GeometryId, std::uint32_t first, std::span<const Eigen::Vector3d> now);
   /// Sets the topology and the positions at both ends of the step. Enables all elements.
   /// Errors   UnsupportedMethod for another type; TooLarge for restDistance; as addTriangleMesh().
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
