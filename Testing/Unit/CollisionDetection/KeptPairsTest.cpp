@@ -245,7 +245,8 @@ void runUntilKept(KeptAndSearched& both, Random& random, double edge) {
 
 TEST(KeptPairsOfTwoSheets, ListsAreMadeAlongWithSearches) {
   Random random(9);
-  const SlowScene scene = slowScenes().front();
+  SlowScene scene = slowScenes().front();
+  scene.bodies = {sheetAt(48, 0.5, 0.0), sheetAt(48, 0.52, 1.0)};  // of several parts
   KeptAndSearched both(scene, 1);
   int searches = 0;
   for (int frame = 0; frame < 30; ++frame) {

@@ -135,7 +135,7 @@ TEST(SomePositionsOfABody, AreRefusedBeyondItsVertices) {
   OctreeBasedCD object;
   const Mesh mesh = sheet(2, 0.0, 0.0);
   const GeometryId id = object.addTriangleMesh(mesh.positions, mesh.triangles),
-                   ball = object.addAnalyticalGeometry(Sphere{1.0});
+                   ball = object.addAnalyticalGeometry(Sphere{.radius = 1.0});
   const auto messageOf = [&](GeometryId geometry, std::uint32_t first, std::size_t count) {
     try {
       object.setPositions(geometry, first, std::vector<Vector3d>(count, Vector3d(7.0, 7.0, 7.0)));
