@@ -243,8 +243,8 @@ void GeometryTable::setPositions(GeometryId id,
   if (moved) geometry.motion.set(geometry.body.mesh, *moved);
 }
 
-void GeometryTable::setPositions(GeometryId id, std::size_t first,
-                                 std::span<const Eigen::Vector3d> now, const Threads& threads) {
+void GeometryTable::setSomePositions(GeometryId id, std::size_t first,
+                                     std::span<const Eigen::Vector3d> now, const Threads& threads) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setPositions()");
   checkPositionCount(geometry, first, now.size());

@@ -34,8 +34,8 @@ class GeometryTable {
   void remove(GeometryId);
   void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);
-  void setPositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now,
-                    const Threads&);
+  void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now,
+                        const Threads&);
   /// Receives a new topology and its positions at rest before they are set. What it throws leaves
   /// the geometry as it was.
   using Preparation = std::function<void(const MeshTopology&, std::span<const Eigen::Vector3d>)>;

@@ -148,10 +148,10 @@ void OctreeBasedCD::setPositions(GeometryId geometry, std::span<const Eigen::Vec
   all->withinLimit([&] { all->geometries.setPositions(geometry, before, now, all->threads); });
 }
 
-void OctreeBasedCD::setPositions(GeometryId geometry, std::uint32_t first,
-                                 std::span<const Eigen::Vector3d> now) {
+void OctreeBasedCD::setSomePositions(GeometryId geometry, std::size_t first,
+                                     std::span<const Eigen::Vector3d> now) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->withinLimit([&] { all->geometries.setPositions(geometry, first, now, all->threads); });
+  all->withinLimit([&] { all->geometries.setSomePositions(geometry, first, now, all->threads); });
 }
 
 void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& now) {

@@ -14,6 +14,7 @@
 
 #include <Eigen/Geometry>
 
+#include <concepts>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -110,7 +111,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Sets the positions now of vertices from `first` on. The others keep theirs, which are neither
   /// read nor compared again if few vertices change in each step.
   /// Errors   WrongPositionCount if there are not as many vertices, or for a shape.
-  void setPositions(GeometryId, std::uint32_t first, std::span<const Eigen::Vector3d> now);
+  template <std::integral Index>
+  void setPositions(GeometryId geometry, Index first, std::span<const Eigen::Vector3d> now) {
+    setSomePositions(geometry, static_cast<std::size_t>(first), now);
+  }
   /// Sets the topology and the positions at both ends of the step. Enables all elements.
   /// Errors   UnsupportedMethod for another type; TooLarge for restDistance; as addTriangleMesh().
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
@@ -237,6 +241,7 @@ class PALPATE_EXPORT OctreeBasedCD {
  private:
   friend class StepGuard;
   std::shared_ptr<StepSource> stepSource();
+  void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now);
   using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);
   /// null: every pair
   void forEachCandidateBatch(const CollisionPair* only, BatchFunction, void* function);

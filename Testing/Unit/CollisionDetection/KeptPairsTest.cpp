@@ -247,6 +247,7 @@ TEST(KeptPairsOfTwoSheets, ListsAreMadeAlongWithSearches) {
   Random random(9);
   SlowScene scene = slowScenes().front();
   scene.bodies = {sheetAt(48, 0.5, 0.0), sheetAt(48, 0.52, 1.0)};  // of several parts
+  scene.settings.thickness = 0.002;
   KeptAndSearched both(scene, 1);
   int searches = 0;
   for (int frame = 0; frame < 30; ++frame) {
