@@ -1,6 +1,7 @@
 // A spherical burr on a large bone under flowing water: debris and blood sink over bone and organs.
 // Bone and organs stay where setTransform() put them, so only the particles' octree changes. The
 // particles meet the bone by planes in an octree's leaves, built before the first frame.
+#include "CommandLine.h"
 #include "SceneProgram.h"
 #include "Scenes.h"
 
@@ -221,9 +222,10 @@ int main(int count, char** arguments) {
        .keys = "n",
        .addOptions =
            [&](CLI::App& app) {
-             app.add_option("--particles", size.particles)->check(CLI::Range(1, 10'000'000));
+             app.add_option("--particles", size.particles, "of debris and blood")
+                 ->check(between(1, 10'000'000));
              app.add_option("--triangles", size.triangles, "of the bone, at least")
-                 ->check(CLI::Range(1000, 10'000'000));
+                 ->check(between(1000, 10'000'000));
            },
        .make = [&](int threads) { return std::make_unique<BoneDrilling>(size, threads); }},
       count, arguments);

@@ -20,7 +20,6 @@ struct View {
   bool front = false;           ///< draws the Pareto front
   bool lines = false;           ///< joins a series' points in the order of x
   bool logX = true;
-  std::vector<std::string> pictures{};  ///< contents of PNG files
 };
 
 /// Returns one HTML page that needs no other file and no network.

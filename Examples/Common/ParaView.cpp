@@ -1,5 +1,6 @@
 #include "ParaView.h"
 
+#include "ContactPoints.h"
 #include "WriteFile.h"
 
 #include <palpate/Error.h>
@@ -101,33 +102,14 @@ VtpText bodiesVtp(World& world) {
 VtpText contactsVtp(World& world) {
   VtpText file;
   std::vector<double> distances, times, normals, pairs, kinds;
-  const auto add = [&](const Vector3d& at, const auto& contact, double time, int kind,
-                       std::size_t pair) {
+  for (const ContactPoint& contact : contactPoints(world)) {
     file.vertices.push_back(static_cast<std::uint32_t>(file.points.size()));
-    file.points.push_back(at);
+    file.points.push_back(contact.at);
     distances.push_back(contact.distance);
-    times.push_back(time);
+    times.push_back(contact.time);
     normals.insert(normals.end(), contact.normal.data(), contact.normal.data() + 3);
-    kinds.push_back(kind);
-    pairs.push_back(static_cast<double>(pair));
-  };
-  for (std::size_t pair = 0; pair < world.pairs().size(); ++pair) {
-    const auto& [a, b, gap] = world.pairs()[pair];
-    const CollisionData& data = world.contacts(a, b);
-    const auto middle = [&](const auto& contact, std::array<World::BodyId, 4> bodies) {
-      const auto [vertices, weights] = stencil(contact);
-      Vector3d sum = Vector3d::Zero();
-      for (std::size_t i = 0; i < 4; ++i)
-        sum += std::abs(weights[i]) / 2 * world.positions(bodies[i])[vertices[i]];
-      return sum;
-    };
-    for (const auto& c : data.vertexTriangle())
-      add(middle(c, {a, b, b, b}), c, c.timeOfImpact, 0, pair);
-    for (const auto& c : data.triangleVertex())
-      add(middle(c, {b, a, a, a}), c, c.timeOfImpact, 1, pair);
-    for (const auto& c : data.edgeEdge()) add(middle(c, {a, a, b, b}), c, c.timeOfImpact, 2, pair);
-    for (const auto& c : data.shape()) add((c.point + c.pointOnShape) / 2, c, 1, 3, pair);
-    for (const auto& c : data.shapeShape()) add((c.pointA + c.pointB) / 2, c, 1, 4, pair);
+    kinds.push_back(static_cast<double>(contact.kind));
+    pairs.push_back(static_cast<double>(contact.pair));
   }
   file.addPointField("distance", distances);
   file.addPointField("time of impact", times);

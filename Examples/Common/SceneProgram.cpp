@@ -1,8 +1,10 @@
 #include "SceneProgram.h"
 
 #include "CommandLine.h"
-#include "HtmlReport.h"
+#include "Figures.h"
 #include "ParaView.h"
+#include "Progress.h"
+#include "RunReport.h"
 #include "WriteFile.h"
 
 #include <palpate/Error.h>
@@ -18,9 +20,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <optional>
+#include <set>
+#include <string_view>
 #include <thread>
 #include <unistd.h>
 
@@ -36,42 +42,51 @@ struct Options {
   bool view = false;
   std::vector<int> pictures{};  // the first frame to draw, and the step from picture to picture
   std::array<int, 2> size{1600, 1000};
-  std::string keys{};
-};
-
-struct Column {
-  std::string name;
-  std::vector<double> values;
-  bool isTime;
+  std::string keys{}, unit{};
 };
 
 /// The figures of a run: a value for each column and frame.
 class RunLog {
  public:
-  void add(const std::string& name, double value, bool isTime = false) {
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  void add(const std::string& name, double value, double budget = kNone) {
     const auto column = std::find_if(m_columns.begin(), m_columns.end(),
-                                     [&](const Column& c) { return c.name == name; });
+                                     [&](const Series& c) { return c.name == name; });
     if (column != m_columns.end())
       column->values.push_back(value);
     else
-      m_columns.push_back({name, {value}, isTime});
+      m_columns.push_back({name, {value}, budget});
   }
-  const std::vector<Column>& columns() const { return m_columns; }
+  const std::vector<Series>& columns() const { return m_columns; }
+  const Series& column(std::string_view name) const {
+    return *std::find_if(m_columns.begin(), m_columns.end(),
+                         [name](const Series& column) { return column.name == name; });
+  }
+  /// The frames in which a column has its largest value.
+  std::set<int> worst() const {
+    std::set<int> frames;
+    for (const Series& column : m_columns) frames.insert(worstOf(column));
+    return frames;
+  }
+  static int worstOf(const Series& column) {
+    return static_cast<int>(std::max_element(column.values.begin(), column.values.end()) -
+                            column.values.begin());
+  }
 
   std::string csv() const {
     std::vector<report::Quantity> quantities;
-    for (const Column& column : m_columns) quantities.push_back({column.name, column.name});
+    for (const Series& column : m_columns) quantities.push_back({column.name, column.name});
     report::Figures figures({"frame"}, quantities);
     for (std::size_t frame = 0; frame < m_columns.front().values.size(); ++frame) {
       report::Figures::Row row{{std::to_string(frame)}, {}};
-      for (const Column& column : m_columns) row.values.push_back(column.values[frame]);
+      for (const Series& column : m_columns) row.values.push_back(column.values[frame]);
       figures.add(std::move(row));
     }
     return figures.csv();
   }
 
  private:
-  std::vector<Column> m_columns;
+  std::vector<Series> m_columns;
 };
 
 double quantile(std::vector<double> values, double share) {
@@ -79,43 +94,37 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-std::string summary(const RunLog& log, const SceneProgram& program) {
+/// A line for each column that is not zero throughout. "!" marks what exceeds the budget.
+std::string summary(const RunLog& log) {
   std::array<char, 256> line;
-  std::string text;
+  std::string text, zero;
   const auto add = [&](const char* format, auto... values) {
     text.append(line.data(), std::snprintf(line.data(), line.size(), format, values...));
   };
-  add("%-20s %10s %10s %10s %10s\n", "", "median", "p99", "worst", "budget");
-  for (const Column& column : log.columns()) {
-    const double budget = column.name == "frame ms"       ? program.frameMilliseconds
-                          : column.name == "collision ms" ? program.collisionMilliseconds
-                                                          : 0;
-    add("%-20s %10.3f %10.3f %10.3f", column.name.c_str(), quantile(column.values, 0.5),
-        quantile(column.values, 0.99), quantile(column.values, 1));
-    budget > 0 ? add(" %10.3f\n", budget) : add("\n");
+  add("%-20s %11s %11s %11s %11s\n", "", "median ", "p99 ", "worst ", "budget ");
+  for (const Series& column : log.columns()) {
+    if (std::all_of(column.values.begin(), column.values.end(), [](double v) { return v == 0; })) {
+      zero += (zero.empty() ? "" : ", ") + column.name;
+      continue;
+    }
+    add("%-20s", column.name.c_str());
+    for (const double share : {0.5, 0.99, 1.0}) {
+      const double value = quantile(column.values, share);
+      add(" %10.3f%c", value, value > column.budget ? '!' : ' ');
+    }
+    if (std::isfinite(column.budget)) add(" %10.3f", column.budget);
+    text.erase(text.find_last_not_of(' ') + 1);
+    text += '\n';
+  }
+  if (!zero.empty()) text += "zero in all frames   " + zero + "\n";
+  for (const Series& column : log.columns()) {
+    const auto over = std::count_if(column.values.begin(), column.values.end(),
+                                    [&](double value) { return value > column.budget; });
+    if (over > 0 && column.budget > 0)
+      add("%-20s %td of %zu frames exceed %g ms; the worst is frame %d\n", column.name.c_str(),
+          over, column.values.size(), column.budget, RunLog::worstOf(column));
   }
   return text;
-}
-
-/// Rows of the page: a group for the times, their histogram, and each other column.
-report::Figures pageFigures(const RunLog& log) {
-  report::Figures figures({"shown", "series", "frame"},
-                          {{"x", "frame (histogram: ms)"}, {"y", "value (histogram: frames)"}});
-  for (const Column& column : log.columns()) {
-    for (std::size_t frame = 0; frame < column.values.size(); ++frame)
-      figures.add({{column.isTime ? "times in ms" : column.name, column.name,
-                    "frame " + std::to_string(frame)},
-                   {static_cast<double>(frame), column.values[frame]}});
-    if (column.name != "frame ms") continue;
-    constexpr int kBins = 30;
-    const double width = quantile(column.values, 1) / kBins;
-    std::vector<double> bins(kBins + 1, 0.0);
-    for (const double value : column.values) ++bins[static_cast<std::size_t>(value / width)];
-    for (int bin = 0; bin <= kBins; ++bin)
-      figures.add({{"histogram", "frames", report::shortNumber((bin + 0.5) * width) + " ms"},
-                   {(bin + 0.5) * width, bins[bin]}});
-  }
-  return figures;
 }
 
 std::string machine() {
@@ -128,27 +137,29 @@ std::string machine() {
   return "unknown";
 }
 
-std::string page(const RunLog& log, const SceneProgram& program, const Options& options,
-                 const std::string& settings, std::uint64_t hash, const std::string& png) {
+std::string page(const RunReport& report, const RunLog& log, const SceneProgram& program,
+                 const Options& options, const std::string& settings, std::uint64_t hash) {
   std::array<char, 32> hashText;
   std::snprintf(hashText.data(), hashText.size(), "%016" PRIx64, hash);
-  report::View view{
-      .title = program.name,
-      .paragraphs = {program.description,
-                     "Settings: " + std::to_string(options.frames) + " frames, threads " +
-                         (options.threads == 0 ? "all" : std::to_string(options.threads)) +
-                         (settings.empty() ? "" : ", " + settings) + ". Machine: " + machine() +
-                         ". Hash of all contacts: " + hashText.data()},
-      .group = "shown",
-      .series = "series",
-      .label = "frame",
-      .first = "times in ms",
-      .x = "x",
-      .y = "y",
-      .lines = true,
-      .logX = false};
-  if (!png.empty()) view.pictures.push_back(png);
-  return report::toHtml(pageFigures(log), view);
+  const Series &slowest = log.column("frame ms"), &untrusted = log.column("untrusted pairs"),
+               &contacts = log.column("contacts");
+  const bool isTrusted = quantile(untrusted.values, 1) == 0;
+  int worst = isTrusted ? RunLog::worstOf(slowest) : 0;
+  const auto faults = [&](int frame) {
+    return std::pair(untrusted.values[frame], contacts.values[frame]);
+  };
+  for (int frame = 1; !isTrusted && frame < options.frames; ++frame)
+    if (faults(frame) > faults(worst)) worst = frame;
+  return report.html(
+      {program.name,
+       {program.description, "Settings: " + std::to_string(options.frames) + " frames, threads " +
+                                 (options.threads == 0 ? "all" : std::to_string(options.threads)) +
+                                 (settings.empty() ? "" : ", " + settings) + ". Machine: " +
+                                 machine() + ". Hash of all contacts: " + hashText.data()},
+       options.unit,
+       worst,
+       isTrusted ? "slowest" : "most pairs not trusted"},
+      log.columns());
 }
 
 #ifdef PALPATE_HAS_VTK
@@ -169,7 +180,7 @@ void prepare(vtk::Window& window, LiveScene& scene, const SceneProgram& program,
                          look.firstElement);
   const PictureView view = scene.view();
   window.setView({.from = view.from, .centre = view.centre, .height = view.height});
-  window.setLengthUnit(program.unit);
+  window.setLengthUnit(options.unit);
   for (const char key : program.keys + options.keys) window.press(key);
 }
 
@@ -231,18 +242,23 @@ std::uint64_t nextHash(std::uint64_t hash, World& world) {
   return hash;
 }
 
-void logFrame(RunLog& log, LiveScene& scene, double milliseconds) {
+void logFrame(RunLog& log, LiveScene& scene, const SceneProgram& program, double milliseconds) {
   const World::Times& times = scene.world().times();
-  log.add("frame ms", milliseconds, true);
-  log.add("collision ms", times.collision, true);
-  log.add("boxes ms", times.boxes, true);
-  log.add("octree ms", times.octree, true);
-  log.add("pairs ms", times.pairs, true);
-  log.add("narrow phase ms", times.narrowPhase, true);
-  log.add("order ms", times.order, true);
-  log.add("hold ms", times.hold, true);
-  log.add("solver ms", times.solver, true);
+  const auto budget = [](double given) { return given > 0 ? given : RunLog::kNone; };
+  log.add("frame ms", milliseconds, budget(program.frameMilliseconds));
   log.add("contacts", static_cast<double>(times.contacts));
+  double untrusted = 0;
+  for (const World::Pair& pair : scene.world().pairs())
+    untrusted += !scene.world().contacts(pair.a, pair.b).validity().trusted;
+  log.add("untrusted pairs", untrusted, 0);
+  log.add("collision ms", times.collision, budget(program.collisionMilliseconds));
+  log.add("boxes ms", times.boxes);
+  log.add("octree ms", times.octree);
+  log.add("pairs ms", times.pairs);
+  log.add("narrow phase ms", times.narrowPhase);
+  log.add("order ms", times.order);
+  log.add("hold ms", times.hold);
+  log.add("solver ms", times.solver);
   log.add("held particles", static_cast<double>(times.held));
   for (const auto& [name, value] : scene.values()) log.add(name, value);
 }
@@ -260,6 +276,8 @@ void run(const SceneProgram& program, Options options) {
   std::optional<ParaViewSeries> series;
   if (options.paraView) series.emplace(options.out / "paraview");
   RunLog log;
+  RunReport report(scene->world(), scene->looks(), scene->view());
+  Progress progress(program.name);
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (int frame = 0; frame < options.frames; ++frame) {
     scene->world().resetTimes();
@@ -268,9 +286,9 @@ void run(const SceneProgram& program, Options options) {
     const std::chrono::duration<double, std::milli> passed =
         std::chrono::steady_clock::now() - start;
     const std::string fault = scene->fault();
-    if (!fault.empty())
-      throw Error(ErrorCode::NotAvailable, "Frame " + std::to_string(frame) + ": " + fault);
-    logFrame(log, *scene, passed.count());
+    if (!fault.empty()) throw BrokenPromise("frame " + std::to_string(frame) + ": " + fault);
+    logFrame(log, *scene, program, passed.count());
+    report.add(scene->world(), frame, log.worst());
     hash = nextHash(hash, scene->world());
     if (series) series->add(scene->world());
 #ifdef PALPATE_HAS_VTK
@@ -283,10 +301,11 @@ void run(const SceneProgram& program, Options options) {
       writeWhole(options.out / "pictures" / name.data(), painter->png());
     }
 #endif
+    progress(frame + 1, options.frames);
   }
   const std::string settings = scene->settings();
   std::printf("%s, %d frames%s%s\n%s", program.name.c_str(), options.frames,
-              settings.empty() ? "" : ", ", settings.c_str(), summary(log, program).c_str());
+              settings.empty() ? "" : ", ", settings.c_str(), summary(log).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
   if (series) series->finish(program.name);
   std::unique_ptr<LiveScene> still;  // whose octrees are built for its very frame
@@ -300,7 +319,7 @@ void run(const SceneProgram& program, Options options) {
     std::printf("%-20s %s\n", "picture", (options.out / "scene.png").c_str());
   }
   writeWhole(options.out / "frames.csv", log.csv());
-  writeWhole(options.out / "report.html", page(log, program, options, settings, hash, png));
+  writeWhole(options.out / "report.html", page(report, log, program, options, settings, hash));
   std::printf("%-20s %s\n", "report", (options.out / "report.html").c_str());
 }
 
@@ -308,15 +327,21 @@ void run(const SceneProgram& program, Options options) {
 
 int runScene(const SceneProgram& program, int count, char** arguments) {
   CLI::App app(program.description, program.name);
-  Options options{.frames = program.frames};
+  Options options{.frames = program.frames, .unit = program.unit};
+  app.footer(
+      "Exit codes: 0 success; 1 the scene broke its promise; 2 a wrong call, or a file that cannot "
+      "be read or written.");
   app.add_option("--frames", options.frames, "frames to compute")
-      ->check(CLI::Range(1, 1'000'000))
+      ->check(between(1, 1'000'000))
       ->capture_default_str();
   app.add_option("--out", options.out, "folder for frames.csv, report.html and scene.png")
       ->capture_default_str();
   app.add_option("--threads", options.threads, "0: all cores")
-      ->check(CLI::Range(0, 1024))
+      ->check(between(0, 1024))
       ->capture_default_str();
+  if (program.isUnitFree)
+    app.add_option("--unit", options.unit, "the meshes' unit of length, as mm, for texts")
+        ->capture_default_str();
   app.add_flag("--paraview", options.paraView,
                "also write OUT/paraview: .vtp files of bodies, contacts and octree, and a .pvd");
 #ifdef PALPATE_HAS_VTK
@@ -329,18 +354,18 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
                  "from there")
       ->type_name("FIRST STEP")
       ->expected(2)
-      ->check(CLI::Range(0, 1'000'000));
+      ->check(between(0, 1'000'000));
   app.add_option("--size", options.size, "width and height of pictures, in pixels")
-      ->check(CLI::Range(1, 8192))
+      ->type_name("WIDTH HEIGHT")
+      ->check(between(1, 8192))
       ->capture_default_str();
   app.add_option("--keys", options.keys, "keys of the window, pressed before it shows anything");
 #endif
   if (program.addOptions) program.addOptions(app);
-  app.failure_message(
-      [](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   return exitCodeOf(app, [&] {
     app.parse(count, arguments);
     run(program, options);
+    return true;
   });
 }
 

@@ -51,7 +51,8 @@ class LiveScene {
   virtual World& world() = 0;
   /// The options of this run, for readers of its figures.
   virtual std::string settings() { return ""; }
-  /// Columns and values of the last computed frame. The columns are the same in every frame.
+  /// Columns and values of the last computed frame. The columns are the same in every frame. A name
+  /// ends with its unit, as "force mN"; that of a number or a share has none.
   virtual std::vector<std::pair<std::string, double>> values() { return {}; }
   /// The promise of the scene that the last computed frame breaks, as a sentence, or an empty text.
   virtual std::string fault() { return ""; }
@@ -69,6 +70,7 @@ struct SceneProgram {
   double collisionMilliseconds = 0;  ///< budget of its collision detection; 0: none
   std::string keys{};                ///< of vtk::Window, pressed before it shows anything
   std::string unit = "mm";           ///< of lengths
+  bool isUnitFree = false;           ///< lengths are those of the user's meshes: option --unit
   std::function<void(CLI::App&)> addOptions{};
   std::function<std::unique_ptr<LiveScene>(int threads)> make{};
 };
@@ -76,8 +78,8 @@ struct SceneProgram {
 /// main() of a scene: reads the command line, computes the frames, prints times beside budgets,
 /// writes frames.csv, report.html and, with a display, scene.png.
 ///
-/// Returns  the exit code. It is not 0 if the call is wrong or the scene broke its promise. Then
-///          one sentence gives the reason, and nothing is written.
+/// Returns  the exit code (CommandLine.h). If it is not 0, one sentence gives the reason, and
+///          nothing is written.
 int runScene(const SceneProgram&, int count, char** arguments);
 
 /// Throws Error if the file cannot be used, or if the program was built without mesh files.

@@ -334,17 +334,16 @@ int main(int count, char** arguments) {
   double seconds = 2;
   bool lockstep = false;
   std::filesystem::path folder;
-  CLI::App app("A haptic loop at 1 kHz beside a simulation at 60 Hz.");
+  CLI::App app("A haptic loop at 1 kHz beside a simulation at 60 Hz.", "Haptics");
   app.add_option("--strokes", strokes, "strokes of the tool over the organ")
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--seconds", seconds, "duration of a stroke")->check(CLI::Range(1.0, 60.0));
+      ->check(palpate::scenes::between(1, 1000));
+  app.add_option("--seconds", seconds, "duration of a stroke")
+      ->check(palpate::scenes::between(1.0, 60.0));
   app.add_flag("--lockstep", lockstep,
                "one thread on a clock of its own: the same forces each time");
   app.add_option("--out", folder, "the folder for haptics.csv and haptics.svg");
-  bool isSmooth = true;
-  const int code = palpate::scenes::exitCodeOf(app, [&] {
+  return palpate::scenes::exitCodeOf(app, [&] {
     app.parse(count, arguments);
-    isSmooth = palpate::scenes::run(strokes, seconds, lockstep, folder);
+    return palpate::scenes::run(strokes, seconds, lockstep, folder);
   });
-  return code == 0 && !isSmooth ? 2 : code;
 }

@@ -1,5 +1,6 @@
 // Five deforming organs, or the user's own meshes, glide through each other: contacts of each
 // frame, what each stage of it cost, and a picture.
+#include "CommandLine.h"
 #include "SceneProgram.h"
 #include "Scenes.h"
 
@@ -129,17 +130,22 @@ int main(int count, char** arguments) {
        .collisionMilliseconds = 1,
        .keys = "o",
        .unit = "L",
+       .isUnitFree = true,
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--mesh", options.meshes,
                             "OBJ, STL, PLY or VTK files to use instead of the organs");
-             app.add_option("--method", options.method,
-                            "auto, intersection, proximity or continuous")
-                 ->transform(CLI::CheckedTransformer(kMethods, CLI::ignore_case));
+             app.add_option_function<std::string>(
+                    "--method",
+                    [&](const std::string& name) { options.method = kMethods.at(name); },
+                    "how contacts are found (default: proximity)")
+                 ->type_name("METHOD")
+                 ->check(oneOf({"auto", "intersection", "proximity", "continuous"}));
              app.add_option("--thickness", options.thickness,
                             "distance under which two features touch, in the meshes' unit; a "
                             "twentieth of the mean edge if absent, and 0 for intersection and "
-                            "continuous");
+                            "continuous")
+                 ->check(between(0.0, 1e9));
            },
        .make = [&](int threads) { return std::make_unique<OrganScene>(options, threads); }},
       count, arguments);

@@ -5,6 +5,8 @@ column contacts | grep -qvx 0 || fail "no contacts"
 for stage in frame collision boxes octree pairs "narrow phase" order; do
   grep -q "^$stage ms " "$folder/text" || fail "no line for $stage"
 done
+grep -qE "^untrusted pairs +[0-9.]+! .* 0\.000$" "$folder/text" || fail "no mark above the budget: $(cat "$folder/text")"
+grep -q "^zero in all frames .*hold ms" "$folder/text" || fail "series of zeros are listed: $(cat "$folder/text")"
 grep -q "5 meshes, 10840 triangles, 10 pairs, proximity" "$folder/run/report.html" || fail "report.html has not the settings"
 for method in intersection proximity continuous auto; do
   run --method $method
@@ -14,6 +16,9 @@ refused --frames many
 refused --thickness -1
 refused --thickness nan
 refused --method guess
+grep -q '"guess" is none of auto, intersection, proximity, continuous' "$folder/messages" || fail "not in words: $(cat "$folder/messages")"
+run --unit furlong
+grep -q '"unit":"furlong"' "$folder/run/report.html" || fail "report.html has not the unit"
 refused --method proximity --thickness 0
 refused --mesh "$folder/missing.obj"
 if [[ $hasVtk == 1 ]]; then

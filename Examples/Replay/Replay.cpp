@@ -1,5 +1,6 @@
 // Runs a captured collision problem, compares it with brute force, and shrinks it while they
 // differ.
+#include "CommandLine.h"
 #include "Shrink.h"
 
 #include <palpate/Capture.h>
@@ -126,21 +127,14 @@ std::size_t triangleCount(const CollisionProblem& problem) {
 
 }  // namespace
 
-/// Returns 0: contacts equal those of brute force; 1: they differ; 2: the problem was not run.
+/// Exit codes as palpate-check: 1 if contacts differ from those of brute force.
 int main(int argc, char** argv) {
-  CLI::App app("Replays a captured collision problem and compares it with brute force.");
+  CLI::App app("Replays a captured collision problem and compares it with brute force.", "Replay");
   std::string file, out;
   app.add_option("file", file, "a capture")->required();
   app.add_option("--shrink", out, "file for a smaller problem that still differs");
-  try {
+  return scenes::exitCodeOf(app, [&] {
     app.parse(argc, argv);
-  } catch (const CLI::CallForHelp& help) {
-    return app.exit(help);
-  } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
-  try {
     const CollisionProblem problem = readCapture(file);
     const bool fails = report(problem);
     if (fails && !out.empty()) {
@@ -151,9 +145,6 @@ int main(int argc, char** argv) {
     } else if (!out.empty()) {
       std::puts("nothing to shrink");
     }
-    return fails ? 1 : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
+    return !fails;
+  });
 }

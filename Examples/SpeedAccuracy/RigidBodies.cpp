@@ -1,5 +1,6 @@
 #include "RigidBodies.h"
 
+#include "CommandLine.h"
 #include "RigidContestant.h"
 #include "Scenes.h"
 
@@ -188,6 +189,14 @@ Figures emptyRigidFigures() {
        {"contacts", "vertices reported a frame"}}};
 }
 
+std::vector<std::pair<std::string, std::string>> rigidRows() {
+  std::vector<std::pair<std::string, std::string>> rows;
+  for (const Moving& moving : {burr(), organ(), particles(1)})
+    for (const RigidContestant& contestant : rigidContestants(moving.tool.triangles.empty(), 1))
+      rows.emplace_back(moving.name, contestant.family);
+  return rows;
+}
+
 void measureRigidBodies(const RigidOptions& options,
                         const std::function<bool(const std::string&, const std::string&)>& isChosen,
                         Figures& figures, const std::function<void()>& save) {
@@ -228,9 +237,9 @@ void measureRigidBodies(const RigidOptions& options,
       std::fflush(stdout);
       save();
       if (value("silent") > 0)
-        throw Error(ErrorCode::NotAvailable,
-                    moving.name + ", " + contestant.family + ", " + contestant.setting +
-                        ": errors beyond the stated one that validity() does not name.");
+        throw scenes::BrokenPromise(
+            moving.name + ", " + contestant.family + ", " + contestant.setting +
+            ": errors beyond the stated one that validity() does not name.");
     }
   }
 }

@@ -4,6 +4,8 @@
 
 #include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace palpate::accuracy {
 
@@ -16,6 +18,9 @@ struct RigidOptions {
 
 /// The columns of measureRigidBodies().
 report::Figures emptyRigidFigures();
+
+/// The scene and the method of each row.
+std::vector<std::pair<std::string, std::string>> rigidRows();
 
 /// Measures the methods for rigid bodies: a tool, a deforming organ and particles at a generated
 /// bone. Skips rows that the figures have and those that `isChosen` rejects by scene and method.

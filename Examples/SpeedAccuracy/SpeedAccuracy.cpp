@@ -81,8 +81,7 @@ class SceneReference {
             referenceOf({scene.meshes[a], scene.meshes[b], before[a], now[a], before[b], now[b]},
                         kFineSubsteps));
         if (pairs.back().contradictions > 0)
-          throw Error(ErrorCode::NotAvailable,
-                      "Triangles intersect that do not touch by brute force.");
+          throw scenes::BrokenPromise("Triangles intersect that do not touch by brute force.");
       }
       before = now;
     }
@@ -221,8 +220,8 @@ report::View view() {
 void checkTrust(const Figures& figures) {
   for (const Figures::Row& row : figures.rows())
     if (row.values[figures.indexOf("wrong_trusted")] > 0)
-      throw Error(ErrorCode::NotAvailable, row.texts[0] + ", " + row.texts[1] + ", " +
-                                               row.texts[2] + ": answers wrong and trusted.");
+      throw scenes::BrokenPromise(row.texts[0] + ", " + row.texts[1] + ", " + row.texts[2] +
+                                  ": answers wrong and trusted.");
 }
 
 report::View rigidView() {
@@ -259,7 +258,21 @@ void runRigid(const Options& options) {
   std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
 }
 
+/// Each choice is part of the name of a scene or a method.
+void checkNames(const Options& options) {
+  std::vector<std::string> names, families;
+  for (const scenes::Scene& scene : scenes::hardScenes()) names.push_back(scene.name);
+  for (const Contestant& method : contestants()) families.push_back(method.family);
+  for (const auto& [scene, method] : rigidRows()) {
+    names.push_back(scene);
+    families.push_back(method);
+  }
+  scenes::checkChoices(options.scenes, names, "scene");
+  scenes::checkChoices(options.methods, families, "method");
+}
+
 void run(const Options& options) {
+  checkNames(options);
   std::filesystem::create_directories(options.out);
   const std::filesystem::path csv = options.out / "speed-accuracy.csv",
                               page = options.out / "report.html";
@@ -281,16 +294,16 @@ Options parse(CLI::App& app, int count, char** arguments) {
   app.add_option("--methods", options.methods, "only methods with one of these words in their name")
       ->delimiter(',');
   app.add_option("--frames", options.frames, "frames of each scene; the motion repeats after 24")
-      ->check(CLI::Range(1, 24))
+      ->check(scenes::between(1, 24))
       ->capture_default_str();
   app.add_option("--repetitions", options.repetitions, "timed passes through the 24 frames")
-      ->check(CLI::Range(1, 1000))
+      ->check(scenes::between(1, 1000))
       ->capture_default_str();
   app.add_option("--bone", options.rigid.triangles, "triangles of the bone, about")
-      ->check(CLI::Range(1000, 10'000'000))
+      ->check(scenes::between(1000, 10'000'000))
       ->capture_default_str();
   app.add_option("--particles", options.rigid.particles, "particles at the bone")
-      ->check(CLI::Range(1, 10'000'000))
+      ->check(scenes::between(1, 10'000'000))
       ->capture_default_str();
   app.add_flag("--again", options.again, "measure also rows that the CSV already has");
   app.parse(count, arguments);
@@ -301,5 +314,8 @@ Options parse(CLI::App& app, int count, char** arguments) {
 
 int main(int count, char** arguments) {
   CLI::App app("Cost and errors of each method on eight scenes.", "SpeedAccuracy");
-  return scenes::exitCodeOf(app, [&] { run(parse(app, count, arguments)); });
+  return scenes::exitCodeOf(app, [&] {
+    run(parse(app, count, arguments));
+    return true;
+  });
 }

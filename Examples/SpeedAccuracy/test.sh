@@ -42,6 +42,13 @@ run >"$folder/text" 2>"$folder/messages" || fail "the second run: $(cat "$folder
   fail "rigid bodies: $(cat "$folder/messages")"
 [[ $(wc -l <"$folder/rigid/rigid-bodies.csv") -eq 20 ]] || fail "rows are missing: $(cat "$folder/text")"
 
-"$program" --frames 0 >"$folder/text" 2>&1 && fail "not refused: --frames 0"
-[[ $(wc -l <"$folder/text") -le 2 ]] || fail "a long refusal: $(cat "$folder/text")"
+# Refused in one line, and nothing written.
+refused() {
+  "$program" --out "$folder/refused" "$@" >"$folder/text" 2>"$folder/messages"
+  [[ $? -eq 2 && $(wc -l <"$folder/messages") -eq 1 && ! -e $folder/refused ]] || fail "not refused: $*: $(cat "$folder/messages")"
+}
+refused --frames 0
+refused --scenes needel
+grep -q 'there is no scene "needel", but .*fast needle' "$folder/messages" || fail "scenes are not named: $(cat "$folder/messages")"
+refused --methods Guess
 echo passed

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -12,12 +13,17 @@ import pytest
 
 import palpate
 import sequences
-from palpate import check
+from palpate import _replay, check
 from palpate._exact import orientations, pierce
 from palpate._findings import Checker
+from palpate._replay import DIGITS, digits_of
 from palpate._sequence import find_sequence
 from scenes import ball
 from sequences import grid, made, write
+
+sys.path.append(os.path.join(os.environ["PALPATE_SOURCE"], "Testing", "Common"))
+import browser  # noqa: E402
+import report  # noqa: E402
 
 
 def run(folder, output, *options):
@@ -261,11 +267,47 @@ def test_the_page_needs_nothing_else(tmp_path):
     folder = made(sequences.pierced_membrane, tmp_path)
     run(folder, tmp_path / "out", "--svg")
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("<svg") == 2 and "<polygon" in page and "Timeline" in page
-    addresses = set(re.findall(r"https?://[^\"]*", page))
-    assert addresses == {"http://www.w3.org/2000/svg"} and "<script" not in page
-    link = re.search(r'href="([^"]+)"', page)[1]
+    assert page.count("<svg") == 1 and "<polygon" in page
+    assert set(re.findall(r"https?://[^\"]*", page)) == {"http://www.w3.org/2000/svg"}
+    link = re.search(r'href="(captures[^"]+)"', page)[1]
     assert (tmp_path / "out" / link).is_file()
+
+
+def data_of(page):
+    return json.loads(re.search(r'id="data">(.*?)</script>', page.read_text(), re.DOTALL)[1])
+
+
+def test_numbers_of_the_page():
+    for values in ([], [0], [91, 0], [92, 5], [8463, 1], [8464], [92**3, 92**4 - 1]):
+        width, *digits = (DIGITS.tolist().index(ord(c)) for c in digits_of(values))
+        numbers = np.array(digits, int).reshape(-1, width) @ 92 ** np.arange(width - 1, -1, -1)
+        assert numbers.tolist() == values and not set('"<\\') & set(digits_of(values))
+
+
+@pytest.mark.skipif(browser.PROGRAM is None, reason="chromium is not installed")
+@pytest.mark.parametrize("name", ["pierced_membrane", "thread_through_itself", "cloth_that_tears"])
+def test_the_page_in_a_browser(name, tmp_path):
+    folder = made(getattr(sequences, name), tmp_path)
+    run(folder, tmp_path / "out", "--svg")
+    assert report.check(tmp_path / "out" / "report.html") == []
+
+
+def test_the_page_of_a_clean_sequence(tmp_path):
+    run(made(sequences.falling_ball, tmp_path), tmp_path / "out")
+    data = data_of(tmp_path / "out" / "report.html")
+    assert data["series"] == [] and [f["at"] for f in data["replay"]["frames"]] == [*range(6)]
+
+
+def test_a_long_sequence_has_its_worst_frames_in_the_page(tmp_path, monkeypatch):
+    monkeypatch.setattr(_replay, "MOST_FRAMES", 3)
+    folder = made(sequences.pierced_membrane, tmp_path)
+    run(folder, tmp_path / "out", "--svg")
+    frames = [f["at"] for f in data_of(tmp_path / "out" / "report.html")["replay"]["frames"]]
+    assert len(frames) == 3 and 6 in frames
+    monkeypatch.setattr(_replay, "MOST_BYTES", 100)
+    run(folder, tmp_path / "out", "--svg")
+    data = data_of(tmp_path / "out" / "report.html")
+    assert "replay" not in data and "too large" in data["paragraphs"][-1]
 
 
 def test_pictures_by_vtk(tmp_path):

@@ -54,7 +54,7 @@ collisions.no_such_call()
 NO_FAULTS = r"""
 # these modules have their hints in their code, which mypy checks
 palpate\._(enums|errors|meshes|results|settings|shapes)\..*
-palpate\._(bodies|captures|exact|findings|frames|npz|pictures|progress|report|sequence)\..*
+palpate\._(bodies|captures|exact|findings|frames|npz|pictures|progress|replay|report|sequence)\..*
 palpate\.(check|cohort)\..*
 # mypy does not see that keyword-only fields are no positional patterns
 palpate\.(_\w+\.)?\w+\.__match_args__

@@ -58,7 +58,7 @@ def test_the_content(wheel, tmp_path):
     zipfile.ZipFile(wheel).extractall(tmp_path)
     package = tmp_path / "palpate"
     names = {path.name for path in package.iterdir()}
-    assert {"__init__.py", "_palpate.pyi", "py.typed", "LICENSE"} <= names
+    assert {"__init__.py", "_palpate.pyi", "_report.html", "py.typed", "LICENSE"} <= names
     files = {p.name for p in (SOURCE / "Source/Adapters/Python/palpate").glob("*.py*")}
     assert files - {"__pycache__"} <= names
     libraries = [path for path in package.iterdir() if ".so" in path.name]

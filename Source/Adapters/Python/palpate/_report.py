@@ -2,12 +2,14 @@
 
 import csv
 import html
+import json
 import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from palpate._findings import INSIDE, KINDS, Finding
 from palpate._sequence import Sequence
@@ -147,15 +149,6 @@ def _cells(group: Group) -> tuple[str, ...]:
     )
 
 
-STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 70em; color: #222 }
-table { border-collapse: collapse; margin: 1em 0 }
-th, td { padding: 0.2em 0.9em; text-align: left; border-bottom: 1px solid #ddd }
-td.n { text-align: right; font-variant-numeric: tabular-nums }
-figure { display: inline-block; margin: 0 1em 1em 0; vertical-align: top }
-figcaption { max-width: 30em; font-size: 13px }
-.k { display: inline-block; width: 0.8em; height: 0.8em; margin-right: 0.4em }
-"""
 ROWS_ON_THE_PAGE = 1000
 
 
@@ -165,25 +158,18 @@ def page_of(
     notes: Iterable[str],
     pictures: Iterable[Picture],
     captures: dict[tuple[int, str, str, str], Path],
+    replay: dict[str, Any],
 ) -> str:
-    """The HTML page. Paths of captures are relative to it."""
+    """The HTML page. Paths of captures are relative to it. replay: of replay_of()."""
     counts = summary.counts
-    parts = [
-        '<!doctype html><html lang="en"><meta charset="utf-8"><title>palpate-check</title>',
-        f"<style>{STYLE}</style><h1>palpate-check</h1>",
-        f"<p>{len(sequence.numbers)} frames. Bodies: ",
-        ", ".join(html.escape(body.name) for body in sequence.bodies) + ".</p>",
-    ]
-    parts += [f"<p>Note: {html.escape(note)}.</p>" for note in notes]
-    if not counts:
-        parts.append("<p>Nothing found.</p>")
-    else:
-        parts.append("<table><tr><th>kind<th>findings<th>meaning")
+    parts = []
+    if counts:
+        parts.append('<table><tr><th>kind<th>findings<th class="text">meaning')
         for kind, text in KINDS.items():
             if counts[kind]:
-                parts.append(f'<tr><td>{_key(kind)}{kind}<td class="n">{counts[kind]}<td>{text}')
+                number = counts[kind]
+                parts.append(f'<tr><td>{_key(kind)}{kind}<td>{number}<td class="text">{text}')
         parts.append("</table>")
-        parts.append("<h2>Timeline</h2>" + timeline(summary, sequence))
         shown = list(pictures)
         if shown:
             parts.append("<h2>Worst findings</h2>")
@@ -191,7 +177,36 @@ def page_of(
             caption = html.escape(_caption(picture.finding))
             parts.append(f"<figure>{picture.markup}<figcaption>{caption}</figcaption></figure>")
         parts.append(_table(summary, captures))
-    return "\n".join(parts) + "\n</html>\n"
+    place = {number: at for at, number in enumerate(sequence.numbers)}
+    series = {kind: [0] * len(place) for kind in KINDS if counts[kind]}
+    for (frame, kind, *_), group in summary.groups.items():
+        series[kind][place[frame]] += group.count
+    data: dict[str, Any] = {
+        "title": "palpate-check",
+        "paragraphs": [
+            f"{len(place)} frames. Bodies: {', '.join(b.name for b in sequence.bodies)}.",
+            *(f"Note: {note}." for note in notes),
+            *(() if counts else ("Nothing found.",)),
+        ],
+        "frames": sequence.numbers,
+        "series": [{"name": kind, "values": values} for kind, values in series.items()],
+    }
+    for each in data["series"]:
+        if each["name"] not in NO_FAULTS:
+            each["budget"] = 0
+    if sequence.times:
+        data["times"] = [sequence.times.get(number) for number in sequence.numbers]
+    worst = summary.worst(1)
+    if worst:
+        data["worst"] = {"at": place[worst[0].frame], "text": worst[0].kind}
+    if replay["frames"]:
+        data["replay"] = replay
+    else:
+        data["paragraphs"] += replay["notes"]
+    page = (resources.files("palpate") / "_report.html").read_text(encoding="utf-8")
+    text = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
+    body, script = page.split("{{body}}")
+    return "\n".join([body, *parts, script.replace("{{data}}", text)])
 
 
 def _caption(finding: Finding) -> str:
@@ -207,8 +222,8 @@ def _key(kind: str) -> str:
 
 
 def _table(summary: Summary, captures: dict[tuple[int, str, str, str], Path]) -> str:
-    rows = ["<h2>Frames</h2><table><tr><th>frame<th>kind<th>bodies<th>findings<th>depth<th>time"]
-    rows[0] += "<th>worst<th>capture"
+    rows = ['<h2>Frames</h2><table><tr><th>frame<th class="text">kind<th class="text">bodies']
+    rows[0] += '<th>findings<th>depth<th>time<th class="text">worst<th class="text">capture'
     groups = list(summary.groups.values())
     for group in groups[:ROWS_ON_THE_PAGE]:
         cells = [html.escape(cell) for cell in _cells(group)]
@@ -216,44 +231,10 @@ def _table(summary: Summary, captures: dict[tuple[int, str, str, str], Path]) ->
         path = captures.get(group.worst.group)
         link = f'<a href="{html.escape(path.as_posix())}">capture</a>' if path else ""
         rows.append(
-            f'<tr><td class="n">{frame}<td>{_key(group.worst.kind)}{kind}<td>{bodies}'
-            f'<td class="n">{count}<td class="n">{depth}<td class="n">{time}<td>{worst}<td>{link}'
+            f'<tr><td>{frame}<td class="text">{_key(group.worst.kind)}{kind}'
+            f'<td class="text">{bodies}<td>{count}<td>{depth}<td>{time}<td class="text">{worst}<td class="text">{link}'
         )
     rows.append("</table>")
     if len(groups) > ROWS_ON_THE_PAGE:
         rows.append(f"<p>{len(groups) - ROWS_ON_THE_PAGE} more rows are in report.txt.</p>")
     return "\n".join(rows)
-
-
-def timeline(summary: Summary, sequence: Sequence) -> str:
-    """An SVG with a row for each kind: where the frames with findings are, and how many."""
-    kinds = [kind for kind in KINDS if summary.counts[kind]]
-    place = {number: i for i, number in enumerate(sequence.numbers)}
-    bins = min(len(sequence.numbers), 400)
-    left, width, height = 130, 800, 26
-    most: dict[tuple[str, int], int] = {}
-    for (frame, kind, *_), group in summary.groups.items():
-        bar_at = (kind, place[frame] * bins // len(sequence.numbers))
-        most[bar_at] = most.get(bar_at, 0) + group.count
-    top = math.log1p(max(most.values()))
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{left + width + 20}" '
-        f'height="{height * len(kinds) + 30}" font-size="12" font-family="sans-serif">'
-    ]
-    for row, kind in enumerate(kinds):
-        base = (row + 1) * height
-        parts.append(f'<text x="0" y="{base - 6}">{kind}</text>')
-        parts.append(f'<path d="M{left} {base}h{width}" stroke="#ccc"/>')
-        for at in range(bins):
-            if count := most.get((kind, at), 0):
-                bar = 4 + (height - 8) * math.log1p(count) / top
-                first = sequence.numbers[-(-at * len(sequence.numbers) // bins)]
-                parts.append(
-                    f'<rect x="{left + at * width / bins:.1f}" y="{base - bar:.1f}" '
-                    f'width="{max(width / bins, 1.5):.1f}" height="{bar:.1f}" '
-                    f'fill="{COLOURS[kind]}"><title>frame {first}: {count}</title></rect>'
-                )
-    base, last = height * len(kinds) + 18, sequence.numbers[-1]
-    parts.append(f'<text x="{left}" y="{base}">frame {sequence.numbers[0]}</text>')
-    parts.append(f'<text x="{left + width}" y="{base}" text-anchor="end">{last}</text></svg>')
-    return "".join(parts)

@@ -21,7 +21,9 @@ from palpate._findings import Checker, Finding
 from palpate._frames import Reader
 from palpate._pictures import drawn, pictures_of
 from palpate._progress import Progress
+from palpate._replay import replay_of
 from palpate._report import (
+    COLOURS,
     NO_FAULTS,
     FindingsTable,
     Picture,
@@ -34,6 +36,7 @@ from palpate.cohort import add_cluster_options, run
 
 LONGEST_TASK = 25  # frames
 ROWS_ON_THE_TERMINAL = 30
+IMPORTANT_FRAMES = 200  # that the 3D view holds before others
 
 HELP = """\
 Finds what is wrong in the frames that a simulator wrote: penetrations of two bodies,
@@ -62,7 +65,7 @@ bodies in a TOML file:
 files in the output folder:
   findings.csv  a row for each finding
   report.txt    a row for each frame, kind and pair of bodies
-  report.html   the same with a timeline and pictures
+  report.html   the same with pictures and the frames in 3D
   captures/     the worst findings as captures of a few elements, for palpate.read_capture()
 
 exit status:
@@ -230,7 +233,9 @@ def _write_report(
     scenes = [drawn(sequence, reader, finding) for finding in worst]
     markup = pictures_of(scenes, vtk=not options.svg)
     pictures = [Picture(f, m) for f, m in zip(worst, markup, strict=True)]
-    page = page_of(summary, sequence, notes, pictures, captures)
+    important = dict.fromkeys(finding.frame for finding in summary.worst(IMPORTANT_FRAMES))
+    replay = replay_of(sequence, reader, options.output / "findings.csv", important, COLOURS)
+    page = page_of(summary, sequence, notes, pictures, captures, replay)
     (options.output / "report.html").write_text(page, encoding="utf-8")
     (options.output / "report.txt").write_text(
         text_of(summary, sequence, notes), encoding="utf-8"
