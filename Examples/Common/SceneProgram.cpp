@@ -208,9 +208,9 @@ class Painter {
         m_window(scene.world().detection(), false, 2 * options.size[0], 2 * options.size[1]) {
     prepare(m_window, scene, program, options);
   }
-  std::string png() {
+  std::string png(int frame) {
     place(m_scene.world());
-    m_window.show();
+    m_window.show(frame);
     return vtk::toPng(halved(m_window.image()));
   }
 
@@ -222,10 +222,10 @@ class Painter {
 
 /// Prints the reason if there is none.
 std::string picture([[maybe_unused]] LiveScene& scene, [[maybe_unused]] const SceneProgram& program,
-                    [[maybe_unused]] const Options& options) {
+                    [[maybe_unused]] const Options& options, [[maybe_unused]] int frame) {
 #ifdef PALPATE_HAS_VTK
   try {
-    return Painter(scene, program, options).png();
+    return Painter(scene, program, options).png(frame);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::NotAvailable) throw;
     std::printf("no picture           %s\n", error.what());
@@ -293,12 +293,12 @@ void run(const SceneProgram& program, Options options) {
     if (series) series->add(scene->world());
 #ifdef PALPATE_HAS_VTK
     if (window) place(scene->world());
-    if (window && !window->show()) options.frames = frame + 1;
+    if (window && !window->show(frame)) options.frames = frame + 1;
     if (painter && frame >= options.pictures[0] &&
         (frame - options.pictures[0]) % std::max(1, options.pictures[1]) == 0) {
       std::array<char, 32> name;
       std::snprintf(name.data(), name.size(), "%06d.png", frame);
-      writeWhole(options.out / "pictures" / name.data(), painter->png());
+      writeWhole(options.out / "pictures" / name.data(), painter->png(frame));
     }
 #endif
     progress(frame + 1, options.frames);
@@ -309,11 +309,13 @@ void run(const SceneProgram& program, Options options) {
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
   if (series) series->finish(program.name);
   std::unique_ptr<LiveScene> still;  // whose octrees are built for its very frame
-  if (const std::optional<int> frame = scene->frameToShow()) {
+  const std::optional<int> chosen = scene->frameToShow();
+  if (chosen) {
     still = program.make(options.threads);
-    still->computeFrame(*frame);
+    still->computeFrame(*chosen);
   }
-  const std::string png = picture(*(still ? still : scene), program, options);
+  const std::string png =
+      picture(*(still ? still : scene), program, options, chosen.value_or(options.frames - 1));
   if (!png.empty()) {
     writeWhole(options.out / "scene.png", png);
     std::printf("%-20s %s\n", "picture", (options.out / "scene.png").c_str());
@@ -359,7 +361,13 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
       ->type_name("WIDTH HEIGHT")
       ->check(between(1, 8192))
       ->capture_default_str();
-  app.add_option("--keys", options.keys, "keys of the window, pressed before it shows anything");
+  app.add_option("--keys", options.keys, "keys of the window, pressed before it shows anything")
+      ->check(CLI::Validator(
+          [](std::string& keys) -> std::string {
+            const auto unknown = std::find_if_not(keys.begin(), keys.end(), vtk::Window::hasKey);
+            return unknown == keys.end() ? "" : std::string("the window has no key ") + *unknown;
+          },
+          ""));
 #endif
   if (program.addOptions) program.addOptions(app);
   return exitCodeOf(app, [&] {

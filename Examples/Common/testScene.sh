@@ -46,6 +46,8 @@ if [[ $hasVtk == 1 ]]; then
   refused --pictures 0 1
   refused --size 0 100
   refused --size 100
+  refused --keys nx
+  grep -q "the window has no key x" "$folder/messages" || fail "the key is not named: $(cat "$folder/messages")"
 fi
 refused --frames 0
 grep -q -- '--frames: "0" is not a whole number from 1 to 1000000; see --help$' "$folder/messages" || fail "not in words: $(cat "$folder/messages")"

@@ -39,6 +39,9 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
     const PlacedShape& shape = *record.shape().body.shape;
     findElementsNear(record.mesh().body, record.plan.swept() ? shape.before : shape.now, shape.now,
                      record.meshes().maxFeatureDistance(), scratch.elements);
+    scratch.candidateCount = scratch.elements.size();
+  } else {
+    scratch.candidateCount = 1;
   }
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;

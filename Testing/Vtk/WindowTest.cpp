@@ -148,6 +148,34 @@ TEST_F(WindowOnOrgans, PanelAndNamesAreShownOnDemand) {
   EXPECT_NE(window.image().rgb, named.rgb);
 }
 
+TEST_F(WindowOnOrgans, PanelHasTheFramesNumber) {
+  Window window(detection, false, 640, 480);
+  window.press('p');
+  const auto changes = [&](int frame, const Image& than) {  // of the panel's first line
+    window.show(frame);
+    return differencesOf(window.image(), than, [](int x, int y) { return x < 320 && y >= 466; })
+        .inside;
+  };
+  window.show();  // 0
+  const Image first = window.image();
+  EXPECT_GT(changes(170, first), 10u);
+  EXPECT_EQ(changes(0, first), 0u);
+  EXPECT_GT(changes(-1, first), 0u);  // 1
+}
+
+TEST_F(WindowOnOrgans, UnknownKeysAreReported) {
+  Window window(detection, false, 320, 240);
+  window.show();
+  const Image image = window.image();
+  EXPECT_FALSE(Window::hasKey('x'));
+  window.press('x');
+  EXPECT_NE(window.image().rgb, image.rgb);
+  EXPECT_TRUE(Window::hasKey('n'));
+  window.press('n');
+  window.press('n');
+  EXPECT_EQ(window.image().rgb, image.rgb);
+}
+
 TEST(Window, AppearanceAndViewAreHonoured) {
   const scenes::SceneMesh ball = scenes::sphere(6);
   OctreeBasedCD detection;

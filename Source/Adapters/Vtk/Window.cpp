@@ -44,6 +44,7 @@
 #include <ctime>
 #include <map>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 // X11's header defines these as macros.
@@ -100,7 +101,7 @@ struct Window::Implementation {
   Clock::time_point lastShow{};
   double framesPerSecond = 0;
   Cells cells = Cells::None;
-  int frames = 0;
+  int frames = 0, frame = -1;
   bool contacts = true, normals = true, untrusted = true, names = true, panel = false,
        translucent = false, isOpen = true, waits = false, isNew = true;
 
@@ -112,6 +113,8 @@ struct Window::Implementation {
   }
 
   void press(char key) {
+    const std::string unknown = std::string("no key ") + key + "; see Docs/Scenes.md";
+    pickedText->SetInput(hasKey(key) || key <= ' ' ? picked.c_str() : unknown.c_str());
     for (const auto& [name, flag] : {std::pair('c', &contacts),
                                      {'n', &normals},
                                      {'u', &untrusted},
@@ -298,7 +301,7 @@ void Window::Implementation::drawAnnotations() {
   }
   if (!panel) return;
   const auto name = [this](GeometryId id) { return nameOf(id); };
-  panelText->SetInput(vtk::panelText(detection, name, frames, framesPerSecond).c_str());
+  panelText->SetInput(vtk::panelText(detection, name, frame, framesPerSecond).c_str());
   vtkTextProperty* look = panelText->GetTextProperty();
   setTextLook(look, text * 4 / 5);
   look->SetFontFamilyToCourier();
@@ -446,8 +449,10 @@ void Window::setView(const View& view) {
 
 void Window::setLengthUnit(std::string unit) { m_implementation->unit = std::move(unit); }
 
-bool Window::show() {
+bool Window::show(int frame) {
   Implementation& own = *m_implementation;
+  own.frame = frame < 0 ? own.frame + 1 : frame;
+  own.window->SetWindowName(("Palpate, frame " + std::to_string(own.frame)).c_str());
   own.take();
   own.measureFrameRate();
   own.times.add(own.detection.statistics().milliseconds);
@@ -456,6 +461,10 @@ bool Window::show() {
   for (own.interactor->ProcessEvents(); own.waits && own.isOpen; own.interactor->ProcessEvents())
     nanosleep(&kPause, nullptr);
   return own.isOpen;
+}
+
+bool Window::hasKey(char key) {
+  return std::string_view("cnulpb otrq").find(key) != std::string_view::npos;
 }
 
 void Window::press(char key) {

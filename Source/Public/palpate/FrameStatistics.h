@@ -33,7 +33,8 @@ struct FrameStatistics {
   std::size_t triangles = 0, segments = 0, points = 0;  ///< elements of all geometries
   std::size_t untestedVertices = 0;                     ///< of no enabled element
   std::size_t rebuiltOctrees = 0, refittedOctrees = 0, unchangedOctrees = 0;
-  /// For the narrow phase; of two placed bodies fewer than those of forEachCandidate().
+  /// For the narrow phase; of two placed bodies fewer than those of forEachCandidate(). Of an
+  /// analytical shape: the elements near it, and 1 for another shape.
   std::size_t candidatePairs = 0;
   std::size_t featurePairs = 0;           ///< owned by candidates; Intersection counts none
   std::size_t contacts = 0;               ///< of all lists of contacts

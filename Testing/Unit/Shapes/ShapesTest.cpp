@@ -247,6 +247,21 @@ TEST(Shapes, CubeOnTableTouchesWithItsCorners) {
   }
 }
 
+TEST(Shapes, CandidatesAreTheElementsNearby) {
+  OctreeBasedCD collisions;
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 100; ++i) points.emplace_back(i, 0, 0);
+  const GeometryId cloud = collisions.addPointSet(points),
+                   ball = collisions.addAnalyticalGeometry(Sphere{{50, 0, 0}, 2.5}),
+                   other = collisions.addAnalyticalGeometry(Sphere{{0, 80, 0}, 1});
+  collisions.addCollisionPair(cloud, ball, {.method = Method::Proximity, .thickness = 0.1});
+  collisions.addCollisionPair(ball, other, {.method = Method::Proximity, .thickness = 0.1});
+  collisions.detectCollision();
+  EXPECT_EQ(collisions.pairStatistics(cloud, ball).candidatePairs, 5u);
+  EXPECT_EQ(collisions.pairStatistics(ball, other).candidatePairs, 1u);
+  EXPECT_EQ(collisions.statistics().candidatePairs, 6u);
+}
+
 TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
   const TestGeometry triangle =
       testGeometry(Mesh{{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}, {{0, 1, 2}}});

@@ -61,8 +61,11 @@ class PALPATE_EXPORT Window {
   /// InvalidSettings if not finite, for parallel directions or length 0, or height < 0.
   void setView(const View&);
   void setLengthUnit(std::string);  ///< the name of L in the picture, such as "mm"
-  bool show();                      ///< draws the last frame and handles input; false once closed
-  void press(char key);             ///< does what the key does
+  /// Draws the last frame and handles input; false once closed. frame: its number in the panel and
+  /// the title; negative: one more than before, from 0.
+  bool show(int frame = -1);
+  void press(char key);          ///< does what the key does; a text in the picture if it has none
+  static bool hasKey(char key);  ///< whether a key does something
   /// Does what a click does, at pixels from the bottom left; names the element or nothing.
   std::string pick(int x, int y);
   Image image() const;  ///< the picture that the window shows
