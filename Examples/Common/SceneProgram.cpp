@@ -303,9 +303,10 @@ void run(const SceneProgram& program, Options options) {
 #endif
     progress(frame + 1, options.frames);
   }
-  const std::string settings = scene->settings();
-  std::printf("%s, %d frames%s%s\n%s", program.name.c_str(), options.frames,
-              settings.empty() ? "" : ", ", settings.c_str(), summary(log).c_str());
+  const std::string own = scene->settings(),
+                    settings = own + (own.empty() ? "" : ", ") + "lengths in " + options.unit;
+  std::printf("%s, %d frames, %s\n%s", program.name.c_str(), options.frames, settings.c_str(),
+              summary(log).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
   if (series) series->finish(program.name);
   std::unique_ptr<LiveScene> still;  // whose octrees are built for its very frame

@@ -71,7 +71,7 @@ class FastNeedle : public LiveScene {
     std::vector<std::pair<std::string, double>> values;
     for (const Lane& lane : m_lanes) {
       values.emplace_back(m_world.bodies()[lane.needle].name + " passed", lane.passed);
-      values.emplace_back(m_world.bodies()[lane.needle].name + " force",
+      values.emplace_back(m_world.bodies()[lane.needle].name + " force mN",
                           m_world.force(lane.needle).norm());
     }
     return values;

@@ -119,7 +119,7 @@ class Suturing : public LiveScene {
   }
 
   std::vector<std::pair<std::string, double>> values() override {
-    return {{"time", m_time},
+    return {{"substeps", m_time},
             {"stretch", stretch()},
             {"holes", m_holes[0] + m_holes[1]},
             {"touches itself", m_world.contacts(m_thread, m_thread).edgeEdge().size()},

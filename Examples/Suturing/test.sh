@@ -5,6 +5,6 @@ long=300
 column stretch | awk '$1 > 1.1 { exit 1 }' || fail "the thread is stretched"
 if [[ $length == long ]]; then
   [[ $(column holes | tail -1) == 2 ]] || fail "the needle pierced one sheet only"
-  [[ $(column time | tail -1) -ge 1000 ]] || fail "the needle was held for good"
+  [[ $(column substeps | tail -1) -ge 1000 ]] || fail "the needle was held for good"
   [[ $(column "touches itself" | tail -1) -ge 3 ]] || fail "the thread does not hold itself"
 fi

@@ -2,6 +2,7 @@
 // fields and proxies. The program fails if an error exceeds the stated one and validity() does not
 // name it.
 #include "Common/RandomMeshes.h"
+#include "CommandLine.h"
 #include "Figures.h"
 #include "RigidContestant.h"
 #include "WriteFile.h"
@@ -180,14 +181,18 @@ bool measure(const BodySweep& sweep, double value, const Options& options,
 int main(int count, char** arguments) {
   CLI::App app("The difficulty at which fields and proxies start to fail.", "palpate_bodies");
   Options options;
+  std::vector<std::string> names;
+  for (const BodySweep& sweep : sweeps()) names.push_back(sweep.name);
   app.add_option("--out", options.out, "folder for stability-bodies.csv");
-  app.add_option("--sweep", options.sweeps, "only these sweeps")->delimiter(',');
+  app.add_option("--sweep", options.sweeps, "only these sweeps")
+      ->delimiter(',')
+      ->check(scenes::oneOf(names));
   app.add_option("--particles", options.particles, "of each step")->capture_default_str();
   app.add_option("--steps", options.steps, "steps of each sweep")
-      ->check(CLI::Range(2, 100))
+      ->check(scenes::between(2, 100))
       ->capture_default_str();
-  CLI11_PARSE(app, count, arguments);
-  try {
+  return scenes::exitCodeOf(app, [&] {
+    app.parse(count, arguments);
     report::Figures figures = emptyFigures();
     int faults = 0;
     for (const BodySweep& sweep : sweeps()) {
@@ -203,9 +208,6 @@ int main(int count, char** arguments) {
       std::filesystem::create_directories(options.out);
       scenes::writeWhole(options.out / "stability-bodies.csv", figures.csv());
     }
-    return faults > 0 ? 1 : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+    return faults == 0;
+  });
 }

@@ -1,6 +1,7 @@
 // Sweeps of two triangles that meet. Each sweep makes one property more difficult, and the program
 // counts the errors of each method. It fails if a result is not finite or violates the definition
 // of its method. Docs/Figures/stability.py draws the chart from the CSV.
+#include "CommandLine.h"
 #include "HtmlReport.h"
 #include "Tally.h"
 #include "WriteFile.h"
@@ -153,13 +154,6 @@ report::View view() {
   return view;
 }
 
-void checkNames(const std::vector<std::string>& names) {
-  const std::vector<Sweep> all = sweeps();
-  for (const std::string& name : names)
-    if (std::none_of(all.begin(), all.end(), [&](const Sweep& s) { return s.name == name; }))
-      throw std::invalid_argument("There is no sweep \"" + name + "\"");
-}
-
 void write(const Options& options, const report::Figures& figures) {
   std::filesystem::create_directories(options.out);
   scenes::writeWhole(options.out / "stability.csv", figures.csv());
@@ -172,24 +166,24 @@ void write(const Options& options, const report::Figures& figures) {
 int main(int count, char** arguments) {
   CLI::App app("The difficulty at which each method starts to fail.", "palpate_stability");
   Options options;
+  std::vector<std::string> names;
+  for (const Sweep& sweep : sweeps()) names.push_back(sweep.name);
   app.add_option("--out", options.out, "folder for stability.csv and report.html");
-  app.add_option("--sweep", options.sweeps, "only these sweeps")->delimiter(',');
+  app.add_option("--sweep", options.sweeps, "only these sweeps")
+      ->delimiter(',')
+      ->check(scenes::oneOf(names));
   app.add_option("--cases", options.cases, "random cases for each step")->capture_default_str();
   app.add_option("--steps", options.steps, "steps of each sweep")
-      ->check(CLI::Range(2, 28))
+      ->check(scenes::between(2, 28))
       ->capture_default_str();
   app.add_flag("--redraw", options.redraw, "writes the page again, from stability.csv in --out");
-  CLI11_PARSE(app, count, arguments);
-  try {
-    checkNames(options.sweeps);
+  return scenes::exitCodeOf(app, [&] {
+    app.parse(count, arguments);
     report::Figures figures = emptyFigures();
     if (options.redraw) figures.addFrom(options.out / "stability.csv");
     const int faults = options.redraw ? 0 : measure(options, figures);
     if (!options.out.empty()) write(options, figures);
     if (faults > 0) std::printf("%d faults\n", faults);
-    return faults > 0 ? 1 : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+    return faults == 0;
+  });
 }
