@@ -20,7 +20,8 @@ constexpr std::string_view kPage =
 #include "RunReportPage.inc"
     ;
 
-constexpr std::size_t kMostBytes = 7'500'000, kMostTriangles = 60'000, kMostPoints = 10'000;
+constexpr std::size_t kMostBytes = 7'500'000, kMostTriangles = 60'000, kMostPoints = 10'000,
+                      kMostContacts = 4'000;
 
 constexpr std::uint32_t kDigits = 92, kSteps = kDigits * kDigits - 1;
 
@@ -137,9 +138,14 @@ struct RunReport::Implementation {
     std::vector<Cells> cells;
     std::vector<std::pair<World::BodyId, const std::string*>> untrusted;  ///< vertices
     const std::string *contacts, *ids;
-    Eigen::AlignedBox3d box;                          ///< of the contacts
-    double least, most;                               ///< distances
-    std::vector<std::pair<const char*, bool>> pairs;  ///< method, and whether it is trusted
+    Eigen::AlignedBox3d box;  ///< of the contacts
+    double least, most;       ///< distances
+    struct Pair {
+      const char* method;
+      bool trusted;
+      std::size_t contacts;
+    };
+    std::vector<Pair> pairs;
     template <class F>
     void forEachBlock(F&& f) const {
       for (const Placed& body : bodies) f(body.block);
@@ -156,6 +162,7 @@ struct RunReport::Implementation {
   std::map<std::string, int> uses;  ///< of each block
   std::size_t bytes = 0;
   int stride = 1;
+  bool hasMoreContacts = false;
   std::vector<Frame> frames;
 
   const std::string* keep(const std::vector<std::uint32_t>& numbers) {
@@ -259,7 +266,13 @@ std::vector<RunReport::Implementation::Cells> RunReport::Implementation::cellsOf
 
 /// 13 numbers and 4 ids of each, as contactsOf() of the page reads them.
 void RunReport::Implementation::addContacts(World& world, Frame& frame) {
-  const std::vector<ContactPoint> points = contactPoints(world);
+  std::vector<ContactPoint> points = contactPoints(world);
+  for (const ContactPoint& point : points) ++frame.pairs[point.pair].contacts;
+  if (const std::size_t each = points.size() / kMostContacts + 1; each > 1) {
+    for (std::size_t i = 0; each * i < points.size(); ++i) points[i] = points[each * i];
+    points.resize((points.size() + each - 1) / each);
+    hasMoreContacts = true;
+  }
   frame.least = frame.most = 0;
   frame.box.extend(Vector3d::Zero());
   for (const ContactPoint& point : points) {
@@ -305,13 +318,12 @@ void RunReport::add(World& world, int frame, const std::set<int>& worst) {
   Implementation::Frame added{};
   added.number = frame;
   added.cells = own.cellsOf(world);
-  own.addContacts(world, added);
   for (World::BodyId id = 0; id < world.bodies().size(); ++id)
     added.bodies.push_back(own.place(world, id));
   std::map<World::BodyId, std::set<std::uint32_t>> untrusted;
   for (const World::Pair& pair : world.pairs()) {
     const Validity& validity = world.contacts(pair.a, pair.b).validity();
-    added.pairs.emplace_back(toString(validity.method), validity.trusted);
+    added.pairs.push_back({toString(validity.method), validity.trusted, 0});
     for (const auto& [body, vertices] : {std::pair(pair.a, &validity.untrustedVerticesA),
                                          std::pair(pair.b, &validity.untrustedVerticesB)})
       if (own.shown[body].isWhole) untrusted[body].insert(vertices->begin(), vertices->end());
@@ -319,6 +331,7 @@ void RunReport::add(World& world, int frame, const std::set<int>& worst) {
   for (const auto& [body, vertices] : untrusted)
     if (!vertices.empty())
       added.untrusted.emplace_back(body, own.keep({vertices.begin(), vertices.end()}));
+  own.addContacts(world, added);
   own.frames.push_back(std::move(added));
   if (own.bytes > kMostBytes) own.dropFramesBut(worst);
   while (own.bytes > kMostBytes && own.frames.size() > worst.size() + 1) {
@@ -378,10 +391,13 @@ std::string RunReport::html(const Text& text, std::span<const Series> series) co
           {{"body", body}, {"block", indexOf(block)}, {"low", numbers({low})}, {"size", size}});
     for (const auto& [body, block] : frame.untrusted)
       at["untrusted"].push_back({{"body", body}, {"block", indexOf(block)}});
-    for (const auto& [method, trusted] : frame.pairs)
-      at["pairs"].push_back({{"method", method}, {"trusted", trusted}});
+    for (const auto& [method, trusted, contacts] : frame.pairs)
+      at["pairs"].push_back({{"method", method}, {"trusted", trusted}, {"count", contacts}});
     replay["frames"].push_back(std::move(at));
   }
+  if (own.hasMoreContacts)
+    replay["notes"].push_back("At most " + std::to_string(kMostContacts) +
+                              " contacts of a frame are shown.");
   json["replay"] = std::move(replay);
   return report::filled(report::replaced(std::string(kPage), "{{body}}", ""), json);
 }

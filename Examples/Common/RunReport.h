@@ -22,10 +22,10 @@ struct Series {
 /// The report of a run as one HTML page that needs no other file and no network: its frames in 3D,
 /// and a row for each series.
 ///
-/// Bounds   positions are rounded to 16 bits of their box. When the frames exceed 7.5 MB, the page
+/// Bounds   positions are rounded to 1/8463 of their box. When the frames exceed 7.5 MB, the page
 ///          holds every second, fourth ... frame, and those in which a series is worst. Meshes of
-///          more than 60,000 triangles are simplified on a grid, and of more than 10,000 points
-///          every n-th is shown.
+///          more than 60,000 triangles are simplified on a grid. Every n-th is shown of more than
+///          10,000 points, and of more than 4,000 contacts of a frame.
 class RunReport {
  public:
   struct Text {
