@@ -8,6 +8,9 @@ done
 grep -qE "^untrusted pairs +[0-9.]+! .* 0\.000$" "$folder/text" || fail "no mark above the budget: $(cat "$folder/text")"
 grep -q "^zero in all frames .*hold ms" "$folder/text" || fail "series of zeros are listed: $(cat "$folder/text")"
 grep -q "5 meshes, 10840 triangles, 10 pairs, proximity" "$folder/run/report.html" || fail "report.html has not the settings"
+[[ ! -s $folder/messages ]] || fail "a short run writes to a log: $(cat "$folder/messages")"
+script -qec "'$program' --frames 3 --out '$folder/run'" /dev/null >"$folder/terminal" || fail "no terminal"
+grep -q '\[#*\] OrganScene: frame 3 of 3, ' "$folder/terminal" || fail "no bar on a terminal: $(cat "$folder/terminal")"
 for method in intersection proximity continuous auto; do
   run --method $method
   column contacts | grep -qvx 0 || fail "no contacts with $method"
