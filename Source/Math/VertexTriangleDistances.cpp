@@ -7,47 +7,16 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "Math/VertexTriangleDistances.cpp"
 #include "Core/Simd.h"
+#include "Math/CompensatedLanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The arithmetic of Foot.cpp and Compensated.h, operation by operation, and thus with the same
-// bits. A lane that would leave the straight path there is undecided.
+// The arithmetic of Foot.cpp, operation by operation, and thus with the same bits. A lane that
+// would leave the straight path there is undecided.
 
-template <class V>
-struct SumInLanes {
-  V value, error;
-};
-template <class V>
-HWY_INLINE SumInLanes<V> exactSum(V a, V b) {
-  const V sum = a + b, bRounded = sum - a;
-  return {sum, (a - (sum - bRounded)) + (b - bRounded)};
-}
-template <class V>
-HWY_INLINE SumInLanes<V> splitInHalves(V a) {
-  const V scaled = hn::Set(hn::DFromV<V>(), 134217729.0) * a;
-  const V high = scaled - (scaled - a);
-  return {high, a - high};
-}
-template <class V>
-HWY_INLINE SumInLanes<V> exactProduct(V a, V b) {
-  const SumInLanes<V> bHalves = splitInHalves(b);
-  const V product = a * b;
-  const auto [high, low] = splitInHalves(a);
-  return {product, ((high * bHalves.value - product) + high * bHalves.error + low * bHalves.value) +
-                       low * bHalves.error};
-}
-
-template <class V>
-HWY_INLINE V sumOfMagnitudes(const Vector3<V>& a) {
-  return (hn::Abs(a.x) + hn::Abs(a.y)) + hn::Abs(a.z);
-}
-template <class V>
-HWY_INLINE V largest(const Vector3<V>& a) {
-  return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
-}
 template <class V>
 HWY_INLINE Vector3<V> operator/(const Vector3<V>& a, const V& divisor) {
   return {a.x / divisor, a.y / divisor, a.z / divisor};
@@ -58,24 +27,6 @@ HWY_INLINE Vector3<V> select(const M& mask, const Vector3<V>& yes, const Vector3
           hn::IfThenElse(mask, yes.z, no.z)};
 }
 
-template <class V>
-struct DifferenceInLanes {
-  Vector3<V> high, low;
-};
-template <class V>
-HWY_INLINE DifferenceInLanes<V> exactSum(const Vector3<V>& a, const Vector3<V>& b) {
-  const auto x = exactSum(a.x, b.x), y = exactSum(a.y, b.y), z = exactSum(a.z, b.z);
-  return {{x.value, y.value, z.value}, {x.error, y.error, z.error}};
-}
-template <class V>
-HWY_INLINE Vector3<V> operator-(const Vector3<V>& a) {
-  return {hn::Neg(a.x), hn::Neg(a.y), hn::Neg(a.z)};
-}
-template <class V>
-HWY_INLINE DifferenceInLanes<V> sum(const DifferenceInLanes<V>& a, const DifferenceInLanes<V>& b) {
-  const DifferenceInLanes<V> high = exactSum(a.high, b.high);
-  return exactSum(high.high, high.low + (a.low + b.low));
-}
 template <class V>
 HWY_INLINE V combination(V m, V mLow, V s, V u, V uLow) {
   const auto [high, low] = splitInHalves(u);
@@ -91,15 +42,6 @@ HWY_INLINE V combination(V m, V mLow, V s, V u, V uLow, V t, V v, V vLow) {
   const V rest = (s * uRest + t * vRest) + (s * uLow + t * vLow);
   return all.value + ((all.error + plane.error) + (mLow + rest));
 }
-/// One component of accurateCross().
-template <class V>
-HWY_INLINE V accurateCross(V uj, V ujLow, V uk, V ukLow, V vj, V vjLow, V vk, V vkLow) {
-  const auto plus = exactProduct(uj, vk), minus = exactProduct(uk, vj);
-  const auto high = exactSum(plus.value, hn::Neg(minus.value));
-  const V mixed = (uj * vkLow + ujLow * vk) - (uk * vjLow + ukLow * vj);
-  return high.value + (high.error + ((plus.error - minus.error) + mixed));
-}
-
 /// The feet of one vertex on the triangles of as many lanes as D has.
 template <class D>
 class Feet {
@@ -299,13 +241,7 @@ class Feet {
         hn::Lt(hn::Abs(height) * (hn::Set(d, 5.0) * factors + hn::Set(d, 4.0) * length),
                hn::Set(d, 7.0) * extent * length);
     if (!hn::AllTrue(d, hn::Or(plain, hn::Not(m_isFace)))) {
-      const auto component =
-          [&](V uj, V ujLow, V uk, V ukLow, V vj, V vjLow, V vk, V vkLow)
-              HWY_ATTR { return accurateCross(uj, ujLow, uk, ukLow, vj, vjLow, vk, vkLow); };
-      const Vectors accurate{
-          component(u.high.y, u.low.y, u.high.z, u.low.z, v.high.y, v.low.y, v.high.z, v.low.z),
-          component(u.high.z, u.low.z, u.high.x, u.low.x, v.high.z, v.low.z, v.high.x, v.low.x),
-          component(u.high.x, u.low.x, u.high.y, u.low.y, v.high.x, v.low.x, v.high.y, v.low.y)};
+      const Vectors accurate = cross(u, v).high;
       normal = select(plain, normal, accurate);
       normalSquare = dot(normal, normal);
       length = hn::Sqrt(normalSquare);

@@ -3,6 +3,7 @@
 #include <palpate/Settings.h>
 #include <palpate/SpatialQueries.h>
 
+#include "Queries/BeamHits.h"
 #include "Queries/BodyPenetration.h"
 #include "Queries/PairTraversal.h"
 #include "Queries/PathIntervals.h"
@@ -43,7 +44,10 @@ class SpatialQueries::Source {
     std::vector<PointDistances::Near> near;
     std::vector<RayHits::Met> met;
     std::array<std::vector<RayHits::Met>, kRaysInFlight> metInFlight;
+    BeamHits::Scratch beam;
     std::vector<RayHit> hits;
+    std::vector<std::vector<RayHit>> hitsOfParts;  ///< of allHits() of many rays
+    std::vector<std::size_t> begins;
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
@@ -167,13 +171,13 @@ void checkPoint(const Eigen::Vector3d& point, std::optional<std::size_t> index =
 void checkPoints(std::span<const Eigen::Vector3d>);
 /// Throws InvalidSettings unless there is room for as many answers as are asked for.
 void checkSizes(std::size_t asked, std::size_t room, const char* name);
+constexpr std::size_t kPartOfBatch = 64;  ///< questions
 /// Calls f(begin, end) for parts of a batch, on all threads.
 template <class F>
 void forParts(SpatialQueries::Source& source, std::size_t size, F&& f) {
-  constexpr std::size_t kGrain = 64;
   const SpatialQueries::Source::Workers workers(source);
   const Threads& threads = workers;
-  threads.forChunks(size, kGrain,
+  threads.forChunks(size, kPartOfBatch,
                     [&](std::size_t, std::size_t begin, std::size_t end) { f(begin, end); });
 }
 /// Throws InvalidSettings for a length that is negative, NaN or, if `finite`, out of range.

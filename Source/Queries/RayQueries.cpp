@@ -3,6 +3,7 @@
 
 #include <palpate/Error.h>
 
+#include "Queries/BeamHits.h"
 #include "Queries/QuerySource.h"
 #include "Queries/RayHits.h"
 #include "Queries/ShapeRays.h"
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -85,16 +87,76 @@ class RayQuery {
   /// out: element kNoElement where there is none.
   void first(const Body& geometry, std::span<const Ray> rays, std::span<RayHit> out) {
     const RayHit none{geometry.id, kNoElement, {}, {0, 0, 0}, kInfinity, false, false};
-    if (!geometry.shape)
-      return RayHits::first(geometry, rays, m_bruteForce, m_scratch->metInFlight, none, out);
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      out[i] = first(geometry, rays[i], kInfinity).value_or(none);
+    if (geometry.shape) {
+      for (std::size_t i = 0; i < rays.size(); ++i)
+        out[i] = first(geometry, rays[i], kInfinity).value_or(none);
+      return;
+    }
+    forBeams(
+        geometry, rays,
+        [&](BeamHits& beam, std::size_t begin, std::size_t count) {
+          std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(begin), count, none);
+          beam.first([&](std::size_t i, const RayHit& hit) { out[begin + i] = hit; },
+                     [&](std::size_t i) {
+                       const Ray& ray = rays[begin + i];
+                       out[begin + i] = first(geometry, ray, ray.tMax).value_or(none);
+                     });
+        },
+        [&](std::size_t begin, std::size_t count) {
+          RayHits::first(geometry, rays.subspan(begin, count), m_bruteForce, m_scratch->metInFlight,
+                         none, out.subspan(begin, count));
+        });
+  }
+  /// Appends all hits of one ray after the other. counts: of each ray's hits.
+  void all(const Body& geometry, std::span<const Ray> rays, std::vector<RayHit>& out,
+           std::span<std::size_t> counts) {
+    const auto single = [&](std::size_t i) {
+      const std::vector<RayHit>& hits = all(geometry, rays[i]);
+      out.insert(out.end(), hits.begin(), hits.end());
+      counts[i] = hits.size();
+    };
+    forBeams(
+        geometry, rays,
+        [&](BeamHits& beam, std::size_t begin, std::size_t count) {
+          std::fill_n(counts.begin() + static_cast<std::ptrdiff_t>(begin), count, std::size_t{0});
+          beam.all(
+              [&](std::size_t i, RayHit hit) {
+                // Hits are in order, but each t is rounded.
+                if (counts[begin + i]++ > 0) hit.t = std::max(hit.t, out.back().t);
+                out.push_back(hit);
+              },
+              [&](std::size_t i) { single(begin + i); });
+        },
+        [&](std::size_t begin, std::size_t count) {
+          for (std::size_t i = 0; i < count; ++i) single(begin + i);
+        });
   }
   bool any(const Body& geometry, const Ray& ray) {
     return geometry.shape ? !all(geometry, ray).empty() : on(geometry, ray).any();
   }
 
  private:
+  /// Divides rays into beams and other rays: calls beam(b, begin, count) for each beam, and
+  /// others(begin, count) for the rays between them.
+  template <class Beam, class Others>
+  void forBeams(const Body& geometry, std::span<const Ray> rays, Beam&& beam, Others&& others) {
+    std::size_t begin = 0, i = 0;
+    if (!geometry.shape && !m_bruteForce) {
+      BeamHits hits(geometry, m_scratch->beam);
+      for (std::size_t skipped = 2; i < rays.size();) {
+        const std::size_t count = hits.start(rays.subspan(i));
+        if (count == 0) {  // Rays without order rarely try again.
+          i += skipped *= 2;
+          continue;
+        }
+        if (begin < i) others(begin, i - begin);
+        beam(hits, i, count);
+        begin = i += count;
+        skipped = 2;
+      }
+    }
+    if (begin < rays.size()) others(begin, rays.size() - begin);
+  }
   RayHits on(const Body& geometry, const Ray& ray) {
     return {geometry, bounded(ray), m_bruteForce, m_scratch->met};
   }
@@ -182,6 +244,39 @@ void SpatialQueries::allHits(GeometryId id, const Ray& ray, std::vector<RayHit>&
   const std::vector<RayHit>& hits = query.all(geometry, ray);
   out.reserve(hits.size());  // nothing below throws
   out.assign(hits.begin(), hits.end());
+}
+
+void SpatialQueries::allHits(GeometryId id, std::span<const Ray> rays, std::vector<RayHit>& out,
+                             std::vector<std::size_t>& begins) const {
+  // Parts are merged in turns, while their hits are in the caches.
+  constexpr std::size_t kPartsInTurn = 64;
+  const Source::Call source(*this);
+  for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
+  const Body& geometry = source->at(id);
+  const Source::Loan scratch(*source);
+  std::vector<RayHit>& hits = scratch->hits;
+  std::vector<std::size_t>& ends = scratch->begins;  // of each ray, after a 0
+  hits.clear();
+  ends.assign(rays.size() + 1, 0);
+  scratch->hitsOfParts.resize(kPartsInTurn);
+  const std::span<std::size_t> counts = std::span(ends).subspan(1);
+  const Source::Workers workers(*source);
+  const Threads& threads = workers;
+  for (std::size_t begin = 0, size; begin < rays.size(); begin += size) {
+    size = std::min(rays.size() - begin, kPartsInTurn * kPartOfBatch);
+    threads.forChunks(size, kPartOfBatch, [&](std::size_t part, std::size_t from, std::size_t to) {
+      scratch->hitsOfParts[part].clear();
+      RayQuery(*source).all(geometry, rays.subspan(begin + from, to - from),
+                            scratch->hitsOfParts[part], counts.subspan(begin + from, to - from));
+    });
+    for (std::size_t part = 0; part * kPartOfBatch < size; ++part) {
+      const std::vector<RayHit>& some = scratch->hitsOfParts[part];
+      hits.insert(hits.end(), some.begin(), some.end());
+    }
+  }
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  out.swap(hits);
+  begins.swap(ends);
 }
 
 }  // namespace palpate

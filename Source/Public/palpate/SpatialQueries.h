@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -160,6 +161,10 @@ class PALPATE_EXPORT SpatialQueries {
   /// firstHit() of many rays; without a hit t is infinite and the element kNoElement.
   void firstHits(GeometryId, std::span<const Ray> rays, std::span<RayHit> out) const;
   void allHits(GeometryId, const Ray&, std::vector<RayHit>& out) const;  ///< by ascending t
+  /// allHits() of many rays, one after the other. Those of ray i are from begins[i] to before
+  /// begins[i + 1].
+  void allHits(GeometryId, std::span<const Ray> rays, std::vector<RayHit>& out,
+               std::vector<std::size_t>& begins) const;
   /// Among all geometries. frontFacesOnly excludes other hits, also lines and points of radius 0.
   std::optional<Pick> pick(const Ray&, bool frontFacesOnly = false) const;
 
