@@ -22,13 +22,17 @@ constexpr double kMostEdges = 40;
 /// Shares of the octree's extent: how much longer than its rays a beam is, how much of that covers
 /// rounding, and the shortest beam.
 constexpr double kLonger = 1.0 / 16, kMargin = 1.0 / 64, kShortest = 1.0 / 8;
-/// The extent, beyond which rays begin far away.
+/// In extents: how far from the octree's zero the rays of a beam may be at its ends.
 constexpr double kFurthestAside = 4;
 
 }  // namespace
 
 BeamHits::BeamHits(const Body& geometry, Scratch& scratch)
-    : m_geometry(geometry), m_scratch(scratch), m_frame(geometry) {
+    : m_geometry(geometry),
+      m_scratch(scratch),
+      m_frame(geometry),
+      m_ordered(geometry.tree.ordered().data()),
+      m_positions(geometry.mesh.now.body().data()) {
   const std::size_t elements = geometry.tree.ordered().size();
   m_hasBeams =
       elements > 0 && geometry.mesh.topology.hasFaces() && geometry.mesh.largestRadius == 0;
@@ -36,21 +40,25 @@ BeamHits::BeamHits(const Body& geometry, Scratch& scratch)
   m_extent = geometry.tree.octree().box(0).reach();
   m_hasBeams = m_extent < kLargestFloat && m_extent > 0x1p-80;
   m_frameError = m_frame.error() + (geometry.isPlaced() ? 4.0 * kOrthonormal * m_extent : 0.0);
-  // As if the triangles were those of a sphere.
-  m_edge = 5.4 * m_extent / std::sqrt(static_cast<double>(elements));
+  // For triangles of one size on a sphere.
+  m_perEdge = std::sqrt(static_cast<double>(elements)) / (5.4 * m_extent);
 }
 
 std::size_t BeamHits::start(std::span<const Ray> rays) {
   m_count = 0;
   if (!m_hasBeams || rays.size() < kLeastRays) return 0;
-  while (m_count < std::min(kSize, rays.size()) && add(rays[m_count])) ++m_count;
+  // Rays without order mostly end here. False where a product overflows, too.
+  const Vector3d &d = rays[0].direction, &e = rays[kLeastRays - 1].direction;
+  const double along = d.dot(e);
+  if (!(along > 0 && along * along >= 0.75 * d.squaredNorm() * e.squaredNorm())) return 0;
+  while (m_count < std::min(kSize, rays.size()) && add(rays[m_count])) continue;
   if (m_count < kLeastRays) return m_count = 0;
   finish();
   return m_count;
 }
 
-/// Adds a ray to the beam, or returns false if it goes another way.
-bool BeamHits::add(const Ray& ray) {
+/// The ray's line in the octree's floats. None if the ray does not advance on the beam's axis.
+std::optional<BeamHits::Line> BeamHits::lineOf(const Ray& ray) {
   const Vector3d origin = m_frame.toFrame(ray.origin), direction = m_frame.turned(ray.direction);
   const double largest = direction.cwiseAbs().maxCoeff();
   if (m_count == 0) {
@@ -61,73 +69,82 @@ bool BeamHits::add(const Ray& ray) {
     m_beam.axes[1] = (m_beam.axes[2] + 2) % 3;
     m_beam.sign = direction[axis] < 0 ? -1.0f : 1.0f;
   }
-  const auto coordinate = [&](const Vector3d& v, std::size_t k) {
+  const auto on = [&](const Vector3d& v, std::size_t k) {
     return v[static_cast<Eigen::Index>(m_beam.axes[k])];
   };
-  const double sign = m_beam.sign, along = sign * coordinate(direction, 2),
-               perT = along * m_frame.scale(), atZero = sign * coordinate(origin, 2);
+  const double along = m_beam.sign * on(direction, 2), perT = along * m_frame.scale(),
+               perAlong = 1.0 / along, atZero = m_beam.sign * on(origin, 2),
+               toMin = ray.tMin * perT, toMax = ray.tMax * perT;
   // These comparisons are false for NaN.
-  if (!(along >= 0.5 * largest && perT >= 0x1p-900 && perT <= 0x1p900)) return false;
-  const double toMin = ray.tMin * perT, toMax = ray.tMax * perT;
-  const double begin = atZero + toMin - kPlacedPointError * std::abs(toMin),
-               end = atZero + toMax + kPlacedPointError * std::abs(toMax);
+  if (!(along >= 0.5 * largest && perT >= 0x1p-900 && perT <= 0x1p900)) return {};
+  return Line{{on(origin, 0), on(origin, 1)},
+              {on(direction, 0) * perAlong, on(direction, 1) * perAlong},
+              atZero,
+              perT,
+              atZero + toMin - kPlacedPointError * std::abs(toMin),
+              atZero + toMax + kPlacedPointError * std::abs(toMax),
+              origin.cwiseAbs().maxCoeff() + m_extent};
+}
+
+/// Whether the beam is as long as the part of the ray within the octree. The first ray says how
+/// long it is.
+bool BeamHits::isLongEnough(const Line& line) {
   const double most = (1.0 + kLonger) * m_extent, margin = kMargin * m_extent;
   if (m_count == 0) {
-    m_begin = static_cast<float>(std::max(-most, begin - kLonger * m_extent));
-    m_end = static_cast<float>(std::min(most, end + kLonger * m_extent));
-    m_slack = 0;
-    m_beam.used = 0;
+    m_begin = static_cast<float>(std::max(-most, line.begin - kLonger * m_extent));
+    m_end = static_cast<float>(std::min(most, line.end + kLonger * m_extent));
   }
-  const double longest = m_end - m_begin;
-  if (!(longest >= kShortest * m_extent &&
-        (begin >= m_begin + margin || m_begin <= -m_extent - margin) &&
-        (end <= m_end - margin || m_end >= m_extent + margin)))
-    return false;
+  return m_end - m_begin >= kShortest * m_extent &&
+         (line.begin >= m_begin + margin || m_begin <= -m_extent - margin) &&
+         (line.end <= m_end - margin || m_end >= m_extent + margin);
+}
+
+/// Adds a ray to the beam, or returns false if it goes another way.
+bool BeamHits::add(const Ray& ray) {
+  const auto line = lineOf(ray);
+  if (!line || !isLongEnough(*line)) return false;
   // With the extent E, the lines are within 4 E, and between their ends w grows by 2.2 E. In floats
   // a line errs by at most 32 roundings of E, less than kFloatRayError. The rest are errors of the
   // ray's line in double: those of the origin on three axes, on two of them by slopes up to 2.
-  const double far = origin.cwiseAbs().maxCoeff() + m_extent,
-               error = kPlacedPointError * far + 3.0 * m_frameError;
-  const double slack = kFloatRayError * m_extent + error + OutwardRounding::kAbsolute;
-  if (!(slack <= margin)) return false;
-  std::array<std::array<double, 2>, 2> lower, upper;
-  std::array<double, 2> atBegin, slopes;
+  const double slack = kFloatRayError * m_extent + kPlacedPointError * line->reach +
+                       3.0 * m_frameError + OutwardRounding::kAbsolute;
+  if (!(slack <= kMargin * m_extent)) return false;
+  Sides lower, upper;
   double edges = 1;
   for (std::size_t k = 0; k < 2; ++k) {
-    slopes[k] = coordinate(direction, k) / along;
     for (const std::size_t i : {0, 1}) {
-      const double at = coordinate(origin, k) + ((i == 0 ? m_begin : m_end) - atZero) * slopes[k];
+      const double at = line->at(k, i == 0 ? m_begin : m_end);
       if (!(std::abs(at) <= kFurthestAside * m_extent)) return false;
-      if (i == 0) atBegin[k] = at;
       lower[k][i] = m_count == 0 ? at : std::min(m_lower[k][i], at);
       upper[k][i] = m_count == 0 ? at : std::max(m_upper[k][i], at);
     }
-    edges *= 1 + std::max(upper[k][0] - lower[k][0], upper[k][1] - lower[k][1]) / m_edge;
+    edges *= 1 + std::max(upper[k][0] - lower[k][0], upper[k][1] - lower[k][1]) * m_perEdge;
   }
   if (!(edges <= kMostEdges)) return false;
-
   m_lower = lower;
   m_upper = upper;
-  m_slack = std::max(m_slack, slack);
-  const std::size_t i = m_count;
+  m_slack = m_count == 0 ? slack : std::max(m_slack, slack);
+
+  const std::size_t i = m_count++;
   m_rays[i] = {ray.origin, ray.direction, ray.tMin,
                std::min(ray.tMax, std::numeric_limits<double>::max())};
-  m_perT[i] = perT;
-  m_atZero[i] = atZero;
+  m_perT[i] = line->perT;
+  m_atZero[i] = line->atZero;
   m_isLeft[i] = false;
-  m_wanted[i] = OutwardRounding::up(std::min(end + slack, m_end));
+  m_wanted[i] = OutwardRounding::up(std::min(line->end + slack, m_end));
   m_first[i] = m_second[i] = m_firstMet[i].t = kInfinity;
   m_error[i] = 0;
-  m_beam.used |= 1u << i;
+  const Vector3d& zero = m_geometry.tree.frame().origin;
   for (std::size_t k = 0; k < 2; ++k) {
     m_beam.origin[k][i] =
-        m_frame.unit() * atBegin[k] + coordinate(m_geometry.tree.frame().origin, k);
-    m_beam.slope[k][i] = sign * slopes[k];
+        m_frame.unit() * line->at(k, m_begin) + zero[static_cast<Eigen::Index>(m_beam.axes[k])];
+    m_beam.slope[k][i] = m_beam.sign * line->slope[k];
   }
   return true;
 }
 
 void BeamHits::finish() {
+  m_beam.used = (1u << m_count) - 1;
   m_beam.begin = static_cast<float>(m_begin);
   m_beam.end =
       *std::max_element(m_wanted.begin(), m_wanted.begin() + static_cast<std::ptrdiff_t>(m_count));
@@ -152,16 +169,17 @@ void BeamHits::finish() {
 }
 
 void BeamHits::setPair(std::size_t i, std::uint32_t ray, std::uint32_t place) {
-  const auto& [a, b, c] = m_geometry.tree.ordered()[place];
-  const Positions& now = m_geometry.mesh.now;
-  m_scratch.pairs.set(i, m_rays[ray], now[a], now[b], now[c]);
+  const auto& [a, b, c] = m_ordered[place];
+  if (const Positions& now = m_geometry.mesh.now; now.isPlaced())
+    m_scratch.pairs.set(i, m_rays[ray], now[a], now[b], now[c]);
+  else
+    m_scratch.pairs.set(i, m_rays[ray], m_positions[a], m_positions[b], m_positions[c]);
 }
 
 void BeamHits::collect(bool first) {
   m_scratch.met.clear();
-  const BeamElements elements{m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data()};
   auto call = [&](std::span<const RayPair> pairs) { return take(pairs, first); };
-  traverseBeam(m_geometry.tree.octree(), m_beam, elements, first, call);
+  traverseBeam(m_geometry.tree.octree(), m_beam, {m_ordered, m_positions}, first, call);
 }
 
 float BeamHits::take(std::span<const RayPair> pairs, bool first) {
@@ -225,7 +243,7 @@ void BeamHits::sort() {
 }
 
 RayHit BeamHits::hitOf(const Met& met, const RayPoints& points, std::size_t i) const {
-  const Triangle& corners = m_geometry.tree.ordered()[met.place];
+  const Triangle& corners = m_ordered[met.place];
   RayHit hit{m_geometry.id, m_geometry.tree.octree().order()[met.place],
              corners,       {points.weights[0][i], points.weights[1][i], points.weights[2][i]},
              points.t[i],   met.frontFace,

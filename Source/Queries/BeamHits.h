@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,10 +40,10 @@ class BeamHits {
   /// Makes a beam of the first rays that go the same way. Returns their number; 0 if there are too
   /// few for a beam.
   std::size_t start(std::span<const Ray>);
-  /// The first hits of the beam's rays. Calls hit(ray, hit) for each ray that has one, and
-  /// other(ray) for each that is left to RayHits.
-  template <class Hit, class Other>
-  void first(Hit&& hit, Other&& other) {
+  /// The first hits of the beam's rays. Calls hit(ray, hit) for each ray that has one, miss(ray)
+  /// for each that has none, and other(ray) for each that is left to RayHits.
+  template <class Hit, class Miss, class Other>
+  void first(Hit&& hit, Miss&& miss, Other&& other) {
     collect(true);
     m_scratch.sorted.clear();
     for (std::uint32_t i = 0; i < m_count; ++i)
@@ -50,6 +51,8 @@ class BeamHits {
         other(i);
       else if (m_firstMet[i].t < kInfinity)
         m_scratch.sorted.push_back(m_firstMet[i]);
+      else
+        miss(i);
     forEachHit(m_scratch.sorted, hit);
   }
   /// All hits: the same calls, for each ray in order, and its hits by ascending t.
@@ -74,6 +77,19 @@ class BeamHits {
   static bool isApart(double first, double second, double mostError) {
     return second - first > 2.0 * mostError || second == kInfinity;
   }
+  /// A ray's line. w: as in RayBeam.
+  struct Line {
+    double origin[2], slope[2];  ///< on the other axes; per w
+    double atZero, perT;         ///< w = atZero + t perT
+    double begin, end;           ///< w of the ray's ends, at least
+    double reach;                ///< of the origin's coordinates and the octree's
+
+    double at(std::size_t k, double w) const { return origin[k] + (w - atZero) * slope[k]; }
+  };
+  using Sides = std::array<std::array<double, 2>, 2>;  ///< of rays: axis, at m_begin and m_end
+
+  std::optional<Line> lineOf(const Ray&);
+  bool isLongEnough(const Line&);
   bool add(const Ray&);
   void finish();
   void collect(bool first);
@@ -101,16 +117,18 @@ class BeamHits {
   const Body& m_geometry;
   Scratch& m_scratch;
   const OctreeFrame m_frame;
-  bool m_hasBeams;      ///< whether the geometry can be searched by beams
+  const Triangle* const m_ordered;
+  const Eigen::Vector3d* const m_positions;  ///< where the octree is
+  bool m_hasBeams;                           ///< whether the geometry can be searched by beams
   double m_extent;      ///< of the octree's root; this and what follows is in its floats
   double m_frameError;  ///< of positions, besides their share of the coordinates
-  double m_edge;        ///< about the mean edge of the triangles
+  double m_perEdge;     ///< per about the mean edge of the triangles
 
   std::size_t m_count = 0;
   RayBeam m_beam;
   double m_begin, m_end;  ///< w between which the beam's lines are taken
   double m_slack;
-  std::array<std::array<double, 2>, 2> m_lower, m_upper;  ///< of rays: axis, at m_begin and m_end
+  Sides m_lower, m_upper;
   // Of each ray:
   std::array<RaySegment, kSize> m_rays;
   std::array<double, kSize> m_perT, m_atZero;            ///< w = m_atZero + t m_perT

@@ -94,9 +94,9 @@ class RayQuery {
     }
     forBeams(
         geometry, rays,
-        [&](BeamHits& beam, std::size_t begin, std::size_t count) {
-          std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(begin), count, none);
+        [&](BeamHits& beam, std::size_t begin, std::size_t) {
           beam.first([&](std::size_t i, const RayHit& hit) { out[begin + i] = hit; },
+                     [&](std::size_t i) { out[begin + i] = none; },
                      [&](std::size_t i) {
                        const Ray& ray = rays[begin + i];
                        out[begin + i] = first(geometry, ray, ray.tMax).value_or(none);
@@ -258,11 +258,13 @@ void SpatialQueries::allHits(GeometryId id, std::span<const Ray> rays, std::vect
   std::vector<std::size_t>& ends = scratch->begins;  // of each ray, after a 0
   hits.clear();
   ends.assign(rays.size() + 1, 0);
-  scratch->hitsOfParts.resize(kPartsInTurn);
   const std::span<std::size_t> counts = std::span(ends).subspan(1);
   const Source::Workers workers(*source);
   const Threads& threads = workers;
-  for (std::size_t begin = 0, size; begin < rays.size(); begin += size) {
+  if (threads.count() == 1) RayQuery(*source).all(geometry, rays, hits, counts);
+  scratch->hitsOfParts.resize(kPartsInTurn);
+  for (std::size_t begin = threads.count() == 1 ? rays.size() : 0, size; begin < rays.size();
+       begin += size) {
     size = std::min(rays.size() - begin, kPartsInTurn * kPartOfBatch);
     threads.forChunks(size, kPartOfBatch, [&](std::size_t part, std::size_t from, std::size_t to) {
       scratch->hitsOfParts[part].clear();

@@ -63,6 +63,12 @@ class PalpateQueries : public SpatialEngine {
           const auto hit = queries.firstHit(m_mesh, {c.point, c.direction});
           out.add(hit ? hit->t : kNone, hit ? hit->element : kNoElement);
         });
+      case SpatialQuery::AllHits:
+        return all([&](const SpatialCase& c) {
+          queries.allHits(m_mesh, {c.point, c.direction}, m_hits);
+          for (const RayHit& hit : m_hits) out.elements.push_back(hit.element);
+          out.endCase();
+        });
       case SpatialQuery::EightNearest:
         return all([&](const SpatialCase& c) {
           queries.nearestElements(m_mesh, c.point, 8, m_points);
@@ -108,6 +114,14 @@ class PalpateQueries : public SpatialEngine {
         queries.firstHits(m_mesh, m_rays, m_hits);
         for (const RayHit& hit : m_hits) out.add(hit.t, hit.element);
         return;
+      case SpatialQuery::AllHits:
+        queries.allHits(m_mesh, m_rays, m_hits, m_begins);
+        for (std::size_t i = 0; i < cases.size(); ++i) {
+          for (std::size_t h = m_begins[i]; h < m_begins[i + 1]; ++h)
+            out.elements.push_back(m_hits[h].element);
+          out.endCase();
+        }
+        return;
       default:
         return ask(query, cases, sizes, out);
     }
@@ -127,6 +141,7 @@ class PalpateQueries : public SpatialEngine {
   std::vector<SurfacePoint> m_points;
   std::vector<SignedDistance> m_distances;
   std::vector<RayHit> m_hits;
+  std::vector<std::size_t> m_begins;
   std::vector<std::uint32_t> m_elements;
 };
 

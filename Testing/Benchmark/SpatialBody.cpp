@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <numbers>
 
 namespace palpate::benchmark {
 namespace {
@@ -34,6 +35,12 @@ constexpr auto kRows = [] {
                  true},
       SpatialRow{
           "first hits, batch", FirstHit, Rays, kMany, {0.22, 0.40, 0.75}, {0.20, 0.31, 0.56}, true},
+      SpatialRow{"first hit, raster", FirstHit, Raster, kMany, {}, {}},
+      SpatialRow{"first hits, raster, batch", FirstHit, Raster, kMany, {}, {}, true},
+      SpatialRow{"all hits, raster, batch", AllHits, Raster, kMany, {}, {}, true},
+      SpatialRow{"first hit, fan", FirstHit, Fan, kMany, {}, {}},
+      SpatialRow{"first hits, fan, batch", FirstHit, Fan, kMany, {}, {}, true},
+      SpatialRow{"all hits, fan, batch", AllHits, Fan, kMany, {}, {}, true},
       SpatialRow{"contains", Contains, InBox, kMany, {0.22, 0.33, 0.6}, {0.25, 0.38, 0.67}},
       SpatialRow{"first hit", FirstHit, Rays, kMany, {0.22, 0.40, 0.75}, {0.20, 0.31, 0.56}},
       SpatialRow{"8 nearest", EightNearest, Near, kLists, {1.5, 2.2, 3.3}, {2.1, 3.0, 4.3}},
@@ -108,7 +115,12 @@ std::vector<SpatialCase> makeCases(const SpatialBody& body, const Points& positi
            testing::randomPoint(random, -scale / 2, scale / 2).cwiseProduct(box.sizes());
   };
   std::vector<SpatialCase> cases(count);
+  // Images are square, and centred on the body.
+  const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(count)));
   for (SpatialCase& c : cases) {
+    const auto number = static_cast<std::size_t>(&c - cases.data());
+    const double x = static_cast<double>(number % side) - 0.5 * static_cast<double>(side),
+                 y = static_cast<double>(number / side) - 0.5 * static_cast<double>(side);
     const auto& [i, j, k] = body.triangles[random() % body.triangles.size()];
     const Vector3d weights = testing::randomPoint(random, 0, 1);
     const Vector3d surface =
@@ -135,6 +147,17 @@ std::vector<SpatialCase> makeCases(const SpatialBody& body, const Points& positi
         c.point = inBox(2);
         c.direction = (inBox(1) - c.point).normalized();
         break;
+      case Place::Raster:
+        c.point = box.center() + body.diagonal * Vector3d(0.3, 0.2, -1.5);
+        c.direction =
+            (box.center() + body.diagonal / 512 * Vector3d(x, y, 0) - c.point).normalized();
+        break;
+      case Place::Fan: {
+        const double angle = x / 256 * std::numbers::pi / 3;
+        c.point = box.center() + body.diagonal * Vector3d(0, y / 512, -0.6);
+        c.direction = Vector3d(std::sin(angle), 0.1, std::cos(angle)).normalized();
+        break;
+      }
       case Place::Surface:
         c.point = surface;
         c.rotation =

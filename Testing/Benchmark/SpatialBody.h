@@ -12,6 +12,8 @@ enum class Place {
   Anywhere,  ///< in twice the box
   InBox,
   Rays,     ///< from points in twice the box to points in the box
+  Raster,   ///< from a focus: part of an X-ray image whose pixels are 1/512 of the diagonal
+  Fan,      ///< from points on a line: part of ultrasound images of 256 rays over 60 degrees
   Surface,  ///< on the surface, turned at random
 };
 

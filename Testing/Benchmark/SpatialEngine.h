@@ -16,6 +16,7 @@ enum class SpatialQuery {
   SignedDistance,  ///< values: distance, negative inside
   Contains,        ///< values: 1 inside, 0 outside
   FirstHit,        ///< values: distance from the origin, infinite for none; elements
+  AllHits,         ///< elements along the ray, by ascending distance
   EightNearest,    ///< values and elements: eight each, by ascending distance
   Ball,            ///< elements within the radius
   Capsule,         ///< elements that meet the capsule, interior included

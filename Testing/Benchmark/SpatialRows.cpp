@@ -137,8 +137,8 @@ double speedOf(const SpatialBody& body, const Engines& engines,
   for (std::size_t r = 0; r < body.rows().size(); ++r)
     for (std::size_t e = 0; e < engines.size(); ++e) {
       const SpatialRow& row = body.rows()[r];
-      if (row.query != SpatialQuery::FirstHit || row.isBatch || times[e].rows[r].empty() ||
-          !engines[e]->name().starts_with("Embree"))
+      if (row.query != SpatialQuery::FirstHit || row.isBatch || row.fastest[body.size] == 0 ||
+          times[e].rows[r].empty() || !engines[e]->name().starts_with("Embree"))
         continue;
       const double speed = median(times[e].rows[r]) / row.fastest[body.size];
       if (least == 0 || speed < least) least = speed;

@@ -70,6 +70,12 @@ Truth truthOf(SpatialQuery query, const SpatialCase& asked, const ShapeSizes& si
         return t >= 0 ? t : kNone;
       })};
     }
+    case SpatialQuery::AllHits: {
+      const Real3 d = asked.direction.cast<Real>();
+      return {body.each([&](const Real3& a, const Real3& b, const Real3& c) {
+        return lineHit<Real>(p, d, a, b, c) >= 0 ? Real(-1) : kNone;
+      })};
+    }
     case SpatialQuery::Ball:
       return {distancesTo(body, p), sizes.ball};
     case SpatialQuery::Capsule: {
@@ -142,6 +148,7 @@ std::vector<SpatialErrors> errorsOf(SpatialQuery query, std::span<const SpatialC
           ++errors[e].of;
           errors[e].wrong += (answers.values[i] != 0) != truth.inside;
           break;
+        case SpatialQuery::AllHits:
         case SpatialQuery::Ball:
         case SpatialQuery::Capsule:
         case SpatialQuery::Box: {

@@ -82,8 +82,15 @@ def test_rays(scene):
     assert scene.queries.first_hit(scene.ball, [3, 3, 3], [0, 0, 1]) is None
     pick = scene.queries.pick([0.1, 0.2, 9], [0, 0, -1])
     assert pick.hit.geometry == scene.ball and pick.edge.shape == (2,)
+    every, begins = scene.queries.all_hits_of_rays(scene.ball, origins, directions)
+    assert len(begins) == len(origins) + 1 and begins[0] == 0 and begins[-1] == len(every)
+    for i, (origin, direction) in enumerate(zip(origins, directions, strict=True)):
+        single = scene.queries.all_hits(scene.ball, origin, direction)
+        assert np.array_equal(every[begins[i] : begins[i + 1]], single)
     with pytest.raises(palpate.Error):
         scene.queries.first_hits(scene.ball, origins, directions[:3])
+    with pytest.raises(palpate.Error):
+        scene.queries.all_hits_of_rays(scene.ball, origins, directions[:3])
 
 
 def test_shapes_and_rigid_meshes(scene):

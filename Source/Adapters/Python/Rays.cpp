@@ -28,23 +28,38 @@ bool anyHit(const Queries& self, Object geometry, Object origin, Object directio
   return self.ask([&](const SpatialQueries& q) { return q.anyHit(id, ray); });
 }
 
-py::array firstHits(const Queries& self, Object geometry, Object origins, Object directions,
-                    double tMin, double tMax) {
-  const GeometryId id = geometryId(geometry);
+std::vector<Ray> raysOf(Object origins, Object directions, double tMin, double tMax) {
   const Positions from(origins, "origins"), along(directions, "directions");
   if (from.size() != along.size())
     throw Error(ErrorCode::InvalidSettings, "There are " + std::to_string(from.size()) +
                                                 " origins and " + std::to_string(along.size()) +
                                                 " directions.");
-  py::array result = newRecords<RayHit>(from.size());
+  std::vector<Ray> rays(from.size());
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    rays[i] = {from.span()[i], along.span()[i], tMin, tMax};
+  return rays;
+}
+
+py::array firstHits(const Queries& self, Object geometry, Object origins, Object directions,
+                    double tMin, double tMax) {
+  const GeometryId id = geometryId(geometry);
+  const std::vector<Ray> rays = raysOf(origins, directions, tMin, tMax);
+  py::array result = newRecords<RayHit>(rays.size());
   const std::span<RayHit> out = recordsIn<RayHit>(result);
-  self.askLong([&](const SpatialQueries& q) {
-    std::vector<Ray> rays(from.size());
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      rays[i] = {from.span()[i], along.span()[i], tMin, tMax};
-    q.firstHits(id, rays, out);
-  });
+  self.askLong([&](const SpatialQueries& q) { q.firstHits(id, rays, out); });
   return result;
+}
+
+py::tuple allHitsOfRays(const Queries& self, Object geometry, Object origins, Object directions,
+                        double tMin, double tMax) {
+  const GeometryId id = geometryId(geometry);
+  const std::vector<Ray> rays = raysOf(origins, directions, tMin, tMax);
+  std::vector<RayHit> hits;
+  std::vector<std::size_t> begins;
+  self.askLong([&](const SpatialQueries& q) { q.allHits(id, rays, hits, begins); });
+  return py::make_tuple(
+      recordsOf(hits),
+      py::array_t<std::size_t>(static_cast<py::ssize_t>(begins.size()), begins.data()));
 }
 
 py::array allHits(const Queries& self, Object geometry, Object origin, Object direction,
@@ -98,6 +113,13 @@ is infinite.)")
            R"(all_hits(geometry, origin, direction, t_min=0.0, t_max=inf) -> numpy.ndarray
 
 All hits as records, by ascending t.)")
+      .def(
+          "all_hits_of_rays", &allHitsOfRays, geometry, py::arg("origins"), py::arg("directions"),
+          tMin, tMax,
+          R"(all_hits_of_rays(geometry, origins, directions, t_min=0.0, t_max=inf) -> tuple[numpy.ndarray, numpy.ndarray]
+
+All hits of rays with origins (n, 3), L, and directions (n, 3), as records, and begins (n + 1,): the
+hits of ray i are [begins[i]:begins[i + 1]], by ascending t.)")
       .def(
           "pick", &pick, origin, direction, py::arg("front_faces_only") = false, tMin, tMax,
           R"(pick(origin, direction, front_faces_only=False, t_min=0.0, t_max=inf) -> numpy.record | None

@@ -58,7 +58,8 @@ class CgalQueries : public SpatialEngine {
   }
 
   bool answers(SpatialQuery query) const override {
-    return query != SpatialQuery::EightNearest && (kExact || query != SpatialQuery::Contains) &&
+    return query != SpatialQuery::EightNearest && query != SpatialQuery::AllHits &&
+           (kExact || query != SpatialQuery::Contains) &&
            (kExact || query != SpatialQuery::SignedDistance);
   }
 

@@ -7,9 +7,12 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <limits>
 #include <map>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 namespace palpate::benchmark {
 namespace {
@@ -48,7 +51,7 @@ class EmbreeQueries : public SpatialEngine {
     rtcSetSharedGeometryBuffer(m_geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                m_triangles.data(), 0, sizeof(Triangle), triangles.size());
     if (m_refit) rtcSetGeometryBuildQuality(m_geometry, RTC_BUILD_QUALITY_REFIT);
-    rtcSetGeometryOccludedFilterFunction(m_geometry, countHit);
+    rtcSetGeometryOccludedFilterFunction(m_geometry, collectHit);
     rtcAttachGeometry(m_scene, m_geometry);
     rtcReleaseGeometry(m_geometry);
     findEdges();
@@ -77,10 +80,13 @@ class EmbreeQueries : public SpatialEngine {
           closest(c, query == SpatialQuery::SignedDistance, out);
           break;
         case SpatialQuery::Contains:
-          out.values.push_back(countHits(c) % 2);
+          out.values.push_back(static_cast<double>(collectHits(c).size() % 2));
           break;
         case SpatialQuery::FirstHit:
           firstHit(c, out);
+          break;
+        case SpatialQuery::AllHits:
+          allHits(c, out);
           break;
         case SpatialQuery::EightNearest:
           eightNearest(c, out);
@@ -213,22 +219,32 @@ class EmbreeQueries : public SpatialEngine {
     }
   }
 
-  struct CountingContext {
+  using Hits = std::vector<std::pair<float, unsigned>>;
+  struct CollectingContext {
     RTCIntersectContext context;
-    int hits = 0;
+    Hits* hits;
   };
-  /// Counts a hit and rejects it.
-  static void countHit(const RTCFilterFunctionNArguments* arguments) {
-    ++reinterpret_cast<CountingContext*>(arguments->context)->hits;
+  /// Collects a hit and rejects it.
+  static void collectHit(const RTCFilterFunctionNArguments* arguments) {
+    reinterpret_cast<CollectingContext*>(arguments->context)
+        ->hits->push_back(
+            {RTCRayN_tfar(arguments->ray, 1, 0), RTCHitN_primID(arguments->hit, 1, 0)});
     arguments->valid[0] = 0;
   }
 
-  int countHits(const SpatialCase& c) const {
-    CountingContext context;
+  const Hits& collectHits(const SpatialCase& c) {
+    CollectingContext context{{}, &m_hits};
+    m_hits.clear();
     rtcInitIntersectContext(&context.context);
     RTCRay along = ray(c);
     rtcOccluded1(m_scene, &context.context, &along);
-    return context.hits;
+    return m_hits;
+  }
+  void allHits(const SpatialCase& c, SpatialAnswers& out) {
+    collectHits(c);
+    std::sort(m_hits.begin(), m_hits.end());
+    for (const auto& [t, triangle] : m_hits) out.elements.push_back(triangle);
+    out.endCase();
   }
 
   void eightNearest(const SpatialCase& c, SpatialAnswers& out) const {
@@ -323,6 +339,7 @@ class EmbreeQueries : public SpatialEngine {
   RTCDevice m_device = nullptr;
   RTCScene m_scene = nullptr;
   RTCGeometry m_geometry = nullptr;
+  Hits m_hits;
   std::vector<Triangle> m_triangles, m_edges;
   std::vector<Float3> m_positions, m_vertexNormals, m_edgeNormals;
 };

@@ -200,7 +200,8 @@ TEST(BeamHits, NeighbouringRaysSearchTogether) {
     together += count;
     beams += count > 0;
     if (count > 0)
-      beam.first([&](std::size_t, const RayHit&) { ++hits; }, [&](std::size_t) { FAIL(); });
+      beam.first([&](std::size_t, const RayHit&) { ++hits; }, [](std::size_t) {},
+                 [&](std::size_t) { FAIL(); });
     i += std::max<std::size_t>(count, 1);
   }
   EXPECT_GE(together, 4950u);

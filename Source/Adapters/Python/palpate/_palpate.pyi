@@ -319,6 +319,14 @@ class SpatialQueries:
         t_min: float = 0.0,
         t_max: float = ...,
     ) -> _Records: ...
+    def all_hits_of_rays(
+        self,
+        geometry: int,
+        origins: _Array,
+        directions: _Array,
+        t_min: float = 0.0,
+        t_max: float = ...,
+    ) -> tuple[_Records, npt.NDArray[np.uint64]]: ...
     def pick(
         self,
         origin: _Array,
