@@ -11,6 +11,7 @@ declare -A options=(
   [Suturing]="--frames 85"
   [Retraction]="--frames 75"
   [RobotArms]="--frames 170"
+  [XRay]="--frames 20 --pixels 512"
   [BoneDrilling]="--frames 60 --particles 12000 --triangles 100000")
 [[ $# -gt 0 ]] || set -- "${!options[@]}"
 
@@ -22,5 +23,6 @@ trap 'rm -rf "$folder"' EXIT
 for scene in "$@"; do
   # shellcheck disable=SC2086
   xvfb-run -a "build/demo/Examples/$scene/$scene" ${options[$scene]} --out "$folder"
+  [[ -e $folder/scene.png ]] || python3 -c "from PIL import Image; Image.open('$folder/scene.pgm').save('$folder/scene.png')"
   mv "$folder/scene.png" "Docs/Pictures/$scene.png"
 done

@@ -29,7 +29,7 @@ constexpr std::array kAttenuation{0.42, 0.25, 0.55, 0.38, 0.16};  // per L, of e
 
 struct Options {
   int frames = 120, pixels = 256, threads = 0;
-  std::filesystem::path out = "xray.pgm";
+  std::filesystem::path out = "out/xray";
 };
 
 double volumeOf(const std::vector<Vector3d>& positions, const std::vector<Triangle>& triangles) {
@@ -148,12 +148,14 @@ void run(const Options& options) {
     std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
     return values[values.size() / 2];
   };
-  writeWhole(options.out, image.picture());
+  makeFolder(options.out);
+  const std::filesystem::path file = options.out / "scene.pgm";
+  writeWhole(file, image.picture());
   std::printf("%d x %d pixels, 5 organs of %zu triangles, %d images\n", options.pixels,
               options.pixels, image.triangles(), options.frames);
   std::printf("image ms %.2f, organs moved ms %.2f, budget ms %.1f\n", median(exposures),
               median(updates), kBudget);
-  std::printf("written: %s\n", options.out.string().c_str());
+  std::printf("written: %s\n", file.string().c_str());
 }
 
 }  // namespace
@@ -166,7 +168,7 @@ int main(int count, char** arguments) {
   app.add_option("--frames", options.frames, "images to compute")->check(CLI::PositiveNumber);
   app.add_option("--pixels", options.pixels, "width and height")->check(CLI::Range(16, 4096));
   app.add_option("--threads", options.threads, "0: all cores")->check(CLI::NonNegativeNumber);
-  app.add_option("--out", options.out, "the last image, PGM");
+  app.add_option("--out", options.out, "the folder for the last image, scene.pgm");
   return exitCodeOf(app, [&] {
     app.parse(count, arguments);
     run(options);

@@ -182,7 +182,7 @@ Rays imageRays() {
   for (int y = 0; y < 10; ++y)
     for (int x = 0; x < 100; ++x)
       rays.push_back(
-          {{0.5, 0.5, 0.3}, {std::sin(0.02 * x - 1), 0.1 * y - 0.47, std::cos(0.02 * x - 1)}});
+          {{0.513, 0.5, 0.3}, {std::sin(0.02 * x - 1), 0.1 * y - 0.47, std::cos(0.02 * x - 1)}});
   return rays;
 }
 
