@@ -18,6 +18,7 @@
 #include <numeric>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace palpate {
 
@@ -66,7 +67,12 @@ void checkRay(const Ray& ray, std::optional<std::size_t> index = {}) {
 class RayQuery {
  public:
   explicit RayQuery(SpatialQueries::Source& source)
-      : m_scratch(source), m_bruteForce(source.engine() == Engine::BruteForce) {}
+      : m_loan(std::in_place, source),
+        m_scratch(m_loan->operator->()),
+        m_bruteForce(source.engine() == Engine::BruteForce) {}
+  /// Uses the scratch of a call.
+  RayQuery(SpatialQueries::Source& source, const SpatialQueries::Source::Loan& scratch)
+      : m_scratch(scratch.operator->()), m_bruteForce(source.engine() == Engine::BruteForce) {}
 
   /// By ascending t; valid until the next call.
   const std::vector<RayHit>& all(const Body& geometry, const Ray& ray) {
@@ -166,7 +172,8 @@ class RayQuery {
     return ray;
   }
 
-  const SpatialQueries::Source::Loan m_scratch;
+  std::optional<SpatialQueries::Source::Loan> m_loan;
+  SpatialQueries::Source::Scratch* const m_scratch;
   const bool m_bruteForce;
 };
 
@@ -254,15 +261,15 @@ void SpatialQueries::allHits(GeometryId id, std::span<const Ray> rays, std::vect
   for (std::size_t i = 0; i < rays.size(); ++i) checkRay(rays[i], i);
   const Body& geometry = source->at(id);
   const Source::Loan scratch(*source);
-  std::vector<RayHit>& hits = scratch->hits;
+  scratch->hitsOfParts.resize(kPartsInTurn + 1);
+  std::vector<RayHit>& hits = scratch->hitsOfParts.back();
   std::vector<std::size_t>& ends = scratch->begins;  // of each ray, after a 0
   hits.clear();
   ends.assign(rays.size() + 1, 0);
   const std::span<std::size_t> counts = std::span(ends).subspan(1);
   const Source::Workers workers(*source);
   const Threads& threads = workers;
-  if (threads.count() == 1) RayQuery(*source).all(geometry, rays, hits, counts);
-  scratch->hitsOfParts.resize(kPartsInTurn);
+  if (threads.count() == 1) RayQuery(*source, scratch).all(geometry, rays, hits, counts);
   for (std::size_t begin = threads.count() == 1 ? rays.size() : 0, size; begin < rays.size();
        begin += size) {
     size = std::min(rays.size() - begin, kPartsInTurn * kPartOfBatch);
