@@ -99,10 +99,9 @@ class XRay {
       m_scene.positions(frame, m, m_positions);
       const double volume = volumeOf(m_positions, m_scene.meshes[m].triangles);
       if (!(std::abs(m_volumes[m] - volume) <= 100.0 / (m_pixels * m_pixels) * volume))
-        throw std::runtime_error("Frame " + std::to_string(frame) + ": the image of organ " +
-                                 std::to_string(m) + " has the volume " +
-                                 std::to_string(m_volumes[m]) + ", the organ " +
-                                 std::to_string(volume) + ".");
+        throw BrokenPromise("Frame " + std::to_string(frame) + ": the image of organ " +
+                            std::to_string(m) + " has the volume " + std::to_string(m_volumes[m]) +
+                            ", the organ " + std::to_string(volume) + ".");
     }
   }
   /// As PGM. The less light arrives, the brighter is a pixel.
@@ -164,13 +163,14 @@ void run(const Options& options) {
 int main(int count, char** arguments) {
   using namespace palpate::scenes;
   Options options;
-  CLI::App app("X-ray images of deforming organs.");
+  CLI::App app("X-ray images of deforming organs.", "XRay");
   app.add_option("--frames", options.frames, "images to compute")->check(CLI::PositiveNumber);
-  app.add_option("--pixels", options.pixels, "width and height")->check(CLI::Range(16, 4096));
+  app.add_option("--pixels", options.pixels, "width and height")->check(between(16, 4096));
   app.add_option("--threads", options.threads, "0: all cores")->check(CLI::NonNegativeNumber);
   app.add_option("--out", options.out, "the folder for the last image, scene.pgm");
   return exitCodeOf(app, [&] {
     app.parse(count, arguments);
     run(options);
+    return true;
   });
 }

@@ -339,3 +339,16 @@ def test_help_reads_well():
             if not name.startswith("_") and (callable(member) or isinstance(member, property)):
                 text = getattr(member, "__doc__", None)
                 assert text and "_palpate" not in text and "self:" not in text, (kind, name)
+
+
+def test_positions_of_some_vertices() -> None:
+    collisions = palpate.OctreeBasedCD()
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    mesh = collisions.add_triangle_mesh(positions, [[0, 1, 2], [1, 3, 2]])
+    collisions.set_positions(mesh, [[5.0, 6, 7], [8, 9, 10]], first=1)
+    positions[1:3] = [[5, 6, 7], [8, 9, 10]]
+    assert (collisions.positions(mesh) == positions).all()
+    with pytest.raises(palpate.Error, match="2 positions given from vertex 3 on, but it has 4"):
+        collisions.set_positions(mesh, positions[:2], first=3)
+    with pytest.raises(TypeError, match="not both"):
+        collisions.set_positions(mesh, positions, positions, first=0)
