@@ -80,5 +80,19 @@ TEST(SupportedPairs, AreThoseThatTheCodeAccepts) {
       }
 }
 
+/// Auto, the default, answers every pair that any other method answers.
+TEST(SupportedPairs, AutoAnswersAll) {
+  constexpr GeometryType kTypes[] = {GeometryType::Triangles, GeometryType::Lines,
+                                     GeometryType::Points, GeometryType::Shape,
+                                     GeometryType::Field};
+  for (const SupportedPairs& row : kSupport)
+    for (const GeometryType a : kTypes)
+      for (const GeometryType b : kTypes)
+        for (const bool itself : {false, true})
+          if (supportOf(row.method, a, b, itself)) {
+            EXPECT_TRUE(supportOf(Method::Auto, a, b, itself)) << toString(row.method);
+          }
+}
+
 }  // namespace
 }  // namespace palpate::testing
