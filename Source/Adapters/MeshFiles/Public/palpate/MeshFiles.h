@@ -17,10 +17,10 @@ namespace palpate {
 struct MeshArrays {
   std::vector<Eigen::Vector3d> positions;  ///< L: the file's length unit
   std::vector<Triangle> triangles;
-  std::vector<Tetrahedron> tetrahedra;
-  std::vector<Segment> segments;      ///< a polyline of n vertices gives n - 1
-  std::vector<std::uint32_t> points;  ///< the vertex of each element that is a point
-  std::size_t joinedVertices = 0;     ///< vertices that readMeshFile() joined to others
+  std::vector<Tetrahedron> tetrahedra{};
+  std::vector<Segment> segments{};      ///< a polyline of n vertices gives n - 1
+  std::vector<std::uint32_t> points{};  ///< the vertex of each element that is a point
+  std::size_t joinedVertices = 0;       ///< vertices that readMeshFile() joined to others
 
   operator TriangleMeshView() const { return {positions, triangles}; }
 };
