@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """extract.py ROOT OUT: writes a CMake project to OUT with every code block of README.md and Docs.
 
-C++     all cpp blocks of a page form the body of one function. An HTML comment on the line before a block changes that:
+C++     all cpp blocks of a page form the body of one function. Only hidden code uses ExampleMeshes.h. An HTML comment
+        on the line before a block changes that:
         <!-- program -->            the block starts a new program
         <!-- file scope -->         the block stands outside the function
         <!-- not run: ... -->       the block starts a new program, which is compiled only
@@ -100,6 +101,8 @@ def main():
             if any(mark.startswith("not compiled") for mark in marks) or language.startswith("{"):
                 continue
             if language == "cpp":
+                if "hidden" not in marks and "example::" in code:
+                    sys.exit(f"{page}:{line}: the block shows a name of ExampleMeshes.h, which readers do not have")
                 alone, runs = "int main(" in code, not any(mark.startswith("not run") for mark in marks)
                 if program is None or "program" in marks or alone or not runs or program.whole is not None:
                     number += 1
