@@ -158,8 +158,9 @@ void print(Report& report, const RowOptions& options, const std::string& scene, 
   report.line(line);
 }
 
-void palpateRow(Report& report, const RowOptions& options, const std::string& scene,
-                const SceneMesh& mesh, const Samples& samples, double bound, double band) {
+/// Returns its error over the bound.
+double palpateRow(Report& report, const RowOptions& options, const std::string& scene,
+                  const SceneMesh& mesh, const Samples& samples, double bound, double band) {
   Row row;
   row.engine = "Palpate";
   std::optional<DistanceField> field;
@@ -179,17 +180,19 @@ void palpateRow(Report& report, const RowOptions& options, const std::string& sc
   row.error = samples.errorOf(out, band) / bound;
   print(report, options, scene, row);
   report.row("fields", scene, 1, row.engine, "cells", static_cast<double>(field->cells()));
+  return row.error;
 }
 
 #ifdef PALPATE_BENCHMARK_OPENVDB
 void openVdbRow(Report& report, const RowOptions& options, const std::string& scene,
-                const SceneMesh& mesh, const Samples& samples, double bound, double band) {
+                const SceneMesh& mesh, const Samples& samples, double bound, double band,
+                double voxel, const char* name) {
   Row row;
-  row.engine = "OpenVDB 10";
+  row.engine = name;
   std::unique_ptr<FieldBaseline> field;
   for (const int threads : options.threads)
     row.builds.push_back(timeOf(options.measure.repetitions, [&] {
-      field = buildOpenVdb(mesh.positions, mesh.triangles, bound, band, threads);
+      field = buildOpenVdb(mesh.positions, mesh.triangles, voxel, band, threads);
     }));
   row.bytes = field->bytes();
   std::vector<double> out(samples.points.size());
@@ -197,6 +200,20 @@ void openVdbRow(Report& report, const RowOptions& options, const std::string& sc
                timeOf(7, [&] { field->values(samples.points, out); });
   row.error = samples.errorOf(out, band) / bound;
   print(report, options, scene, row);
+}
+
+/// The largest voxel, in steps of 5 %, whose measured error over the bound is at most this.
+double voxelOfError(const SceneMesh& mesh, const Samples& samples, double bound, double band,
+                    double error) {
+  std::vector<double> out(samples.exact.size());
+  double found = bound;
+  for (double voxel = bound; voxel <= band; voxel *= 1.05) {
+    buildOpenVdb(mesh.positions, mesh.triangles, voxel, band, 1)
+        ->values(std::span(samples.points).first(out.size()), out);
+    if (samples.errorOf(out, band) > error * bound) break;
+    found = voxel;
+  }
+  return found;
 }
 #endif
 
@@ -212,9 +229,13 @@ void fieldRow(Report& report, const RowOptions& options, const std::string& name
   const Samples samples(mesh, band);
   const std::string scene = name + ", " + accuracy.name();
   report.line({scene});
-  palpateRow(report, options, scene, mesh, samples, bound, band);
+  [[maybe_unused]] const double error =
+      palpateRow(report, options, scene, mesh, samples, bound, band);
 #ifdef PALPATE_BENCHMARK_OPENVDB
-  if (band <= kWidestBand * bound) openVdbRow(report, options, scene, mesh, samples, bound, band);
+  if (band > kWidestBand * bound) return;
+  openVdbRow(report, options, scene, mesh, samples, bound, band, bound, "OpenVDB 10");
+  openVdbRow(report, options, scene, mesh, samples, bound, band,
+             voxelOfError(mesh, samples, bound, band, error), "OpenVDB 10, equal error");
 #endif
 }
 
@@ -231,12 +252,15 @@ void fieldRows(Report& report, const RowOptions& options) {
   report.line(header);
   for (const auto& [name, make, isLarge] : bodies()) {
     if (isLarge && options.scenes.empty()) continue;
-    if (!isWanted(name, options.scenes)) continue;
-    const SceneMesh mesh = make();
+    std::optional<SceneMesh> mesh;
     for (const Accuracy& accuracy :
          {Accuracy{0.01, 0.03}, Accuracy{0.01, 0.05}, Accuracy{0.003, 0.009},
-          Accuracy{0.001, 0.003}, Accuracy{0.001, 0.05}})
-      if (!isLarge || accuracy.band == 0.003) fieldRow(report, options, name, mesh, accuracy);
+          Accuracy{0.001, 0.003}, Accuracy{0.001, 0.05}}) {
+      if (!isWanted(name + (", " + accuracy.name()), options.scenes)) continue;
+      if (isLarge && accuracy.band != 0.003) continue;
+      if (!mesh) mesh = make();
+      fieldRow(report, options, name, *mesh, accuracy);
+    }
   }
 }
 

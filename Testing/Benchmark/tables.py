@@ -110,6 +110,15 @@ def spatial(figures):
     return markdown(["1 thread", "Palpate us", "fastest library", "its us", "ratio"], rows)
 
 
+def particles(figures):
+    """One row for each number of particles and of triangles: each method's frame."""
+    methods = figures.distinct("particles", "engine")
+    rows = [[f"{int(number):,}" for number in re.findall(r"\d+", scene)] +
+            [figure(figures.value("particles", scene, 1, m, "frame ms")) for m in methods]
+            for scene in figures.distinct("particles", "scene")]
+    return markdown(["particles", "triangles", *(f"`{m}` ms" for m in methods)], rows)
+
+
 def provenance(figures):
     row = figures.rows[0]
     return [f"{row['machine']}, {row['compiler']}, SIMD path {row['simd']}, commit {row['commit']}."]
@@ -121,6 +130,8 @@ TABLES = {
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
     "continuous": metrics("continuous", "1 / 2 threads", engines=lambda e: not e.startswith("Embree"),
                           columns=["ms", "narrow phase ms"]),
+    "resting": metrics("resting", "1 thread", columns=["Proximity ms", "Auto ms"]),
+    "particles": particles,
     "fields": metrics("fields", "1 thread", scenes=lambda s: s.startswith(("sphere", "liver", "bone")) and
                       s.endswith((" 1 %, band 3 %", " 0.1 %, band 0.3 %"))),
     "spatial": spatial,
