@@ -1,7 +1,8 @@
 """reference.py XML OUT HEADER...: writes one page of the C++ reference for each public header.
 
 XML: the folder of Doxygen's XML. OUT: the folder of the pages. HEADER: a path that contains Public/palpate/.
-A page begins with the first "//" comment inside the header's namespace, which is about the header as a whole.
+A page begins with the first "//" comment inside the header's namespace, which is about the header as a whole. Types
+follow in the order of the header, each with a heading, then functions and constants. GROUPS has every header once.
 """
 import pathlib
 import re
@@ -12,6 +13,14 @@ xml, out = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 headers = sys.argv[3:]
 DIRECTIVES = {"struct": "doxygenstruct", "class": "doxygenclass", "enum": "doxygenenum", "typedef": "doxygentypedef",
               "variable": "doxygenvariable", "function": "doxygenfunction", "define": "doxygendefine"}
+GROUPS = {
+    "Detection": "OctreeBasedCD Settings Types Meshes AnalyticalGeometry ArrayAdapter",
+    "Contacts and response": "CollisionData ConstraintRows Validity StepGuard FeaturePairs",
+    "Queries": "SpatialQueries Snapshot PenetrationTracker",
+    "Bodies with an error bound": "DistanceField Simplify",
+    "Files and display": "MeshFiles DataSets Window",
+    "Errors, measurement and checks": "Error FrameStatistics LooseOctree Capture FclEngine Executor Export",
+}
 
 index = ElementTree.parse(xml / "index.xml").getroot()
 namespaces = [ElementTree.parse(xml / (compound.get("refid") + ".xml")).getroot() for compound in index.iter("compound")
@@ -43,7 +52,7 @@ def signature(member):
 
 
 def directives(header):
-    """The directives of all that the header declares at namespace scope, in its order."""
+    """(line, directive, name, options) of all that the header declares at namespace scope, in its order."""
     tree = ElementTree.parse(xml / (files[pathlib.Path(header).name] + ".xml")).getroot()
     found = []
     for inner in tree.iter("innerclass"):
@@ -63,35 +72,57 @@ def directives(header):
             continue
         name = signature(member) if kind == "function" else member.findtext("qualifiedname") or member.findtext("name")
         found.append((int(member.find("location").get("line")), DIRECTIVES[kind], name, ""))
-    return "".join(f".. {directive}:: {name}\n{options}\n" for _, directive, name, options in sorted(found))
+    return sorted(found)
 
 
-names, table = [], []
+def plain(name):
+    """The name without "palpate::" and parameters."""
+    return re.sub(r"\(.*", "", name).removeprefix("palpate::")
+
+
+def section(heading, entries):
+    blocks = "".join(f".. {directive}:: {name}\n{options}\n" for _, directive, name, options in entries)
+    return f"## {heading}\n\n```{{eval-rst}}\n{blocks}```\n\n"
+
+
+rows, stems = {}, [stem for group in GROUPS.values() for stem in group.split()]
 for header in headers:
-    page = directives(header)
-    if not page:
+    found = directives(header)
+    if not found:
         continue
-    included = header.split("Public/palpate/", 1)[1]
-    name = pathlib.Path(header).stem
-    names.append(name)
-    declared = list(dict.fromkeys(re.findall(r"^\.\. \w+:: (?:palpate::)?([\w:]+)", page, re.MULTILINE)))
-    table.append(f"| [`<palpate/{included}>`]({name}.md) | {', '.join(f'`{each}`' for each in declared)} |")
-    (out / f"{name}.md").write_text(f"# `<palpate/{included}>`\n\n{introduction(header)}```{{eval-rst}}\n{page}```\n",
-                                    encoding="utf-8")
-lines, rows = "\n".join(names), "\n".join(table)
-(out / "index.md").write_text(f"""# C++ API
+    included, stem = header.split("Public/palpate/", 1)[1], pathlib.Path(header).stem
+    if stems.count(stem) != 1:
+        sys.exit(f"{header}: GROUPS of reference.py must have {stem} once")
+    names = ", ".join(f"`{name}`" for name in dict.fromkeys(
+        plain(entry[2]) + ("()" if entry[1] == "doxygenfunction" else "") for entry in found))
+    rows[stem] = f"| [`<palpate/{included}>`]({stem}.md) | {names} |"
+    types = [entry for entry in found if entry[1] in ("doxygenstruct", "doxygenclass", "doxygenenum", "doxygentypedef")]
+    others = [entry for entry in found if entry not in types]
+    page = "".join(section(f"`{plain(entry[2])}`", [entry]) for entry in types)
+    page += section("Functions and constants", others) if others else ""
+    (out / f"{stem}.md").write_text(f"# `<palpate/{included}>`\n\n{introduction(header)}{page}", encoding="utf-8")
+if missing := set(stems) - set(rows):
+    sys.exit(f"GROUPS of reference.py has {missing}, which no header is")
+text = """# C++ API
 
 This reference has one page for each public header. `<palpate/Palpate.h>` includes those of the library.
 Include the headers of optional targets yourself.
 [Errors](/Docs/Errors.md) explains the codes that functions throw, and [Settings](/Docs/Settings.md) lists all settings.
+"""
+for group, members in GROUPS.items():
+    lines, table = "\n".join(members.split()), "\n".join(rows[stem] for stem in members.split())
+    text += f"""
+## {group}
 
 | header | declares |
 |---|---|
-{rows}
+{table}
 
 ```{{toctree}}
+:caption: {group}
 :hidden:
 :maxdepth: 1
 {lines}
 ```
-""", encoding="utf-8")
+"""
+(out / "index.md").write_text(text, encoding="utf-8")
