@@ -146,7 +146,7 @@ def textOf(node, skipped):
     """The text of a node on one line, less that of nodes of the skipped kinds."""
     if isinstance(node, skipped) or "members" in (node.get("classes", []) if isinstance(node, nodes.Element) else []):
         return ""
-    if not node.children:
+    if not node.children or isinstance(node, addnodes.desc_parameterlist):
         return node.astext()
     separator = "" if isinstance(node, (nodes.TextElement, nodes.literal)) else " "
     return separator.join(textOf(child, skipped) for child in node.children)
