@@ -64,7 +64,7 @@ sed -i 's#/javascript/normalize.css/##' "$out/html/_static/styles/furo.css"
 
 # What a reader finds by the search, and what every page looks like at three widths of the window.
 node Testing/Documentation/search.js "$out/html"
-timeout 300 chromium --headless --no-sandbox --disable-gpu --allow-file-access-from-files --virtual-time-budget=100000000 \
+timeout 1200 chromium --headless --no-sandbox --disable-gpu --allow-file-access-from-files --virtual-time-budget=100000000 \
   --window-size=1400,1000 --dump-dom "file://$PWD/Testing/Documentation/layout.html?$out/html" 2>/dev/null >"$out/layout.html"
 awk '/<pre id="result">/ { on = 1 } on { last = /<\/pre>/; gsub(/<[^>]*>/, ""); print } last { exit }' "$out/layout.html"
 grep -q 'layout: .* pages, 0 faults' "$out/layout.html"
