@@ -1,7 +1,8 @@
 #!/bin/bash
-# CMake/docs.sh: builds the documentation site into build/docs/html, with packages of Debian and without network. Fails
-# on any warning: a broken link between pages, a page that no table of contents names, a name that Doxygen cannot resolve;
-# and if the search does not find what readers look for, or a page does not fit its window.
+# CMake/docs.sh [--layout]: builds the documentation site into build/docs/html, with packages of Debian and without
+# network. Fails on any warning: a broken link between pages, a page that no table of contents names, a name that Doxygen
+# cannot resolve; and if the search does not find what readers look for. --layout: fails, too, if a page does not fit its
+# window, in minutes.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -62,10 +63,11 @@ sphinx-build -W --keep-going -q -b html -c Docs/Site "$out/source" "$out/html"
 cp /usr/share/javascript/normalize.css/normalize.css "$out/html/_static/styles/"
 sed -i 's#/javascript/normalize.css/##' "$out/html/_static/styles/furo.css"
 
-# What a reader finds by the search, and what every page looks like at three widths of the window.
-node Testing/Documentation/search.js "$out/html"
+node Testing/Documentation/search.js "$out/html"  # what a reader finds by the search
+echo "The documentation is in build/docs/html/index.html."
+[[ ${1:-} == --layout ]] || exit 0
+# What every page looks like at three widths of the window.
 timeout 1200 chromium --headless --no-sandbox --disable-gpu --allow-file-access-from-files --virtual-time-budget=100000000 \
   --window-size=1400,1000 --dump-dom "file://$PWD/Testing/Documentation/layout.html?$out/html" 2>/dev/null >"$out/layout.html"
 awk '/<pre id="result">/ { on = 1 } on { last = /<\/pre>/; gsub(/<[^>]*>/, ""); print } last { exit }' "$out/layout.html"
 grep -q 'layout: .* pages, 0 faults' "$out/layout.html"
-echo "The documentation is in build/docs/html/index.html."
