@@ -115,11 +115,11 @@ void GeometryStep::setSomePositions(const GeometryLabel& label, TriangleMesh& me
   Eigen::AlignedBox3d bounds = mesh.now.bounds(), old;
   for (std::size_t v = changed.begin; v < changed.end; ++v) old.extend(last[v]);
   // A side that an old position touched may be further in now, unless a new one reaches it.
-  const auto isInside = [&](const auto& inner, const auto& now, const auto& side) {
-    return (inner < side || now >= side).all();
+  const auto stays = [](const auto& side, const auto& before, const auto& after) {
+    return (before < side || after >= side).all();
   };
-  if (isInside(old.max().array(), part.max().array(), bounds.max().array()) &&
-      isInside(-old.min().array(), -part.min().array(), -bounds.min().array())) {
+  if (stays(bounds.max().array(), old.max().array(), part.max().array()) &&
+      stays(-bounds.min().array(), -old.min().array(), -part.min().array())) {
     bounds.extend(part);
   } else {
     bounds.setEmpty();

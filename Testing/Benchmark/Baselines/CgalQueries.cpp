@@ -124,6 +124,7 @@ class CgalQueries : public SpatialEngine {
           break;
         }
         case SpatialQuery::EightNearest:
+        case SpatialQuery::AllHits:
           break;
       }
     }

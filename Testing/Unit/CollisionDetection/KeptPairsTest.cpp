@@ -67,7 +67,7 @@ std::vector<SlowScene> slowScenes() {
 /// An object that keeps its candidates, and one that searches from scratch.
 class KeptAndSearched {
  public:
-  KeptAndSearched(const SlowScene& scene, int threads) : m_scene(scene) {
+  KeptAndSearched(const SlowScene& scene, int threads) {
     for (const bool keeps : {true, false}) {
       Settings settings = settingsOf(Engine::Octree, keeps ? threads : 1);
       settings.octree.keepsPairs = keeps;
@@ -145,7 +145,6 @@ class KeptAndSearched {
   void setAsksStatistics(bool asks) { m_asksStatistics = asks; }
 
  private:
-  const SlowScene& m_scene;
   std::vector<OctreeBasedCD> m_objects;
   std::vector<GeometryId> m_ids;
   std::vector<Positions> m_positions;
