@@ -175,13 +175,23 @@ void place(World& world) {
 void prepare(vtk::Window& window, LiveScene& scene, const SceneProgram& program,
              const Options& options) {
   for (const BodyLook& look : scene.looks())
-    window.setAppearance(scene.world().bodies()[look.body].id,
-                         {look.label, look.colour, look.opacity, look.frontFaces},
-                         look.firstElement);
+    window.setAppearance(
+        scene.world().bodies()[look.body].id,
+        {look.label, look.colour, look.opacity, look.frontFaces, look.roughness, look.metallic},
+        look.firstElement);
   const PictureView view = scene.view();
-  window.setView({.from = view.from, .centre = view.centre, .height = view.height});
+  window.setView({.from = view.from, .up = view.up, .centre = view.centre, .height = view.height});
+  if (view.insetHeight > 0)
+    window.setInset({view.inset, view.insetHeight, view.insetLeft, view.insetTop});
   window.setLengthUnit(options.unit);
   for (const char key : program.keys + options.keys) window.press(key);
+}
+
+void addNotes(vtk::Window& window, LiveScene& scene) {
+  std::vector<vtk::Note> notes;
+  for (const PictureNote& note : scene.notes())
+    notes.push_back({note.text, note.at, note.from, note.colour});
+  window.setNotes(std::move(notes));
 }
 
 /// An image of half the width and height: the mean of each four pixels.
@@ -210,6 +220,7 @@ class Painter {
   }
   std::string png(int frame) {
     place(m_scene.world());
+    addNotes(m_window, m_scene);
     m_window.show(frame);
     return vtk::toPng(halved(m_window.image()));
   }
@@ -292,7 +303,7 @@ void run(const SceneProgram& program, Options options) {
     hash = nextHash(hash, scene->world());
     if (series) series->add(scene->world());
 #ifdef PALPATE_HAS_VTK
-    if (window) place(scene->world());
+    if (window) place(scene->world()), addNotes(*window, *scene);
     if (window && !window->show(frame)) options.frames = frame + 1;
     if (painter && frame >= options.pictures[0] &&
         (frame - options.pictures[0]) % std::max(1, options.pictures[1]) == 0) {
@@ -327,6 +338,18 @@ void run(const SceneProgram& program, Options options) {
 }
 
 }  // namespace
+
+std::vector<PictureNote> forceNotes(const Eigen::Vector3d& at, const Eigen::Vector3d& newtons,
+                                    double length) {
+  constexpr double kLeast = 0.05;  // N
+  const double size = newtons.norm();
+  if (size < kLeast) return {};
+  std::array<char, 16> text;
+  std::snprintf(text.data(), text.size(), "%.1f N", size);
+  const Eigen::Vector3d tip = at + length * newtons;
+  return {{"", tip, at, kForceColour},
+          {text.data(), tip + 0.15 * length * size * newtons / size, {}, kForceColour}};
+}
 
 int runScene(const SceneProgram& program, int count, char** arguments) {
   CLI::App app(program.description, program.name);

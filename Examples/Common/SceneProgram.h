@@ -20,11 +20,11 @@ namespace palpate::scenes {
 using Colour = std::array<double, 3>;  ///< red, green and blue in [0, 1]
 
 /// Colours of pictures. Colour-blind readers can tell them apart by lightness.
-inline constexpr Colour kLiverColour{0.66, 0.33, 0.27}, kStomachColour{0.94, 0.76, 0.70},
-    kKidneyColour{0.80, 0.52, 0.42}, kSpleenColour{0.64, 0.49, 0.53},
-    kGallbladderColour{0.88, 0.82, 0.58}, kTissueColour{0.93, 0.80, 0.74},
+inline constexpr Colour kLiverColour{0.45, 0.10, 0.07}, kStomachColour{0.90, 0.62, 0.54},
+    kKidneyColour{0.66, 0.30, 0.22}, kSpleenColour{0.64, 0.49, 0.53},
+    kGallbladderColour{0.88, 0.82, 0.58}, kTissueColour{0.90, 0.68, 0.58},
     kBoneColour{0.93, 0.89, 0.80}, kSteelColour{0.62, 0.66, 0.72}, kNeedleColour{0.35, 0.40, 0.48},
-    kThreadColour{0.10, 0.35, 0.75}, kBloodColour{0.70, 0.10, 0.12};
+    kThreadColour{0.10, 0.35, 0.75}, kBloodColour{0.70, 0.10, 0.12}, kForceColour{0.80, 0.30, 0.0};
 
 /// How a picture shows a body, or its elements from `firstElement` on.
 struct BodyLook {
@@ -34,13 +34,31 @@ struct BodyLook {
   double opacity = 1.0;
   bool frontFaces = true;  ///< false: the picture shows a cavity from inside
   std::uint32_t firstElement = 0;
+  double roughness = 0.4;  ///< wet tissue 0.3, bone 0.7
+  double metallic = 0;
 };
+
+/// A text in a picture. With `from`, an arrow leads from there to `at`, and the text stands there.
+struct PictureNote {
+  std::string text;
+  Eigen::Vector3d at;
+  std::optional<Eigen::Vector3d> from{};
+  Colour colour{0.1, 0.1, 0.12};
+};
+
+/// An arrow from a point along a force in newtons, with its size at the tip. length: L, of 1 N.
+std::vector<PictureNote> forceNotes(const Eigen::Vector3d& at, const Eigen::Vector3d& newtons,
+                                    double length);
 
 /// What a picture shows.
 struct PictureView {
   Eigen::Vector3d from{0.5, -1.0, 0.6};  ///< from the scene to the camera
+  Eigen::Vector3d up{0, 0, 1};
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double height = 0;  ///< L, about the centre; 0: everything is in view
+  Eigen::Vector3d inset = Eigen::Vector3d::Zero();
+  double insetHeight = 0;                   ///< L, of an enlarged part about `inset`; 0: none
+  bool insetLeft = false, insetTop = true;  ///< its corner
 };
 
 /// A scene that is computed frame by frame.
@@ -61,6 +79,7 @@ class LiveScene {
   virtual std::optional<int> frameToShow() { return {}; }
   virtual std::vector<BodyLook> looks() { return {}; }
   virtual PictureView view() { return {}; }
+  virtual std::vector<PictureNote> notes() { return {}; }  ///< on the last computed frame
 };
 
 struct SceneProgram {

@@ -14,6 +14,8 @@ using Eigen::Vector3d;
 
 // Lengths in mm, times in s.
 constexpr double kFrame = 1.0 / 60, kThickness = 0.5, kSpeed = 20 * kThickness;
+// Membranes reach into each other, but no pair of theirs is tested. Pictures show their middle.
+constexpr double kSpacing = 15, kShown = 6.5;
 constexpr double kHalfWidth = 15, kNeedleLength = 8, kNeedleRadius = 0.4;
 constexpr double kAbove = 11, kBelow = -9;  // where the tip turns
 constexpr int kRounds = 4, kIterations = 12, kFramesDown = 12, kPeriod = 24;
@@ -29,9 +31,27 @@ SceneMesh needleMesh() {
   return mesh;
 }
 
+/// The triangles whose vertices are all kept. vertexOf: the old index of each vertex.
+SceneMesh partOf(const SceneMesh& mesh, const std::function<bool(const Vector3d&)>& keeps,
+                 std::vector<std::uint32_t>& vertexOf) {
+  SceneMesh part;
+  std::vector<std::uint32_t> newIndex(mesh.positions.size());
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    if (!keeps(mesh.positions[v])) continue;
+    newIndex[v] = static_cast<std::uint32_t>(vertexOf.size());
+    vertexOf.push_back(v);
+    part.positions.push_back(mesh.positions[v]);
+  }
+  for (const auto& [a, b, c] : mesh.triangles)
+    if (keeps(mesh.positions[a]) && keeps(mesh.positions[b]) && keeps(mesh.positions[c]))
+      part.triangles.push_back({newIndex[a], newIndex[b], newIndex[c]});
+  return part;
+}
+
 struct Lane {
   Method method;
-  World::BodyId needle, membrane;
+  World::BodyId needle, membrane, shown;
+  std::vector<std::uint32_t> shownOf;  ///< the membrane's vertex of each one that is shown
   bool passed = false;
 };
 
@@ -48,13 +68,36 @@ class FastNeedle : public LiveScene {
   std::vector<BodyLook> looks() override {
     std::vector<BodyLook> looks;
     for (const Lane& lane : m_lanes) {
-      looks.push_back({lane.needle, m_world.bodies()[lane.needle].name, kNeedleColour});
-      looks.push_back({lane.membrane, "", kStomachColour, 0.6});
+      looks.push_back({lane.needle, "", kSteelColour, 1, true, 0, 0.3, 1});
+      looks.push_back({lane.membrane, "", kTissueColour, 0});
+      looks.push_back({lane.shown, "", kTissueColour});
     }
     return looks;
   }
 
-  PictureView view() override { return {.from = {0.2, -1, 0.45}}; }
+  PictureView view() override {
+    return {.from = {0, -1, 0.22}, .centre = {0, 0, -1.5}, .height = 31};
+  }
+
+  /// Each needle's way from the start, and whether its method found the membrane.
+  std::vector<PictureNote> notes() override {
+    std::vector<PictureNote> notes;
+    for (const Lane& lane : m_lanes) {
+      const Vector3d tip = m_world.positions(lane.needle).front(), start(tip.x(), tip.y(), kAbove),
+                     end(tip.x(), tip.y(), tip.z() + kNeedleLength);
+      const bool found = m_world.force(lane.needle).norm() > 0;
+      const Colour colour = found ? Colour{0, 0.45, 0.35} : Colour{0.75, 0.25, 0};
+      notes.push_back({"", end, start});
+      notes.push_back({m_world.bodies()[lane.needle].name, {tip.x(), tip.y(), kAbove + 1.2}});
+      notes.push_back({found ? "found: the membrane holds it" : "missed: it is through",
+                       {tip.x(), tip.y(), -12.5},
+                       {},
+                       colour});
+    }
+    notes.push_back(
+        {"10 mm in a frame", m_world.positions(m_lanes[0].needle).front() + Vector3d(4, 0, 15)});
+    return notes;
+  }
 
   void computeFrame(int frame) override {
     m_world.predict(kFrame, Vector3d::Zero(), 0.1);
@@ -65,6 +108,9 @@ class FastNeedle : public LiveScene {
     }
     m_world.hold();
     m_world.commit();
+    for (const Lane& lane : m_lanes)
+      for (std::size_t i = 0; i < lane.shownOf.size(); ++i)
+        m_world.positions(lane.shown)[i] = m_world.positions(lane.membrane)[lane.shownOf[i]];
   }
 
   std::vector<std::pair<std::string, double>> values() override {
@@ -88,12 +134,19 @@ class FastNeedle : public LiveScene {
 
  private:
   void addLane(const std::string& name, Method method, int side) {
-    const Vector3d centre(side * 2.2 * kHalfWidth, 0, 0);
+    const Vector3d centre(side * kSpacing, 0, 0);
     SceneMesh needle = needleMesh(), membrane = sheet(24);
     for (Vector3d& p : needle.positions) p += centre + Vector3d(0.3, 0.2, kAbove);
     for (Vector3d& p : membrane.positions) p = centre + kHalfWidth * p;
-    Lane lane{method, m_world.addMesh(name, needle, 0.0),
-              m_world.addMesh(name + " membrane", membrane, 1.0)};
+    Lane lane{method,
+              m_world.addMesh(name, needle, 0.0),
+              m_world.addMesh(name + " membrane", membrane, 1.0),
+              0,
+              {}};
+    const auto shown = [&](const Vector3d& p) {  // a section through the needle's way
+      return std::abs(p.x() - centre.x()) < kShown && p.y() > -0.1 && p.y() < kShown;
+    };
+    lane.shown = m_world.addMesh("", partOf(membrane, shown, lane.shownOf), 0.0);
     m_world.pin(lane.membrane, [&](const Vector3d& p) {
       return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
     });
@@ -153,6 +206,7 @@ int main(int count, char** arguments) {
        .frames = 96,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,
+       .keys = "n",
        .make = [](int threads) { return std::make_unique<FastNeedle>(threads); }},
       count, arguments);
 }

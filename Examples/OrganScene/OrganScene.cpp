@@ -128,7 +128,7 @@ int main(int count, char** arguments) {
        .frames = 120,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,
-       .keys = "o",
+       .keys = "on",
        .unit = "L",
        .isUnitFree = true,
        .addOptions =

@@ -72,7 +72,16 @@ class Palpation : public LiveScene {
 
   std::vector<BodyLook> looks() override {
     return {{m_organ, m_world.bodies()[m_organ].name, kLiverColour},
-            {m_tool, m_world.bodies()[m_tool].name, kSteelColour}};
+            {m_tool, m_world.bodies()[m_tool].name, kSteelColour, 0.35, true, 0, 0.3, 1}};
+  }
+
+  PictureView view() override {
+    return {.from = {0.3, -1, 0.8}, .inset = m_tip, .insetHeight = 0.24 * m_size};
+  }
+
+  /// What the organ does to the tool.
+  std::vector<PictureNote> notes() override {
+    return forceNotes(m_tip, m_world.force(m_tool) / 1000, m_size / 10);
   }
 
   void computeFrame(int frame) override {
@@ -195,6 +204,7 @@ int main(int count, char** arguments) {
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,
+       .keys = "n",
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--mesh", files.organ,

@@ -79,10 +79,12 @@ class Retraction : public LiveScene {
 
   std::vector<BodyLook> looks() override {
     const auto [liver, stomach, membrane] = m_bodies;
-    return {{liver, "Liver", kLiverColour},
+    return {{liver, "Liver", kLiverColour, 0.35},
             {stomach, "Stomach", kStomachColour},
             {membrane, "Membrane", kGallbladderColour}};
   }
+
+  PictureView view() override { return {.from = {0.5, -1, 0.75}}; }
 
   void computeFrame(int frame) override {
     for (int substep = 1; substep <= kSubsteps; ++substep) {
@@ -178,6 +180,7 @@ int main(int count, char** arguments) {
            "A liver pressed onto a stomach and drawn aside, a membrane gathered between them.",
        .frames = 1000,
        .frameMilliseconds = 1000.0 / 60,
+       .keys = "n",
        .make = [](int threads) { return std::make_unique<Retraction>(threads); }},
       count, arguments);
 }

@@ -17,7 +17,8 @@ using BothJoints = Eigen::Matrix<double, 12, 1>;
 
 // Lengths in mm. kStep: what an arm's points move in a frame of 1/60 s, of its own accord.
 constexpr double kGap = 1, kSight = 2 * kGap, kStep = 1;
-constexpr int kRounds = 6, kIterations = 12, kPeriod = 240, kLinks = InstrumentArm::kLinks;
+constexpr int kRounds = 6, kIterations = 12, kPeriod = 240, kLinks = InstrumentArm::kLinks,
+              kJoints = 3;
 constexpr World::BodyId kCavity = 0, kLiver = 1, kFirstArm = 4, kSecondArm = kFirstArm + kLinks;
 
 struct Row {
@@ -53,6 +54,11 @@ class RobotArms : public LiveScene {
       }
     }
     addPairs();
+    for (int joint = 0; joint < 2 * kJoints; ++joint) {  // shown only
+      SceneMesh ball = sphere(8);
+      for (Vector3d& p : ball.positions) p *= 3.5 - 0.2 * (joint % kJoints);
+      m_joints.push_back(m_world.addRigidMesh("", ball));
+    }
     move();
   }
 
@@ -64,14 +70,21 @@ class RobotArms : public LiveScene {
         {kLiver, "Liver", kLiverColour},
         {kLiver + 1, "Stomach", kStomachColour},
         {kLiver + 2, "Kidney", kKidneyColour}};
-    for (World::BodyId link = kFirstArm; link < m_world.bodies().size(); ++link) {
-      const bool isLeft = link < kSecondArm;
+    for (World::BodyId link = kFirstArm; link < kFirstArm + 2 * kLinks; ++link) {
       const char* label = link == kFirstArm ? "Left arm" : link == kSecondArm ? "Right arm" : "";
-      looks.push_back({link, label, isLeft ? kSteelColour : kNeedleColour});
+      looks.push_back({link, label, kSteelColour, 1, true, 0, 0.3, 1});
     }
+    for (const World::BodyId joint : m_joints)
+      looks.push_back({joint, "", {0.15, 0.16, 0.18}, 1, true, 0, 0.4, 0.5});
     return looks;
   }
-  PictureView view() override { return {.from = {-0.1, -1, 1.0}}; }
+  PictureView view() override {
+    return {.from = {-0.1, -1, 1.0},
+            .centre = {0, 5, 0},
+            .height = 105,
+            .inset = middle(),
+            .insetHeight = 24};
+  }
   void computeFrame(int frame) override {
     const std::vector<InstrumentArm> arms = m_arms;
     const double breath = m_breath;
@@ -99,7 +112,7 @@ class RobotArms : public LiveScene {
   /// exact arithmetic, and a vertex of each, which stands for all then, is not inside another.
   std::string fault() override {
     const auto& bodies = m_world.bodies();
-    for (std::size_t i = 0; i < bodies.size(); ++i)
+    for (std::size_t i = 0; i < m_meshes.size(); ++i)
       for (const GeometryId id : {m_meshes[i], m_firsts[i]})
         m_check.setTransform(id, {bodies[i].rotation, bodies[i].translation});
     m_check.detectCollision();
@@ -148,6 +161,9 @@ class RobotArms : public LiveScene {
     for (int i = 0; i < 2 * kLinks; ++i) {
       const Eigen::Isometry3d& at = m_arms[i / kLinks].link(i % kLinks);
       m_world.place(kFirstArm + i, at.linear(), at.translation());
+      const int joint = i % kLinks - 1;
+      if (joint >= 0 && joint < kJoints)
+        m_world.place(m_joints[kJoints * (i / kLinks) + joint], at.linear(), at.translation());
     }
     m_world.detect();
     m_rows.clear();
@@ -159,6 +175,12 @@ class RobotArms : public LiveScene {
         addRow(a, b, c.distance, c.normal, c.pointA, c.pointB);
     }
     return m_nearest;
+  }
+
+  /// Between the jaws of both arms.
+  Vector3d middle() const {
+    return (m_arms[0].link(kLinks - 1).translation() + m_arms[1].link(kLinks - 1).translation()) /
+           2;
   }
 
   /// normal: towards a, which is a link.
@@ -199,6 +221,7 @@ class RobotArms : public LiveScene {
   std::vector<GeometryId> m_meshes, m_firsts;  // of m_check, by body: tessellation, its vertex 0
   std::vector<InstrumentArm> m_arms;
   std::vector<Row> m_rows;
+  std::vector<World::BodyId> m_joints;
   double m_breath = 0, m_nearest = kSight;
   int m_armsTouch = 0, m_organsTouch = 0, m_held = 0;
 };
@@ -212,6 +235,7 @@ int main(int count, char** arguments) {
                    .description = "Two arms of rigid links in a cavity, among organs that breathe.",
                    .frames = 480,
                    .frameMilliseconds = 1000.0 / 60,
+                   .keys = "n",
                    .make = [](int threads) { return std::make_unique<RobotArms>(threads); }},
                   count, arguments);
 }

@@ -20,7 +20,7 @@ constexpr std::uint32_t kNeedle = 60, kSegments = 1000;  // segments
 constexpr double kSegment = 0.07, kRadius = 0.05, kGap = 0.01, kArc = 4, kDepth = 2.4;
 constexpr double kNeedleSpeed = 0.1, kMostStretch = 1.08;
 // The story, in substeps: through both sheets, up, around the standing part, away.
-constexpr double kThrough = 300, kUp = 160, kAround = 400, kAway = 340;
+constexpr double kThrough = 300, kUp = 160, kAround = 400, kAway = 740;
 
 Vector3d onArc(double angle) {
   return {kArc * std::cos(angle), 0.21, kDepth + kArc * std::sin(angle)};
@@ -42,7 +42,7 @@ std::vector<Vector3d> needleAt(double time) {
   Vector3d place = end + up * (axis + Vector3d(7, 0, 9.5) - end);
   if (up == 1)
     place = axis + Vector3d(radius * std::cos(orbit), radius * std::sin(orbit), 9.5 - 2 * around);
-  place += away * Vector3d(22, 22, -2);
+  place += away * Vector3d(48, 48, -4);
   const Eigen::AngleAxisd turn(orbit - pi * up, Vector3d::UnitZ());
   std::vector<Vector3d> needle;
   for (std::uint32_t i = 0; i <= kNeedle; ++i)
@@ -88,16 +88,25 @@ class Suturing : public LiveScene {
     m_world.addGuard(m_thread, m_thread);
     for (const double side : {-1.0, 1.0}) addSheet(side, touching);
     m_world.addPair(m_sheets[0], m_sheets[1], touching, kGap);
+    SceneMesh bed = sheet(24);  // shown only
+    for (Vector3d& p : bed.positions)
+      p = {2.5 * p.x(), 5 * p.y(), -0.5 - 1.5 * (1 - p.x() * p.x())};
+    m_bed = m_world.addRigidMesh("wound", bed);
     m_world.addGuard(m_sheets[0], m_sheets[1]);
   }
 
   World& world() override { return m_world; }
 
   std::vector<BodyLook> looks() override {
-    return {{m_thread, "Needle", kNeedleColour},
-            {.body = m_thread, .label = "Thread", .colour = kThreadColour, .firstElement = kNeedle},
-            {m_sheets[0], "Left sheet", kStomachColour},
-            {m_sheets[1], "Right sheet", kTissueColour}};
+    return {{m_thread, "", kSteelColour, 1, true, 0, 0.3, 1},
+            {.body = m_thread, .label = "", .colour = kThreadColour, .firstElement = kNeedle},
+            {m_sheets[0], "", kTissueColour, 1, true, 0, 0.5},
+            {m_sheets[1], "", kTissueColour, 1, true, 0, 0.5},
+            {m_bed, "", {0.45, 0.05, 0.05}, 1, true, 0, 0.25}};
+  }
+
+  PictureView view() override {
+    return {.from = {0.35, -1, 0.75}, .centre = {0, 0, 0.8}, .height = 10};
   }
 
   void computeFrame(int) override {
@@ -191,7 +200,7 @@ class Suturing : public LiveScene {
   }
 
   World m_world;
-  World::BodyId m_thread = 0;
+  World::BodyId m_thread = 0, m_bed = 0;
   std::array<World::BodyId, 2> m_sheets{};
   std::array<bool, 2> m_holes{};
   std::vector<std::vector<Vector3d>> m_steps;  // the frame's, committed
@@ -209,6 +218,7 @@ int main(int count, char** arguments) {
        .description = "A thread of 1,000 segments through two sheets and around itself.",
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
+       .keys = "n",
        .make = [](int threads) { return std::make_unique<Suturing>(threads); }},
       count, arguments);
 }

@@ -28,6 +28,14 @@ double roundLength(double limit) {
   return power;
 }
 
+double roundUp(double least) {
+  constexpr double kRounding = 1 - 1e-9;
+  const double power = std::pow(10, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * power >= kRounding * least) return factor * power;
+  return 10 * power;
+}
+
 ScaleBar::ScaleBar() {
   m_points->SetNumberOfPoints(6);
   vtkNew<vtkCellArray> lines;

@@ -31,5 +31,7 @@ class ScaleBar {
 
 /// 1, 2 or 5 times a power of ten: the greatest such number that is at most `limit` > 0.
 double roundLength(double limit);
+/// The least such number that is at least `least` > 0.
+double roundUp(double least);
 
 }  // namespace palpate::vtk

@@ -208,7 +208,7 @@ void tessellate(Mesh& shape, double size) {
 }
 
 vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, const Parts& parts, double thinnest,
-                 int height) {
+                 double pixelsPerLength) {
   const Appearance& look = parts.begin()->second;
   if (look.opacity == 0) return nullptr;
   const bool tubes = mesh.type == GeometryType::Lines && mesh.triangles.size() <= kMostTubes,
@@ -238,10 +238,11 @@ vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, const Parts& parts, do
   property->SetColor(look.colour[0], look.colour[1], look.colour[2]);
   property->SetOpacity(look.opacity);
   property->SetFrontfaceCulling(!look.frontFaces);
-  property->SetAmbient(0.12);
-  property->SetSpecular(0.13);
-  property->SetSpecularPower(25);
-  property->SetPointSize(std::max(2.0F, static_cast<float>(height) / 400));
+  if (tubes || !thin) property->SetInterpolationToPBR();
+  property->SetRoughness(look.roughness);
+  property->SetMetallic(look.metallic);
+  const double diameter = mesh.radii.empty() ? 0 : 2 * mesh.radii.front();
+  property->SetPointSize(static_cast<float>(std::max(2.0, pixelsPerLength * diameter)));
   property->SetLineWidth(3);
   property->RenderPointsAsSpheresOn();
   renderer->AddActor(actor);

@@ -22,8 +22,8 @@ void tessellate(CollisionProblem::Geometry& shape, double size);
 
 /// Adds a body to the renderer, or returns null for an invisible one. Each cell has the id of its
 /// element in the cell array "element". thinnest: L, the least radius with which lines are drawn.
-/// height: pixels of the picture.
+/// pixelsPerLength: of the picture.
 vtkProp* addBody(vtkRenderer*, const CollisionProblem::Geometry&, const Parts&, double thinnest,
-                 int height);
+                 double pixelsPerLength);
 
 }  // namespace palpate::vtk

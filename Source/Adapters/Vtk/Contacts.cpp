@@ -13,8 +13,8 @@ using Mesh = CollisionProblem::Geometry;
 void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProblem& problem,
                             const std::map<GeometryId, std::size_t>& indices, double size,
                             const Vector3d& towards) {
-  constexpr double kBall = 0.008, kArrow = 0.035, kMark = 0.012;  // shares of the size
-  constexpr double kFew = 400, kSmallest = 0.4;                   // many contacts are drawn smaller
+  constexpr double kBall = 0.011, kArrow = 0.04, kMark = 0.014;  // shares of the size
+  constexpr double kFew = 400, kSmallest = 0.5;                  // many contacts are drawn smaller
   const double shrink = std::clamp(
       std::sqrt(kFew / static_cast<double>(detection.statistics().contacts + 1)), kSmallest, 1.0);
   for (const auto& [first, second, settings] : detection.pairs()) {

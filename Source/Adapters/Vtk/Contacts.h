@@ -26,7 +26,7 @@ struct ContactGlyphs {
   Glyphs untrusted;                      ///< vertices that validity() names
   std::optional<FeaturePair> nearest{};  ///< the contact of two meshes nearest to the camera
 
-  /// indices: of the geometries in the problem. size: L, the diagonal of everything in view.
+  /// indices: of the geometries in the problem. size: L, of what is in view.
   /// towards: the direction of the view.
   void collect(const OctreeBasedCD&, const CollisionProblem&,
                const std::map<GeometryId, std::size_t>& indices, double size,

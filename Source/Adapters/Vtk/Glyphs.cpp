@@ -10,6 +10,7 @@
 #include <vtkRenderer.h>
 
 #include <cstddef>
+#include <span>
 
 namespace palpate::vtk {
 
@@ -61,20 +62,30 @@ vtkProperty* Glyphs::show(vtkRenderer* renderer, vtkAlgorithm* shape,
 }
 
 void setDistanceColours(vtkColorTransferFunction* colours, const std::array<double, 2>& range) {
-  constexpr std::array<std::array<int, 3>, 10> kViridis{{{68, 1, 84},
-                                                         {72, 40, 120},
-                                                         {62, 74, 137},
-                                                         {49, 104, 142},
-                                                         {38, 130, 142},
-                                                         {31, 158, 137},
-                                                         {53, 183, 121},
-                                                         {109, 205, 89},
-                                                         {180, 222, 44},
-                                                         {253, 231, 37}}};
+  using Colour = std::array<int, 3>;
+  constexpr std::array<Colour, 10> kViridis{{{68, 1, 84},
+                                             {72, 40, 120},
+                                             {62, 74, 137},
+                                             {49, 104, 142},
+                                             {38, 130, 142},
+                                             {31, 158, 137},
+                                             {53, 183, 121},
+                                             {109, 205, 89},
+                                             {180, 222, 44},
+                                             {253, 231, 37}}};
+  constexpr std::array<Colour, 7> kRedToBlue{{{178, 24, 43},
+                                              {239, 138, 98},
+                                              {253, 219, 199},
+                                              {255, 255, 255},
+                                              {209, 229, 240},
+                                              {103, 169, 207},
+                                              {33, 102, 172}}};
   colours->RemoveAllPoints();
-  for (std::size_t i = 0; i < kViridis.size(); ++i) {
-    const auto& [red, green, blue] = kViridis[i];
-    const double share = static_cast<double>(i) / (kViridis.size() - 1);
+  const std::span<const Colour> places =
+      range[0] < 0 ? std::span<const Colour>(kRedToBlue) : std::span<const Colour>(kViridis);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto& [red, green, blue] = places[i];
+    const double share = static_cast<double>(i) / static_cast<double>(places.size() - 1);
     colours->AddRGBPoint(range[0] + share * (range[1] - range[0]), red / 255.0, green / 255.0,
                          blue / 255.0);
   }

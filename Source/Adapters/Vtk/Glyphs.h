@@ -31,10 +31,11 @@ class Glyphs {
   vtkNew<vtkDoubleArray> m_values, m_sizes, m_turns;
 };
 
-/// Colours of distances: dark violet for the least one, yellow for the greatest. Lightness grows
-/// evenly, so that colour-blind readers can tell them apart.
+/// Colours of distances. From 0: dark violet, then yellow for the greatest one; lightness grows
+/// evenly, so that colour-blind readers can tell them apart. Otherwise white at 0, red below and
+/// blue above.
 ///
-/// Source   the viridis map of matplotlib (Smith and van der Walt, 2015), at ten places.
+/// Source   the maps viridis (Smith and van der Walt, 2015) and RdBu (Brewer, 2002).
 void setDistanceColours(vtkColorTransferFunction*, const std::array<double, 2>& range);
 
 }  // namespace palpate::vtk

@@ -5,6 +5,8 @@
 #include "Vtk/Contacts.h"
 #include "Vtk/Glyphs.h"
 #include "Vtk/Labels.h"
+#include "Vtk/Light.h"
+#include "Vtk/Notes.h"
 #include "Vtk/Panel.h"
 #include "Vtk/TimesGraph.h"
 
@@ -20,11 +22,11 @@
 #include <vtkDataSet.h>
 #include <vtkImageData.h>
 #include <vtkInteractorStyleTrackballCamera.h>
-#include <vtkLightKit.h>
 #include <vtkLookupTable.h>
 #include <vtkNew.h>
 #include <vtkPNGWriter.h>
 #include <vtkProperty.h>
+#include <vtkProperty2D.h>
 #include <vtkRenderWindow.h>
 #include <vtkRenderWindowInteractor.h>
 #include <vtkRenderer.h>
@@ -64,6 +66,15 @@ constexpr timespec kPause{0, 20'000'000};  // 20 ms
 /// The least radius with which lines are drawn, as a share of the diagonal of everything in view.
 constexpr double kThinnest = 0.0012;
 
+void check(const View& view) {
+  const auto& [from, up, centre, height] = view;
+  if (!from.allFinite() || !up.allFinite() || !centre.allFinite() || !(height >= 0) ||
+      !std::isfinite(height) || !(up.cross(from).norm() > 0))
+    throw Error(ErrorCode::InvalidSettings,
+                "A view needs finite values, a height of at least 0, and directions that are not "
+                "parallel.");
+}
+
 }  // namespace
 
 std::shared_ptr<void> openDisplay() {
@@ -82,13 +93,17 @@ struct Window::Implementation {
 
   const OctreeBasedCD& detection;
   std::shared_ptr<void> connection = openDisplay();
-  vtkNew<vtkRenderer> renderer{}, overlay{}, labelLayer{}, graph{};
+  vtkNew<vtkRenderer> renderer{}, inset{}, overlay{}, labelLayer{}, graph{};
   vtkNew<vtkRenderWindow> window{};
   vtkNew<vtkRenderWindowInteractor> interactor{};
   vtkNew<vtkTextActor> pickedText{}, panelText{};
   vtkNew<vtkScalarBarActor> colourBar{};
   vtkNew<vtkColorTransferFunction> colours{};  // of distances
+  std::array<double, 2> colourRange{};
+  Light light{};
   ScaleBar scaleBar{};
+  InsetFrame insetFrame{};
+  std::vector<Note> notes{};
   TimesGraph times{};
   CollisionProblem problem{};  // of the frame that is shown
   std::map<GeometryId, std::size_t> indices{};
@@ -96,6 +111,7 @@ struct Window::Implementation {
   std::map<vtkProp*, const Mesh*> bodies{};
   std::string picked{}, unit{};
   View view{};
+  std::optional<Inset> insetView{};
   std::optional<FeaturePair> nearest{};  // contact to the camera
   Eigen::AlignedBox3d box{};
   Clock::time_point lastShow{};
@@ -155,7 +171,10 @@ struct Window::Implementation {
   }
 
   /// Of texts, in pixels. It grows with the window.
-  int textSize() const { return std::max(9, window->GetSize()[1] / 44); }
+  int textSize() const { return std::max(9, window->GetSize()[1] / 38); }
+  double pixelsPerLength() const {
+    return window->GetSize()[1] / (2 * renderer->GetActiveCamera()->GetParallelScale());
+  }
   const Parts& partsOf(const Mesh& mesh);
   std::string nameOf(GeometryId) const;
   void take();
@@ -164,6 +183,7 @@ struct Window::Implementation {
   void drawBodies();
   void drawCells() const;
   void drawContacts();
+  void drawContactsIn(vtkRenderer*, const ContactGlyphs&);
   void drawAnnotations();
   void updateScale(vtkObject* = nullptr, unsigned long = 0, void* = nullptr);
   void aim();
@@ -217,9 +237,11 @@ void Window::Implementation::drawBodies() {
     double& opacity = look.begin()->second.opacity;
     const bool thin = mesh.type == GeometryType::Lines || mesh.type == GeometryType::Points;
     if (translucent && !thin) opacity = std::min(opacity, kTranslucent);
-    if (vtkProp* body =
-            addBody(renderer, mesh, look, kThinnest * box.diagonal().norm(), window->GetSize()[1]))
-      bodies[body] = &mesh;
+    vtkProp* body =
+        addBody(renderer, mesh, look, kThinnest * box.diagonal().norm(), pixelsPerLength());
+    if (body == nullptr) continue;
+    bodies[body] = &mesh;
+    if (insetView) inset->AddViewProp(body);
   }
 }
 
@@ -250,38 +272,53 @@ void Window::Implementation::drawCells() const {
   if (cells == Cells::OfContact) look->SetLineWidth(static_cast<float>(textSize()) / 10);
 }
 
-void Window::Implementation::drawContacts() {
-  const double size = box.diagonal().norm();
-  ContactGlyphs glyphs;
-  glyphs.collect(detection, problem, indices, size,
-                 Vector3d(renderer->GetActiveCamera()->GetDirectionOfProjection()));
-  nearest = glyphs.nearest;
-  auto [low, high] = glyphs.spheres.range();
-  low = std::min(low, 0.0);  // the same range in most frames
-  for (const auto& pair : detection.pairs()) high = std::max(high, pair.settings.thickness);
-  setDistanceColours(colours, {low, std::max(high, low + 1e-9 * size)});
+/// Draws the contacts that no body hides.
+void Window::Implementation::drawContactsIn(vtkRenderer* shown, const ContactGlyphs& glyphs) {
   vtkNew<vtkSphereSource> ball;
   ball->SetThetaResolution(16);
   ball->SetPhiResolution(12);
   vtkNew<vtkArrowSource> arrow;
   arrow->SetTipResolution(16);
   arrow->SetShaftResolution(12);
-  constexpr double kThroughBodies = 0.4;
-  for (vtkRenderer* layer : {renderer.Get(), overlay.Get()}) {
-    const double opacity = layer == overlay ? kThroughBodies : 1;
-    if (contacts) glyphs.spheres.show(layer, ball, colours)->SetOpacity(opacity);
-    if (normals && layer == renderer) glyphs.arrows.show(layer, arrow, colours);
-  }
+  if (contacts) glyphs.spheres.show(shown, ball, colours);
+  if (normals) glyphs.arrows.show(shown, arrow, colours);
   vtkNew<vtkLookupTable> magenta;
   magenta->SetHueRange(0.85, 0.85);
-  if (untrusted) glyphs.untrusted.show(renderer, ball, magenta);
+  if (untrusted) glyphs.untrusted.show(shown, ball, magenta);
+}
+
+void Window::Implementation::drawContacts() {
+  ContactGlyphs main, enlarged;
+  const auto collect = [&](ContactGlyphs& glyphs, vtkRenderer* shown) {
+    vtkCamera* camera = shown->GetActiveCamera();
+    glyphs.collect(detection, problem, indices, 2.5 * camera->GetParallelScale(),
+                   Vector3d(camera->GetDirectionOfProjection()));
+  };
+  collect(main, renderer);
+  nearest = main.nearest;
+  const auto [low, high] = main.spheres.range();
+  double most = 0;
+  for (const auto& pair : detection.pairs()) most = std::max(most, pair.settings.thickness);
+  if (most == 0) most = std::max(high, -low);
+  auto& [least, greatest] = colourRange;  // round numbers, which stay from frame to frame
+  greatest = std::max(greatest, most > 0 ? roundUp(most) : 1);
+  if (low < 0 || least < 0) least = -greatest;
+  setDistanceColours(colours, colourRange);
+  drawContactsIn(renderer, main);
+  if (insetView) {
+    collect(enlarged, inset);
+    drawContactsIn(inset, enlarged);
+  }
   if (!problem.pairs.empty() && (contacts || normals)) overlay->AddViewProp(colourBar);
 }
 
 void Window::Implementation::updateScale(vtkObject*, unsigned long, void*) {
   const int* size = window->GetSize();
-  scaleBar.update(size[1] / (2 * renderer->GetActiveCamera()->GetParallelScale()), unit, size[0],
-                  size[1]);
+  scaleBar.update(pixelsPerLength(), unit, size[0], size[1]);
+  for (vtkRenderer* shown : {renderer.Get(), inset.Get()}) light.follow(shown);
+  if (insetView)
+    insetFrame.update(renderer->GetActiveCamera(), inset->GetActiveCamera(), inset->GetViewport(),
+                      size[0], size[1]);
 }
 
 void Window::Implementation::drawAnnotations() {
@@ -290,6 +327,8 @@ void Window::Implementation::drawAnnotations() {
   if (names)
     showLabels(labelLayer, problem, parts,
                Projection(renderer->GetActiveCamera(), size[0], size[1]), text, translucent);
+  showNotes(overlay, notes, text, pixelsPerLength());
+  if (insetView) insetFrame.show(overlay, text);
   setTextLook(pickedText->GetTextProperty(), text);
   pickedText->SetPosition(0.4 * size[0], 0.03 * size[1]);
   overlay->AddViewProp(pickedText);
@@ -303,7 +342,7 @@ void Window::Implementation::drawAnnotations() {
   const auto name = [this](GeometryId id) { return nameOf(id); };
   panelText->SetInput(vtk::panelText(detection, name, frame, framesPerSecond).c_str());
   vtkTextProperty* look = panelText->GetTextProperty();
-  setTextLook(look, text * 4 / 5);
+  setTextLook(look, text * 7 / 10);
   look->SetFontFamilyToCourier();
   look->SetVerticalJustificationToTop();
   look->SetBackgroundColor(1, 1, 1);
@@ -314,8 +353,8 @@ void Window::Implementation::drawAnnotations() {
 
 /// Aims the camera as the view says.
 void Window::Implementation::aim() {
-  // The share of the picture that bodies fill at most; the bar of colours is on the right.
-  constexpr double kShareOfWidth = 0.8, kShareOfHeight = 0.88, kMiddleX = 0.44;
+  // The share of the picture that bodies fill at most; below are the bars of length and colours.
+  constexpr double kShareOfWidth = 0.9, kShareOfHeight = 0.78, kMiddleY = 0.56;
   const Vector3d from = view.from.normalized(), right = view.up.cross(from).normalized(),
                  top = from.cross(right);
   Vector3d focus = view.centre;
@@ -334,20 +373,24 @@ void Window::Implementation::aim() {
     const int* size = window->GetSize();
     const double aspect = static_cast<double>(size[0]) / size[1];
     height = std::max(seen.sizes().y() / kShareOfHeight, seen.sizes().x() / kShareOfWidth / aspect);
-    focus += (0.5 - kMiddleX) * height * aspect * right;
+    focus += (0.5 - kMiddleY) * height * top;
   }
   if (height == 0) height = 1;  // a single point
-  vtkCamera* camera = renderer->GetActiveCamera();
-  const Vector3d position = focus + (box.diagonal().norm() + height) * from;
-  camera->ParallelProjectionOn();
-  camera->SetFocalPoint(focus.data());
-  camera->SetPosition(position.data());
-  camera->SetViewUp(top.data());
-  camera->SetParallelScale(height / 2);
+  const auto place = [&](vtkCamera* camera, const Vector3d& at, double seen) {
+    const Vector3d position = at + (box.diagonal().norm() + height) * from;
+    camera->ParallelProjectionOn();
+    camera->SetFocalPoint(at.data());
+    camera->SetPosition(position.data());
+    camera->SetViewUp(top.data());
+    camera->SetParallelScale(seen / 2);
+  };
+  place(renderer->GetActiveCamera(), focus, height);
+  if (insetView) place(inset->GetActiveCamera(), insetView->centre, insetView->height);
 }
 
 void Window::Implementation::draw() {
   renderer->RemoveAllViewProps();
+  inset->RemoveAllViewProps();
   overlay->RemoveAllViewProps();
   labelLayer->RemoveAllViewProps();
   bodies.clear();
@@ -357,9 +400,12 @@ void Window::Implementation::draw() {
   drawContacts();
   if (cells != Cells::None) drawCells();
   drawAnnotations();
-  renderer->SetSSAORadius(0.06 * box.diagonal().norm());
-  renderer->SetSSAOBias(0.002 * box.diagonal().norm());
-  renderer->ResetCameraClippingRange();
+  for (vtkRenderer* shown : {renderer.Get(), inset.Get()}) {
+    const double height = 2 * shown->GetActiveCamera()->GetParallelScale();
+    shown->SetSSAORadius(0.08 * height);
+    shown->SetSSAOBias(0.003 * height);
+    shown->ResetCameraClippingRange();
+  }
   window->Render();
 }
 
@@ -371,19 +417,18 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
   m_implementation.reset(new Implementation{detection});
   Implementation& own = *m_implementation;
   own.panel = onScreen;
-  own.renderer->SetBackground(1, 1, 1);
-  own.renderer->SetUseDepthPeeling(true);
-  own.renderer->SetMaximumNumberOfPeels(12);
-  own.renderer->SetUseSSAO(true);
-  own.renderer->SetSSAOKernelSize(64);
-  own.renderer->SetSSAOBlur(true);
-  own.renderer->SetUseFXAA(true);
-  vtkNew<vtkLightKit> lights;
-  lights->SetKeyLightIntensity(0.72);
-  lights->SetKeyToFillRatio(1.7);
-  lights->SetKeyToHeadRatio(2.5);
-  lights->AddLightsToRenderer(own.renderer);
-  lights->AddLightsToRenderer(own.overlay);
+  for (vtkRenderer* shown : {own.renderer.Get(), own.inset.Get()}) {
+    shown->SetBackground(1, 1, 1);
+    shown->SetUseDepthPeeling(true);
+    shown->SetMaximumNumberOfPeels(12);
+    shown->SetUseSSAO(shown == own.renderer);  // it needs the whole window
+    shown->SetSSAOKernelSize(64);
+    shown->SetSSAOBlur(true);
+    shown->SetUseFXAA(true);
+    own.light.show(shown);
+  }
+  own.inset->InteractiveOff();
+  own.inset->SetDraw(false);
   for (vtkRenderer* layer : {own.overlay.Get(), own.labelLayer.Get()}) {
     layer->SetLayer(layer == own.overlay ? 1 : 2);
     layer->InteractiveOff();
@@ -392,13 +437,17 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
   own.renderer->AddObserver(vtkCommand::StartEvent, &own, &Implementation::updateScale);
   own.colourBar->SetLookupTable(own.colours);
   own.colourBar->UnconstrainedFontSizeOn();
-  own.colourBar->SetNumberOfLabels(5);
-  own.colourBar->SetLabelFormat("%.2g");
-  own.colourBar->SetBarRatio(0.25);
-  own.colourBar->SetVerticalTitleSeparation(std::max(4, height / 100));
-  own.colourBar->SetPosition(0.87, 0.52);
-  own.colourBar->SetWidth(0.1);
-  own.colourBar->SetHeight(0.44);
+  own.colourBar->SetOrientationToHorizontal();
+  own.colourBar->SetLabelFormat("%.3g");
+  own.colourBar->SetNumberOfLabels(3);
+  own.colourBar->DrawBackgroundOn();
+  own.colourBar->GetBackgroundProperty()->SetColor(1, 1, 1);
+  own.colourBar->GetBackgroundProperty()->SetOpacity(0.75);
+  own.colourBar->SetBarRatio(0.2);
+  own.colourBar->SetVerticalTitleSeparation(std::max(4, height / 60));
+  own.colourBar->SetPosition(0.68, 0.02);
+  own.colourBar->SetWidth(0.28);
+  own.colourBar->SetHeight(0.11);
   own.graph->SetViewport(0.62, 0, 1, 0.32);
   own.graph->SetLayer(3);
   own.graph->InteractiveOff();
@@ -412,6 +461,7 @@ Window::Window(const OctreeBasedCD& detection, bool onScreen, int width, int hei
   own.window->SetSize(width, height);
   own.window->SetNumberOfLayers(4);
   own.window->AddRenderer(own.renderer);
+  own.window->AddRenderer(own.inset);
   own.window->AddRenderer(own.overlay);
   own.window->AddRenderer(own.labelLayer);
   own.window->AddRenderer(own.graph);
@@ -428,24 +478,36 @@ Window::~Window() = default;
 void Window::setAppearance(GeometryId id, const Appearance& appearance,
                            std::uint32_t firstElement) {
   const auto isShare = [](double value) { return value >= 0 && value <= 1; };  // NaN is not
-  if (!isShare(appearance.opacity) ||
+  if (!isShare(appearance.opacity) || !isShare(appearance.roughness) ||
+      !isShare(appearance.metallic) ||
       !std::all_of(appearance.colour.begin(), appearance.colour.end(), isShare))
     throw Error(ErrorCode::InvalidSettings,
-                "An appearance's colour and opacity must be from 0 to 1.");
+                "An appearance's colour, opacity, roughness and metallic must be from 0 to 1.");
   Implementation& own = *m_implementation;
   own.parts[id].insert_or_assign(firstElement, appearance);
 }
 
 void Window::setView(const View& view) {
-  const auto& [from, up, centre, height] = view;
-  if (!from.allFinite() || !up.allFinite() || !centre.allFinite() || !(height >= 0) ||
-      !std::isfinite(height) || !(up.cross(from).norm() > 0))
-    throw Error(ErrorCode::InvalidSettings,
-                "A view needs finite values, a height of at least 0, and directions that are not "
-                "parallel.");
+  check(view);
   m_implementation->view = view;
   m_implementation->isNew = true;
 }
+
+void Window::setInset(const Inset& shown) {
+  if (!shown.centre.allFinite() || !std::isfinite(shown.height) || !(shown.height > 0))
+    throw Error(ErrorCode::InvalidSettings,
+                "An inset needs a finite centre and a finite positive height.");
+  constexpr double kWidth = 0.29, kHeight = 0.4, kMargin = 0.015, kBars = 0.14;
+  const double x = shown.left ? kMargin : 1 - kMargin - kWidth,
+               y = shown.top ? 1 - kMargin - kHeight : kBars;
+  Implementation& own = *m_implementation;
+  own.insetView = shown;
+  own.inset->SetViewport(x, y, x + kWidth, y + kHeight);
+  own.inset->SetDraw(true);
+  own.isNew = true;
+}
+
+void Window::setNotes(std::vector<Note> notes) { m_implementation->notes = std::move(notes); }
 
 void Window::setLengthUnit(std::string unit) { m_implementation->unit = std::move(unit); }
 

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,23 @@ struct Appearance {
   std::array<double, 3> colour{0.62, 0.66, 0.72};  ///< red, green and blue in [0, 1]
   double opacity = 1;                              ///< in [0, 1]; 0: invisible
   bool frontFaces = true;                          ///< false: only faces away from the camera
+  double roughness = 0.4;                          ///< in [0, 1]; 0: a mirror
+  double metallic = 0;                             ///< in [0, 1]; 1: metal
+};
+
+/// An enlarged part of the scene, seen from the same direction.
+struct Inset {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double height = 1;              ///< L, of the part
+  bool left = false, top = true;  ///< the corner of the picture
+};
+
+/// A text in the picture, and an arrow, both in front of all bodies.
+struct Note {
+  std::string text{};
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();  ///< the arrow's tip, or the text's middle
+  std::optional<Eigen::Vector3d> from{};         ///< the arrow's other end; its text stands there
+  std::array<double, 3> colour{0.1, 0.1, 0.12};
 };
 
 /// The direction and the part of the scene. The projection is parallel.
@@ -40,7 +58,8 @@ struct View {
 };
 
 /// A window that shows the geometries of an OctreeBasedCD and its last answers. Contacts are midway
-/// between their points, with normals, coloured by distance. Vertices of validity() are magenta.
+/// between their points, with normals, coloured by distance: white at 0 if any is negative. The
+/// range of colours only grows. Vertices of validity() are magenta.
 ///
 ///   palpate::vtk::Window window(collisions);
 ///   while (window.show()) moveAndDetect(collisions);  // a frame
@@ -60,7 +79,11 @@ class PALPATE_EXPORT Window {
   /// For the next show(); by default everything in the first frame is in view. Throws
   /// InvalidSettings if not finite, for parallel directions or length 0, or height < 0.
   void setView(const View&);
-  void setLengthUnit(std::string);  ///< the name of L in the picture, such as "mm"
+  /// Shows an enlarged part of the scene in a corner, and frames it in the picture. Throws
+  /// InvalidSettings if not finite, or if the height is not positive.
+  void setInset(const Inset&);
+  void setNotes(std::vector<Note>);  ///< for the next show(); without an effect if not finite
+  void setLengthUnit(std::string);   ///< the name of L in the picture, such as "mm"
   /// Draws the last frame and handles input; false once closed. frame: its number in the panel and
   /// the title; negative: one more than before, from 0.
   bool show(int frame = -1);
