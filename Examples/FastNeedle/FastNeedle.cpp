@@ -146,7 +146,7 @@ class FastNeedle : public LiveScene {
     const auto shown = [&](const Vector3d& p) {  // a section through the needle's way
       return std::abs(p.x() - centre.x()) < kShown && p.y() > -0.1 && p.y() < kShown;
     };
-    lane.shown = m_world.addMesh("", partOf(membrane, shown, lane.shownOf), 0.0);
+    lane.shown = m_world.addMesh(name + " section", partOf(membrane, shown, lane.shownOf), 0.0);
     m_world.pin(lane.membrane, [&](const Vector3d& p) {
       return (p - centre).head<2>().lpNorm<Eigen::Infinity>() > 0.999 * kHalfWidth;
     });

@@ -57,7 +57,7 @@ class RobotArms : public LiveScene {
     for (int joint = 0; joint < 2 * kJoints; ++joint) {  // shown only
       SceneMesh ball = sphere(8);
       for (Vector3d& p : ball.positions) p *= 3.5 - 0.2 * (joint % kJoints);
-      m_joints.push_back(m_world.addRigidMesh("", ball));
+      m_joints.push_back(m_world.addRigidMesh("joint", ball));
     }
     move();
   }

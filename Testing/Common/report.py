@@ -31,6 +31,9 @@ def check(path, contacts=True):
     with browser.Page(path) as page:
         value = page.value
         held = value("replay.frames.map(f => f.at)")
+        hidden = "replay.bodies.every((b, i) => bodies[i].visible === b.opacity > 0)"
+        expect(value(hidden), "a body that pictures hide is shown, or another is not")
+        expect(value("replay.bodies.every(b => b.name)"), "a body has no name")
         value("Object.assign(shown, {contacts: false, untrusted: false})")  # bodies alone
         value(TO_FRAME.format(held[0]))
         first = value(LOOK)
@@ -82,6 +85,7 @@ def check(path, contacts=True):
             expect(value(LOOK)["sum"] != before["sum"], f"no zoom, turn or move by {options}")
         expect(not page.problems, f"problems: {page.problems}")
     with browser.Page(path, dark=True) as page:
+        page.value("bodies.forEach(b => b.visible = false)")  # they may fill the view
         expect(max(page.value(LOOK)["corner"]) < 90, "dark mode has a light background")
         width = page.value("document.documentElement.scrollWidth")
         expect(width <= 1366, f"{width} pixels wide on a laptop")
