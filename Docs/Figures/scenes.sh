@@ -8,6 +8,7 @@ declare -A options=(
   [OrganScene]="--frames 120"
   [FastNeedle]="--frames 6"
   [Palpation]="--frames 60"
+  [LiverLift]="--frames 90 --size 830 519"
   [Suturing]="--frames 85"
   [Retraction]="--frames 75"
   [RobotArms]="--frames 170"

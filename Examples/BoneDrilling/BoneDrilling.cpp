@@ -2,7 +2,6 @@
 // Bone and organs stay where setTransform() put them, so only the particles' octree changes. The
 // particles meet the bone by planes in an octree's leaves, built before the first frame.
 #include "CommandLine.h"
-#include "Implicit.h"
 #include "SceneProgram.h"
 #include "Scenes.h"
 
@@ -30,66 +29,23 @@ const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);  // less what water carri
 struct Size {
   int particles = 100'000, triangles = 500'000;
 };
-const Vector3d kHole = Vector3d(0, -0.3, 1).normalized();        // from the middle of the bone
-constexpr double kHoleRadius = 9, kHoleDepth = 6.5, kTable = 8;  // kTable: the skull's thickness
-
-/// 1 in the middle of the drilled hole, 0 outside it; smooth. d: a unit vector.
-double inHole(const Vector3d& d) {
-  const double share = std::clamp(1.4 - 1.4 * kBone * (d - kHole).norm() / kHoleRadius, 0.0, 1.0);
-  return share * share * (3 - 2 * share);
-}
-
-/// Of the bone without the hole.
-double wholeRadius(const Vector3d& d) {
+/// Of the bone, which is seen whole from its middle, along a unit vector.
+double boneRadius(const Vector3d& d) {
   return kBone * (1 + 0.06 * std::sin(5 * d.x() + 1) * std::cos(4 * d.y()) - 0.1 * d.y() * d.y() +
                   0.01 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z()));
-}
-/// Of the bone, which is seen whole from its middle, along a unit vector.
-double boneRadius(const Vector3d& d) { return wholeRadius(d) - kHoleDepth * inHole(d); }
-
-/// Directions about the hole are nearer to it, so that triangles there are a third as long.
-Vector3d gather(const Vector3d& d) {
-  constexpr double kWithin = 0.6, kLeast = 1.0 / 3;  // kWithin: radians
-  const double along = d.dot(kHole), angle = std::acos(std::clamp(along, -1.0, 1.0)),
-               t = std::min(1.0, angle / kWithin), share = t * t * (3 - 2 * t),
-               nearer = angle * (kLeast + (1 - kLeast) * share);
-  const Vector3d across = d - along * kHole;
-  if (across.norm() == 0) return d;
-  return std::cos(nearer) * kHole + std::sin(nearer) * across.normalized();
-}
-
-/// A part of the skull around the hole, cut through its middle: shown only.
-SceneMesh section() {
-  constexpr double kHalf = 34, kRound = 1;
-  const Vector3d front = Vector3d::UnitX().cross(kHole);
-  const auto body = [&](const Vector3d& p) {
-    const double r = p.norm();
-    const Vector3d d = p / r;
-    const double table = smoothMax(r - boneRadius(d), wholeRadius(d) - kTable - r, kRound);
-    return std::max({table, p.dot(front), (p - p.dot(kHole) * kHole).norm() - kHalf});
-  };
-  const Vector3d at = wholeRadius(kHole) * kHole;
-  return meshOf(body, Eigen::AlignedBox3d(at - Vector3d(40, 36, 32), at + Vector3d(40, 40, 20)),
-                0.8);
 }
 
 class BoneDrilling : public LiveScene {
  public:
   BoneDrilling(const Size& size, int threads) : m_sag(12'000.0 / size.triangles), m_world(threads) {
     SceneMesh bone = cubeSphere(static_cast<int>(std::ceil(std::sqrt(size.triangles / 12.0))));
-    for (Vector3d& p : bone.positions) {
-      const Vector3d d = gather(p);
-      p = boneRadius(d) * d;
-    }
+    for (Vector3d& p : bone.positions) p = (boneRadius(p) * p).eval();
     addRigid("bone", std::move(bone), 1, kMiddle);
-    m_section = m_world.addRigidMesh("section", section());
-    const std::array stem{Vector3d(0, 0, 3), Vector3d(0, 0, 12), Vector3d(0, 0, 70)};
-    m_stem = m_world.addRigidMesh("stem", tubeAround(stem, 1.4, 24));
     addRigid("liver", organMeshes()[0].mesh, 50, {-70, -120, -60});
     addRigid("stomach", organMeshes()[1].mesh, 50, {65, -125, -60});
     m_burrAt = burrTarget(0) + 5 * Vector3d::UnitZ();
     m_burr = m_world.addShape("burr", Sphere{kMiddle, kBurr}, capsule(kMiddle, kMiddle, kBurr, 8));
-    placeBurr();
+    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
     std::vector<Vector3d> positions(size.particles);
     for (Vector3d& p : positions) {  // sinking already, beside and above all else
       do p = {between(-130, 130), between(-150, 120), between(kFloor, kBone + 180)};
@@ -116,20 +72,13 @@ class BoneDrilling : public LiveScene {
   World& world() override { return m_world; }
 
   std::vector<BodyLook> looks() override {
-    return {{m_rigid[0], "", kBoneColour, 0},
-            {m_rigid[1], "", kLiverColour, 0},
-            {m_rigid[2], "", kStomachColour, 0},
-            {m_section, "Skull, cut open", kBoneColour, 1, true, 0, 0.7},
-            {m_burr, "Burr", kSteelColour, 1, true, 0, 0.3, 1},
-            {m_stem, "", kSteelColour, 1, true, 0, 0.3, 1},
+    return {{m_rigid[0], "Bone", kBoneColour},
+            {m_rigid[1], "Liver", kLiverColour},
+            {m_rigid[2], "Stomach", kStomachColour},
+            {m_burr, "Burr", kSteelColour},
             {m_particles, "", kBloodColour}};
   }
-  PictureView view() override {
-    return {.from = {0.15, -1, 0.35},
-            .up = kHole,
-            .centre = 1.04 * wholeRadius(kHole) * kHole,
-            .height = 44};
-  }
+  PictureView view() override { return {.from = {0.5, -1, 0.9}}; }
   void computeFrame(int frame) override {
     double fastest = 0;
     for (const Vector3d& v : m_world.solver().velocities) fastest = std::max(fastest, v.norm());
@@ -155,13 +104,11 @@ class BoneDrilling : public LiveScene {
             {"rebuilt", m_rebuilt}};
   }
 
-  /// The bone by the surface that its mesh was made of, organs by winding numbers. In the hole a
-  /// particle meets walls on several sides, but has the plane of one: a step may lead it deeper.
+  /// The bone by the surface that its mesh was made of, organs by winding numbers.
   std::string fault() override {
     const std::span<const Vector3d> particles = m_world.positions(m_particles);
     for (std::size_t i = 0; i < particles.size(); ++i)
-      if (const Vector3d d = particles[i].normalized();
-          particles[i].norm() < boneRadius(d) - m_sag - 2 * kReach * (inHole(d) > 0))
+      if (particles[i].norm() < boneRadius(particles[i].normalized()) - m_sag)
         return "particle " + std::to_string(i) + " is inside the bone.";
     OctreeBasedCD& detection = m_world.detection();
     const auto id = [&](World::BodyId body) { return m_world.bodies()[body].id; };
@@ -186,18 +133,11 @@ class BoneDrilling : public LiveScene {
     m_world.place(m_rigid.back(), Eigen::Matrix3d::Identity(), at);
   }
 
-  /// The hand presses 1 mm deep, along an eight in the hole.
+  /// The hand presses 1 mm deep, along an eight.
   static Vector3d burrTarget(double frame) {
-    const double phase = 2 * pi * frame / 300, y = 0.012 * std::sin(2 * phase) - 0.3;
-    const Vector3d d = Vector3d(0.025 * std::sin(phase), y, 1).normalized();
+    const double phase = 2 * pi * frame / 300, y = 0.15 * std::sin(2 * phase) - 0.3;
+    const Vector3d d = Vector3d(0.3 * std::sin(phase), y, 1).normalized();
     return (boneRadius(d) + kBurr - 1) * d;
-  }
-
-  void placeBurr() {
-    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
-    const auto lean =
-        Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), kHole + Vector3d(0.35, 0, 0));
-    m_world.place(m_stem, lean.matrix(), m_burrAt);
   }
 
   /// What lies within reach is behind the plane through its nearest point: so the burr, on its side
@@ -216,7 +156,7 @@ class BoneDrilling : public LiveScene {
       if (const double towards = way.dot(c.normal); towards > c.distance)
         share = std::min(share, std::max(0.0, c.distance / towards));
     m_burrAt += share * way;
-    placeBurr();
+    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
   }
 
   /// None goes further than contacts were looked for. Rows are met one after another: who would
@@ -247,9 +187,8 @@ class BoneDrilling : public LiveScene {
     for (std::size_t i = m_world.bodies()[m_particles].first; i < solver.now.size(); ++i) {
       if (solver.now[i].z() > kFloor) continue;
       const Vector3d vessel(-20, -30, boneRadius(Vector3d(-20, -30, 90).normalized()) + 6);
-      const Vector3d above = m_burrAt + (kBurr + 2) * kHole;  // out of the hole
       const Vector3d away(between(-2, 2), between(-2, 2), between(-2, 2));
-      solver.now[i] = solver.before[i] = (i % 2 == 0 ? above : vessel) + away;
+      solver.now[i] = solver.before[i] = (i % 2 == 0 ? m_burrAt : vessel) + away;
       solver.velocities[i] = 40 * away;
       ++m_fallen;
     }
@@ -263,7 +202,7 @@ class BoneDrilling : public LiveScene {
   std::minstd_rand m_random;
   std::vector<World::BodyId> m_rigid;  // the bone, then organs
   std::vector<InsideVertex> m_inside;
-  World::BodyId m_burr = 0, m_particles = 0, m_section = 0, m_stem = 0;
+  World::BodyId m_burr = 0, m_particles = 0;
   Vector3d m_burrAt;
   int m_touching = 0, m_fallen = 0, m_rebuilt = 0;
 };
