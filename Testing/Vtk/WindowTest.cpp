@@ -205,6 +205,9 @@ TEST(Window, RefusesAppearancesAndViewsOutOfRange) {
   for (const View& wrong : {View{.from = {0, 0, 0}}, View{.from = {0, 0, 2}},
                             View{.from = {nan, 0, 1}}, View{.height = -1}, View{.height = nan}})
     refuse([&] { window.setView(wrong); });
+  for (const Inset& wrong :
+       {Inset{.centre = {nan, 0, 0}}, Inset{.height = 0}, Inset{.height = nan}})
+    refuse([&] { window.setInset(wrong); });
 }
 
 /// Where the middle of the picture looks: from the front, somewhat to the right and above.
