@@ -110,7 +110,7 @@ bool GeometryOctree::canLag(const TriangleMesh& mesh, Revision topology, double 
 
 bool GeometryOctree::updateChanged(const TriangleMesh& mesh, Revision topology, double scale,
                                    const OctreeSettings& settings, const Threads& threads) {
-  constexpr std::size_t kFew = 8;  // a smaller share of the vertices
+  constexpr std::size_t kFew = 8;  // Few are at most one vertex in this many.
   const auto changed = mesh.now.changesSince(m_lastPositions);
   if (m_isLagging || !canRefitSome(mesh, topology, scale, settings) || !changed ||
       changed->size() * kFew > mesh.now.size())
@@ -126,7 +126,8 @@ bool GeometryOctree::updateChanged(const TriangleMesh& mesh, Revision topology, 
   for (std::size_t i = 0; i < m_slices.size(); ++i) {
     const auto pieces = m_slicePieces[i];
     if (std::none_of(pieces.begin(), pieces.end(), [&](std::uint32_t piece) {
-          return changed->contains(piece * PieceMotion::kPiece, (piece + 1) * PieceMotion::kPiece);
+          return changed->overlaps(
+              {piece * PieceMotion::kPiece, (piece + 1) * PieceMotion::kPiece});
         }))
       continue;
     m_slices[i].moved = std::numeric_limits<double>::infinity();

@@ -38,7 +38,8 @@ class GeometryOctree {
               const Threads&);
   /// Instead of update(), if few vertices changed since the last one, and it swept no step: brings
   /// the floats and boxes of these up to date. Returns false if that is not so.
-  /// Cost     linear in the elements near the vertices, by their numbers, and 1/500 of the others.
+  /// Cost     linear in these vertices and in the elements of their slices, and in the number of
+  ///          slices.
   bool updateChanged(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
                      const Threads&);
   /// Whether updateSome() is possible: the tree was updated to the positions from which the motion

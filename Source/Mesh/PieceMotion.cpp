@@ -18,7 +18,7 @@ void PieceMotion::advanceTo(const Positions& now) {
         now.changesSince(m_to->bodyRevision()).value_or(VertexRange{0, size});
     for (std::size_t piece = 0; piece < m_ranges.size(); ++piece) {
       const std::size_t begin = piece * kPiece, count = std::min(kPiece, size - begin);
-      m_ranges[piece] = changed.contains(begin, begin + count)
+      m_ranges[piece] = changed.overlaps({begin, begin + count})
                             ? motionRange(before.subspan(begin, count), after.subspan(begin, count))
                             : MotionRange{.isEmpty = false};
     }

@@ -32,7 +32,7 @@ inline bool haveSameBits(const Pose& l, const Pose& r) {
 struct VertexRange {
   std::size_t begin = 0, end = 0;
   std::size_t size() const { return end - begin; }
-  bool contains(std::size_t first, std::size_t last) const { return first < end && begin < last; }
+  bool overlaps(const VertexRange& other) const { return other.begin < end && begin < other.end; }
   void add(const VertexRange& other) {  ///< becomes the range of both and what lies between
     if (other.size() == 0) return;
     *this =

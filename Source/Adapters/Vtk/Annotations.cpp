@@ -36,18 +36,22 @@ double roundUp(double least) {
   return 10 * power;
 }
 
-ScaleBar::ScaleBar() {
-  m_points->SetNumberOfPoints(6);
-  vtkNew<vtkCellArray> lines;
-  for (const std::array<vtkIdType, 2>& line : {std::array<vtkIdType, 2>{0, 1}, {2, 3}, {4, 5}})
-    lines->InsertNextCell(2, line.data());
+void setLines(vtkActor2D* actor, vtkPoints* points,
+              std::span<const std::array<vtkIdType, 2>> lines) {
+  vtkNew<vtkCellArray> cells;
+  for (const auto& line : lines) cells->InsertNextCell(2, line.data());
   vtkNew<vtkPolyData> data;
-  data->SetPoints(m_points);
-  data->SetLines(lines);
+  data->SetPoints(points);
+  data->SetLines(cells);
   vtkNew<vtkPolyDataMapper2D> mapper;
   mapper->SetInputData(data);
-  m_line->SetMapper(mapper);
-  m_line->GetProperty()->SetColor(0.1, 0.1, 0.12);
+  actor->SetMapper(mapper);
+  actor->GetProperty()->SetColor(0.1, 0.1, 0.12);
+}
+
+ScaleBar::ScaleBar() {
+  m_points->SetNumberOfPoints(6);
+  setLines(m_line, m_points, std::array<std::array<vtkIdType, 2>, 3>{{{0, 1}, {2, 3}, {4, 5}}});
 }
 
 void ScaleBar::show(vtkRenderer* overlay, int textSize) {

@@ -5,6 +5,8 @@
 #include <vtkPoints.h>
 #include <vtkTextActor.h>
 
+#include <array>
+#include <span>
 #include <string>
 
 class vtkRenderer;
@@ -14,6 +16,9 @@ namespace palpate::vtk {
 
 /// Dark text; size: pixels.
 void setTextLook(vtkTextProperty*, int size);
+
+/// Makes `actor` draw dark lines between points of the picture, in pixels.
+void setLines(vtkActor2D* actor, vtkPoints*, std::span<const std::array<vtkIdType, 2>> lines);
 
 /// A bar of a round length, with its length and unit.
 class ScaleBar {

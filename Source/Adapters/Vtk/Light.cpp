@@ -56,7 +56,6 @@ void Light::show(vtkRenderer* renderer) {
   lights->SetKeyToHeadRatio(4);
   lights->AddLightsToRenderer(renderer);
   auto* openGl = vtkOpenGLRenderer::SafeDownCast(renderer);
-
   openGl->GetEnvMapPrefiltered()->SetPrefilterMaxSamples(128);
   renderer->UseImageBasedLightingOn();
   renderer->SetEnvironmentTexture(m_room);

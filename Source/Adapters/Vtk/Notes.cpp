@@ -7,10 +7,7 @@
 #include <vtkArrowSource.h>
 #include <vtkBillboardTextActor3D.h>
 #include <vtkCamera.h>
-#include <vtkCellArray.h>
-#include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
-#include <vtkPolyDataMapper2D.h>
 #include <vtkProperty.h>
 #include <vtkProperty2D.h>
 #include <vtkRenderer.h>
@@ -84,19 +81,9 @@ void showNotes(vtkRenderer* layer, const std::vector<Note>& notes, int textSize,
 
 InsetFrame::InsetFrame() {
   m_points->SetNumberOfPoints(8);
-  vtkNew<vtkCellArray> lines;
-  for (vtkIdType first : {0, 4})
-    for (vtkIdType i = 0; i < 4; ++i) {
-      const std::array line{first + i, first + (i + 1) % 4};
-      lines->InsertNextCell(2, line.data());
-    }
-  vtkNew<vtkPolyData> data;
-  data->SetPoints(m_points);
-  data->SetLines(lines);
-  vtkNew<vtkPolyDataMapper2D> mapper;
-  mapper->SetInputData(data);
-  m_lines->SetMapper(mapper);
-  m_lines->GetProperty()->SetColor(0.1, 0.1, 0.12);
+  constexpr std::array<std::array<vtkIdType, 2>, 8> kLines{
+      {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}}};
+  setLines(m_lines, m_points, kLines);
 }
 
 void InsetFrame::show(vtkRenderer* overlay, int textSize) {
