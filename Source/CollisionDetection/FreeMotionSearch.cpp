@@ -45,6 +45,11 @@ MeshPair meshesOf(const PairRecord& record) {
   return meshes;
 }
 
+FreeMotions motionsOf(const PairRecord& record) {
+  return {record.a->nextFreeMotion, record.b->nextFreeMotion, record.a->elementBoxes,
+          record.b->elementBoxes};
+}
+
 }  // namespace
 
 bool FreeMotionSearch::isKnown(const PairTable& pairs) const {
@@ -64,6 +69,9 @@ void FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pa
   if (isKnown(pairs)) return;
   m_known.clear();
   start(geometries, pairs);
+  threads.forEach(m_boxed.size(), [&](std::size_t i) {
+    boxElements(m_boxed[i]->body.mesh, m_boxed[i]->elementBoxes);
+  });
   m_places.clear();
   m_nodePairs.clear();
   for (std::size_t i = 0; i < m_works.size(); ++i) {
@@ -94,21 +102,31 @@ void FreeMotionSearch::commit(const GeometryTable& geometries) noexcept {
   for (const auto& geometry : geometries.all()) geometry->freeMotion.swap(geometry->nextFreeMotion);
 }
 
-/// Lists the pairs that take part, and starts each free motion at the share of the least reach.
+/// Lists the pairs that take part and the meshes whose elements need boxes, and starts each free
+/// motion at the share of the least reach.
 void FreeMotionSearch::start(const GeometryTable& geometries, const PairTable& pairs) {
   for (const auto& geometry : geometries.all())
     geometry->nextFreeMotion.assign(geometry->freeMotionCount(),
                                     std::numeric_limits<double>::infinity());
   m_works.clear();
+  m_boxed.clear();
   for (const auto& record : pairs.records()) {
     if (!takesPart(*record)) continue;
     const double reach = record->pair.settings.freeMotionReach;
     for (Geometry* geometry : {record->a, record->b})
       for (double& motion : geometry->nextFreeMotion) motion = std::min(motion, 0.5 * reach);
     if (isEmpty(record->a->body) || isEmpty(record->b->body)) continue;
+    if (!hasShape(*record)) {
+      m_boxed.push_back(record->a);
+      m_boxed.push_back(record->b);
+    }
     m_works.push_back({record.get(), rangeOf(*record).searchDistance(largestOf(record->a->body) +
                                                                      largestOf(record->b->body))});
   }
+  std::sort(m_boxed.begin(), m_boxed.end());
+  m_boxed.erase(std::unique(m_boxed.begin(), m_boxed.end()), m_boxed.end());
+  for (Geometry* geometry : m_boxed)
+    geometry->elementBoxes.resize(geometry->body.mesh.topology.elements.size());
 }
 
 void FreeMotionSearch::startSearch(Work& work, const Threads& threads) {
@@ -128,9 +146,7 @@ void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch) 
     const MeshPair pair;
     const double searchDistance;
     const FreeMotions motions;
-  } context{meshesOf(*work.record),
-            work.searchDistance,
-            {work.record->a->nextFreeMotion, work.record->b->nextFreeMotion}};
+  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record)};
   scratch.sink.start(
       [](void* opaque, std::span<const ElementPair> pairs) {
         const Context& c = *static_cast<const Context*>(opaque);
@@ -150,8 +166,7 @@ void FreeMotionSearch::runByBruteForce(const Work& work, Scratch& scratch) {
     scratch.candidates.clear();
     for (std::uint32_t j = pair.self() ? i + 1 : 0; j < countB; ++j)
       scratch.candidates.push_back({i, j});
-    findFreeMotion(pair, work.searchDistance, scratch.candidates,
-                   {work.record->a->nextFreeMotion, work.record->b->nextFreeMotion});
+    findFreeMotion(pair, work.searchDistance, scratch.candidates, motionsOf(*work.record));
   }
 }
 

@@ -62,6 +62,7 @@ class FreeMotionSearch {
   std::vector<Known> m_known;  ///< for which the results hold
   bool m_isNew = false;        ///< commit() has something to commit
   std::vector<Work> m_works;
+  std::vector<Geometry*> m_boxed;  ///< each once
   std::vector<Place> m_places;
   std::vector<std::unique_ptr<Scratch>> m_scratch;
   Buffer<NodePair> m_nodePairs;

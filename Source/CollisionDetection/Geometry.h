@@ -12,6 +12,7 @@
 #include "Mesh/Motion.h"
 #include "Mesh/PieceMotion.h"
 #include "Mesh/Revision.h"
+#include "Math/FreeMotion.h"
 #include "Core/Buffer.h"
 
 #include <array>
@@ -67,6 +68,7 @@ struct Geometry : CountedObject {
   /// L: OctreeBasedCD::freeMotion(), of the last detection and of the one that runs. Empty before
   /// one is needed, and after a change of the elements. unlimited: the answer without a pair.
   Buffer<double> freeMotion, nextFreeMotion, unlimited;
+  Buffer<RoundBox> elementBoxes;  ///< of the search for free motion that runs, or ran last
   bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
 
   operator GeometryLabel() const { return body; }

@@ -7,24 +7,16 @@
 
 namespace palpate {
 
-namespace {
-
 using Eigen::Vector3d;
 
-struct Bounds {
-  Vector3d lower, upper;
-
-  explicit Bounds(const RoundPoints& points)
-      : lower(points.positions[0].array() - points.radii[0]),
-        upper(points.positions[0].array() + points.radii[0]) {
-    for (int i = 1; i < points.count; ++i) {
-      lower = lower.cwiseMin((points.positions[i].array() - points.radii[i]).matrix());
-      upper = upper.cwiseMax((points.positions[i].array() + points.radii[i]).matrix());
-    }
+RoundBox::RoundBox(const RoundPoints& points)
+    : lower(points.positions[0].array() - points.radii[0]),
+      upper(points.positions[0].array() + points.radii[0]) {
+  for (int i = 1; i < points.count; ++i) {
+    lower = lower.cwiseMin((points.positions[i].array() - points.radii[i]).matrix());
+    upper = upper.cwiseMax((points.positions[i].array() + points.radii[i]).matrix());
   }
-};
-
-}  // namespace
+}
 
 SharedGap gapAlong(const RoundPoints& p, const RoundPoints& q, const Vector3d& direction,
                    bool withRadii) {
@@ -45,10 +37,9 @@ SharedGap gapAlong(const RoundPoints& p, const RoundPoints& q, const Vector3d& d
   return result;
 }
 
-BoxGap gapOfBoxes(const RoundPoints& p, const RoundPoints& q, double thickness) {
-  const Bounds ofP(p), ofQ(q);
-  const Vector3d above = ofP.lower - ofQ.upper, below = ofQ.lower - ofP.upper,
-                 lower = ofP.lower.cwiseMin(ofQ.lower), upper = ofP.upper.cwiseMax(ofQ.upper);
+BoxGap gapOfBoxes(const RoundBox& p, const RoundBox& q, double thickness) {
+  const Vector3d above = p.lower - q.upper, below = q.lower - p.upper,
+                 lower = p.lower.cwiseMin(q.lower), upper = p.upper.cwiseMax(q.upper);
   Eigen::Index axis = 0;
   const double gap = above.cwiseMax(below).maxCoeff(&axis);
   return {gap,

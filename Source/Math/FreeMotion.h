@@ -44,15 +44,29 @@ struct GapSize {
   double extent;   ///< at least the largest difference between two points in a coordinate
 };
 
-/// The boxes of two sets of round points. The gap is the widest one along a coordinate axis, and
-/// the direction that from q towards p.
+/// The box of some round points. In L.
+struct RoundBox {
+  Eigen::Vector3d lower, upper;
+
+  RoundBox() = default;
+  explicit RoundBox(const RoundPoints&);
+  /// Whether the boxes are further apart along a coordinate axis. distance: in L.
+  bool isBeyond(double distance, const RoundBox& other) const {
+    for (int k = 0; k < 3; ++k)
+      if (lower[k] - other.upper[k] > distance || other.lower[k] - upper[k] > distance) return true;
+    return false;
+  }
+};
+
+/// What separates two boxes, p and q. The gap is the widest one along a coordinate axis, and the
+/// direction that from q towards p.
 struct BoxGap {
   double gap;
   Eigen::Vector3d direction;
   GapSize size;
 };
 /// Law      fewer points never have a smaller gap or a larger size, also in the last bit.
-BoxGap gapOfBoxes(const RoundPoints& p, const RoundPoints& q, double thickness);
+BoxGap gapOfBoxes(const RoundBox& p, const RoundBox& q, double thickness);
 
 /// How far apart the features of a pair are for its free motion (PairSettings::freeMotionReach).
 class FreeMotionRange {

@@ -19,7 +19,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The vertices of a feature or an element, with their positions and free motions.
+/// No vertex may move further. Other threads may lower a value meanwhile: that changes nothing.
+double mostFree(std::span<double> motions, std::span<const std::uint32_t> vertices) {
+  double most = 0.0;
+  for (const std::uint32_t v : vertices) most = std::max(most, leastSoFar(motions[v]));
+  return most;
+}
+
+/// The vertices of a feature, with their positions and free motions.
 struct FeatureCorners {
   RoundPoints points;
   std::array<std::uint32_t, 3> vertices;
@@ -37,11 +44,8 @@ struct FeatureCorners {
   double largestRadius() const {
     return *std::max_element(points.radii.begin(), points.radii.end());
   }
-  /// No vertex may move further. Other threads may lower a value meanwhile: that changes nothing.
   double mostFree() const {
-    double most = 0.0;
-    for (int i = 0; i < points.count; ++i) most = std::max(most, leastSoFar(motion(i)));
-    return most;
+    return palpate::mostFree(motions, std::span(vertices).first(points.count));
   }
 };
 
@@ -104,15 +108,16 @@ class FreeMotionFinder {
 
  private:
   void add(const ElementPair& candidate) {
+    const RoundBox &s = m_motions.boxesOfA[candidate.a], &t = m_motions.boxesOfB[candidate.b];
+    if (s.isBeyond(m_searchDistance, t)) return;
     if (!m_pair.a.topology.isEnabled(candidate.a) || !m_pair.b.topology.isEnabled(candidate.b))
       return;
     const std::uint32_t tests = m_tests.of(candidate);
     if (tests == 0) return;
-    const FeatureCorners s(m_pair.a, m_motions.a, m_pair.a.topology.elements[candidate.a]),
-        t(m_pair.b, m_motions.b, m_pair.b.topology.elements[candidate.b]);
-    const Limits limits(*this, s, t);
-    if (limits.lowersNone(s, t)) return;
-    m_most = std::max({m_most, s.mostFree(), t.mostFree()});
+    const double most = std::max(mostFree(m_motions.a, m_pair.a.topology.elements[candidate.a]),
+                                 mostFree(m_motions.b, m_pair.b.topology.elements[candidate.b]));
+    if (Limits(*this, s, t).lowersNone(most)) return;
+    m_most = std::max(m_most, most);
     m_tests.add(candidate, tests);
     if (m_tests.isFull()) flush();
   }
@@ -125,14 +130,12 @@ class FreeMotionFinder {
 
   /// What the boxes of two features, or of two elements, prove.
   struct Limits {
-    Limits(const FreeMotionFinder& finder, const FeatureCorners& p, const FeatureCorners& q)
-        : box(gapOfBoxes(p.points, q.points, finder.m_range.thickness())),
+    Limits(const FreeMotionFinder& finder, const RoundBox& p, const RoundBox& q)
+        : box(gapOfBoxes(p, q, finder.m_range.thickness())),
           free(finder.m_range.freeGap(box.gap, box.size)) {}
 
-    /// Whether all vertices are known to be no freer than along the axis.
-    bool lowersNone(const FeatureCorners& p, const FeatureCorners& q) const {
-      return free > 0.0 && std::max(p.mostFree(), q.mostFree()) <= 0.5 * free;
-    }
+    /// Whether vertices that may move `most` are known to be no freer than along the axis.
+    bool lowersNone(double most) const { return free > 0.0 && most <= 0.5 * free; }
 
     BoxGap box;
     double free;  ///< L: along the axis of the widest gap
@@ -186,8 +189,8 @@ class FreeMotionFinder {
   template <class Nearly, class IsRejected, class Measure>
   void bound(const FeatureCorners& p, const FeatureCorners& q, Nearly&& nearly,
              IsRejected&& isRejected, Measure&& measured) {
-    const Limits limits(*this, p, q);
-    if (limits.lowersNone(p, q) || isRejected()) return;
+    const Limits limits(*this, RoundBox(p.points), RoundBox(q.points));
+    if (limits.lowersNone(std::max(p.mostFree(), q.mostFree())) || isRejected()) return;
     const Vector3d shortest = nearly();
     const double length = shortest.norm();
     SharedGap shared = gapAlong(p.points, q.points, shortest / length);
@@ -222,6 +225,15 @@ class FreeMotionFinder {
 };
 
 }  // namespace
+
+void boxElements(const TriangleMesh& mesh, std::span<RoundBox> boxes) {
+  PALPATE_ASSERT(boxes.size() == mesh.topology.elements.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    RoundPoints points;
+    for (const std::uint32_t v : mesh.topology.elements[i]) points.add(mesh.now[v], mesh.radius(v));
+    boxes[i] = RoundBox(points);
+  }
+}
 
 void findFreeMotion(const MeshPair& pair, double searchDistance,
                     std::span<const ElementPair> candidates, const FreeMotions& motions) {

@@ -1,15 +1,20 @@
 #pragma once
 
 #include "NarrowPhase/NarrowPhase.h"
+#include "Math/FreeMotion.h"
 
 #include <span>
 
 namespace palpate {
 
-/// L, one for each vertex of the meshes of a pair; the same span twice for self-collision.
+/// Of the meshes of a pair; the same spans twice for self-collision.
 struct FreeMotions {
-  std::span<double> a, b;
+  std::span<double> a, b;                        ///< L, one for each vertex
+  std::span<const RoundBox> boxesOfA, boxesOfB;  ///< boxElements()
 };
+
+/// The box of each element, at its present position. The octrees may hold larger ones: of the step.
+void boxElements(const TriangleMesh&, std::span<RoundBox>);
 
 /// Lowers the free motions of vertices of the candidate pairs, with the pair's filters. Elements
 /// beyond the reach lower none below half of it. searchDistance: that of
