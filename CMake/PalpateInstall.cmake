@@ -1,27 +1,39 @@
-# The installed tree: public headers, libraries, and the package file that find_package(Palpate) reads.
+# The installed tree: public headers, libraries, and what find_package(Palpate) and pkg-config read. Each library is a
+# component of find_package() with an export file of its own, so that a package may leave it out. For cpack, the
+# libraries that users run belong to the component NAME, all else of them to NAMEDevelopment: NAME is Library, or Vtk or
+# Fcl for what needs those.
 include(CMakePackageConfigHelpers)
 
 set(packageFolder ${CMAKE_INSTALL_LIBDIR}/cmake/Palpate)
-set(components Palpate)
-set(withSimplify OFF)
-if(TARGET PalpateSimplify)
-  set(withSimplify ON)
-  list(APPEND components PalpateSimplify)
-endif()
-foreach(component PalpateMeshFiles PalpateVtk)
+set(components)
+foreach(component Palpate PalpateSimplify PalpateMeshFiles PalpateVtk PalpateFcl)
   if(TARGET ${component})
     list(APPEND components ${component})
   endif()
 endforeach()
-set(withFcl OFF)
-if(TARGET PalpateFcl)
-  set(withFcl ON)
-  list(APPEND components PalpateFcl)
-endif()
 foreach(component IN LISTS components)
   palpate_export_own_symbols(${component})
+endforeach()
+if(NOT PALPATE_INSTALL)
+  return()
+endif()
+
+set(withSimplify OFF)
+if(TARGET PalpateSimplify)
+  set(withSimplify ON)
+endif()
+foreach(component IN LISTS components)
   # The libraries find each other wherever they are installed.
   set_target_properties(${component} PROPERTIES INSTALL_RPATH "$ORIGIN")
+  set(package Library)
+  if(component MATCHES "Palpate(Vtk|Fcl)")
+    set(package ${CMAKE_MATCH_1})
+  endif()
+  install(TARGETS ${component} EXPORT ${component}Targets
+    LIBRARY COMPONENT ${package} NAMELINK_COMPONENT ${package}Development
+    ARCHIVE COMPONENT ${package}Development
+    FILE_SET HEADERS COMPONENT ${package}Development)
+  install(EXPORT ${component}Targets NAMESPACE Palpate:: DESTINATION ${packageFolder} COMPONENT ${package}Development)
 endforeach()
 # A static Palpate::Vtk hands VTK on to its user's linker, and Palpate::Fcl FCL.
 if(TARGET PalpateVtk)
@@ -29,13 +41,36 @@ if(TARGET PalpateVtk)
   list(FILTER vtkComponents INCLUDE REGEX "^VTK::")
   list(TRANSFORM vtkComponents REPLACE "^VTK::" "")
 endif()
-install(TARGETS ${components} EXPORT PalpateTargets FILE_SET HEADERS)
-install(EXPORT PalpateTargets NAMESPACE Palpate:: DESTINATION ${packageFolder})
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/PalpateConfig.cmake.in
   ${PROJECT_BINARY_DIR}/PalpateConfig.cmake INSTALL_DESTINATION ${packageFolder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/PalpateConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/PalpateConfig.cmake ${PROJECT_BINARY_DIR}/PalpateConfigVersion.cmake
-  DESTINATION ${packageFolder})
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  DESTINATION ${packageFolder} COMPONENT LibraryDevelopment)
+
+# For pkg-config: the core. The folder above the file is the prefix, so that the tree can be moved.
+file(RELATIVE_PATH prefixOfPc /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" prefixOfPc ${prefixOfPc})
+set(threadsOfPc -pthread)
+if(PALPATE_THREADS STREQUAL TBB)
+  set(threadsOfPc -ltbb)
+endif()
+set(forStatic .private)
+if(NOT BUILD_SHARED_LIBS)
+  set(forStatic)
+endif()
+file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/palpate.pc @ONLY CONTENT
+"prefix=\${pcfiledir}/@prefixOfPc@
+Name: palpate
+Description: @PROJECT_DESCRIPTION@; its C++ headers need C++20
+Version: @PROJECT_VERSION@
+Requires: eigen3
+Requires@forStatic@: libhwy gmp
+Cflags: -I\${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
+Libs: -L\${prefix}/@CMAKE_INSTALL_LIBDIR@ -lPalpate
+Libs@forStatic@: @threadsOfPc@ -lstdc++ -lm
+")
+install(FILES ${PROJECT_BINARY_DIR}/palpate.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
+  COMPONENT LibraryDevelopment)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT LibraryDevelopment)

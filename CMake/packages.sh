@@ -1,5 +1,5 @@
 #!/bin/bash
-# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage),
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage, package),
 # as root or through sudo. Returns at once when all are there.
 set -euo pipefail
 
@@ -11,6 +11,7 @@ python="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev lib
 test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
   clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe python3-sphinx-copybutton nodejs chromium"
+package="lintian dpkg-dev fakeroot help2man"
 figures="python3 python3-matplotlib python3-pil"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev
   libopenvdb-dev"

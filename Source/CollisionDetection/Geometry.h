@@ -69,7 +69,7 @@ struct Geometry : CountedObject {
   /// one is needed, and after a change of the elements. unlimited: the answer without a pair.
   Buffer<double> freeMotion, nextFreeMotion, unlimited;
   Buffer<RoundBox> elementBoxes;  ///< of the search for free motion that runs, or ran last
-  bool skipsOctree = false;  ///< the update that runs, or ran last, leaves the octree outdated
+  bool skipsOctree = false;       ///< the update that runs, or ran last, leaves the octree outdated
 
   operator GeometryLabel() const { return body; }
   /// The data for the choice of a method.
