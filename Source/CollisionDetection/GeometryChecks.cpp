@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -99,7 +100,8 @@ void checkPositionCount(const Geometry& geometry, std::size_t first, std::size_t
   if (first > all || count > all - first)
     throw Error(ErrorCode::WrongPositionCount,
                 nameOf(geometry) + ": " + std::to_string(count) + " positions given from vertex " +
-                    std::to_string(first) + " on, but it has " + std::to_string(all) + " vertices",
+                    std::to_string(static_cast<std::ptrdiff_t>(first)) + " on, but it has " +
+                    std::to_string(all) + " vertices",
                 geometry.body.id);
 }
 

@@ -136,7 +136,7 @@ TEST(SomePositionsOfABody, AreRefusedBeyondItsVertices) {
   const Mesh mesh = sheet(2, 0.0, 0.0);
   const GeometryId id = object.addTriangleMesh(mesh.positions, mesh.triangles),
                    ball = object.addAnalyticalGeometry(Sphere{.radius = 1.0});
-  const auto messageOf = [&](GeometryId geometry, std::uint32_t first, std::size_t count) {
+  const auto messageOf = [&](GeometryId geometry, long long first, std::size_t count) {
     try {
       object.setPositions(geometry, first, std::vector<Vector3d>(count, Vector3d(7.0, 7.0, 7.0)));
     } catch (const Error& error) {
@@ -147,8 +147,10 @@ TEST(SomePositionsOfABody, AreRefusedBeyondItsVertices) {
   };
   EXPECT_EQ(messageOf(id, 7, 3),
             "geometry 0: 3 positions given from vertex 7 on, but it has 9 vertices");
-  EXPECT_EQ(messageOf(id, 4294967295u, 1),
+  EXPECT_EQ(messageOf(id, 4294967295, 1),
             "geometry 0: 1 positions given from vertex 4294967295 on, but it has 9 vertices");
+  EXPECT_EQ(messageOf(id, -1, 1),
+            "geometry 0: 1 positions given from vertex -1 on, but it has 9 vertices");
   EXPECT_NE(messageOf(ball, 0, 0).find("is a shape"), std::string::npos);
   EXPECT_EQ(messageOf(id, 9, 0), "");
   EXPECT_TRUE(std::ranges::equal(object.positions(id), mesh.positions));
