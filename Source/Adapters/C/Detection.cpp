@@ -1,0 +1,344 @@
+// Part of <palpate/palpate_c.h>: geometries, pairs and frames.
+#include "C/Handles.h"
+#include "C/Twins.h"
+
+#include <palpate/Capture.h>
+
+#include <optional>
+
+using namespace palpate;
+using namespace palpate::c;
+
+namespace {
+
+static_assert(PALPATE_UPDATE_REBUILD == static_cast<int>(OctreeUpdate::Rebuild));
+static_assert(PALPATE_BOUNDS_DOP14 == static_cast<int>(OctreeBounds::Dop14));
+static_assert(PALPATE_BOUNDS_DOP18 == static_cast<int>(OctreeBounds::Dop18));
+static_assert(PALPATE_ENGINE_BRUTE_FORCE == static_cast<int>(Engine::BruteForce));
+static_assert(PALPATE_METHOD_INTERSECTION == static_cast<int>(Method::Intersection));
+static_assert(PALPATE_METHOD_PROXIMITY == static_cast<int>(Method::Proximity));
+static_assert(PALPATE_METHOD_CONTINUOUS == static_cast<int>(Method::Continuous));
+static_assert(PALPATE_METHOD_DISTANCE_FIELD == static_cast<int>(Method::DistanceField));
+static_assert(PALPATE_METHOD_PROXY == static_cast<int>(Method::Proxy));
+static_assert(PALPATE_CONTACTS_ALL == static_cast<int>(Contacts::All));
+static_assert(PALPATE_SIDES_OUTER == static_cast<int>(Sidedness::Outer));
+static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactFeatures::Kind::TriangleVertex));
+static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactFeatures::Kind::EdgeEdge));
+
+Settings settingsOf(const palpate_settings* settings) {
+  if (!settings) return {};
+  const palpate_settings& s = sized(settings, "the settings");
+  return {.octree = {.maxDepth = s.max_depth,
+                     .maxElementsPerLeaf = s.max_elements_per_leaf,
+                     .update = enumerator(s.octree_update, OctreeUpdate::Rebuild, "octree_update"),
+                     .bounds = enumerator(s.octree_bounds, OctreeBounds::Dop18, "octree_bounds"),
+                     .keepsPairs = s.keeps_pairs != 0},
+          .engine = enumerator(s.engine, Engine::BruteForce, "engine"),
+          .threads = s.threads,
+          .memoryLimit = s.memory_limit};
+}
+
+palpate_settings fromSettings(const Settings& s) {
+  return {.size = sizeof(palpate_settings),
+          .memory_limit = s.memoryLimit,
+          .threads = s.threads,
+          .engine = static_cast<int>(s.engine),
+          .octree_update = static_cast<int>(s.octree.update),
+          .octree_bounds = static_cast<int>(s.octree.bounds),
+          .max_depth = s.octree.maxDepth,
+          .max_elements_per_leaf = s.octree.maxElementsPerLeaf,
+          .keeps_pairs = s.octree.keepsPairs};
+}
+
+PairSettings pairSettingsOf(const palpate_pair_settings* settings) {
+  if (!settings) return {};
+  const palpate_pair_settings& s = sized(settings, "the settings");
+  return {.method = enumerator(s.method, Method::Proxy, "method"),
+          .thickness = s.thickness,
+          .contacts = enumerator(s.contacts, Contacts::All, "contacts"),
+          .restDistance = s.rest_distance,
+          .allowedError = s.allowed_error,
+          .freeMotionReach = s.free_motion_reach,
+          .continuous = {.timeTolerance = s.time_tolerance,
+                         .earliestTimeOnly = s.earliest_time_only != 0},
+          .automatic = {.motionTolerance = s.motion_tolerance},
+          .proxy = {.widestNormalCone = s.widest_normal_cone}};
+}
+
+palpate_pair_settings fromPairSettings(const PairSettings& s) {
+  return {.size = sizeof(palpate_pair_settings),
+          .thickness = s.thickness,
+          .rest_distance = s.restDistance,
+          .allowed_error = s.allowedError,
+          .free_motion_reach = s.freeMotionReach,
+          .time_tolerance = s.continuous.timeTolerance,
+          .motion_tolerance = s.automatic.motionTolerance,
+          .widest_normal_cone = s.proxy.widestNormalCone,
+          .method = static_cast<int>(s.method),
+          .contacts = static_cast<int>(s.contacts),
+          .earliest_time_only = s.continuous.earliestTimeOnly};
+}
+
+/// add() with one radius for all vertices, or with one per vertex.
+template <class Add>
+palpate_id addWithRadii(const double* radii, std::size_t count, const Add& add) {
+  const auto all = array(radii, count, "radii");
+  return static_cast<palpate_id>(count > 1 ? add(all) : add(count == 1 ? all[0] : 0.0));
+}
+
+}  // namespace
+
+palpate_status palpate_init_settings(palpate_settings* settings, size_t size) {
+  return initialise(__func__, settings, size, fromSettings({}));
+}
+palpate_status palpate_init_pair_settings(palpate_pair_settings* settings, size_t size) {
+  return initialise(__func__, settings, size, fromPairSettings({}));
+}
+palpate_status palpate_init_filter(palpate_filter* filter, size_t size) {
+  const CollisionFilter f;
+  return initialise(__func__, filter, size,
+                    {sizeof *filter, f.groups, f.mask, static_cast<int>(f.sidedness)});
+}
+palpate_status palpate_init_proxy_settings(palpate_proxy_settings* settings, size_t size) {
+  const SurfaceProxySettings s;
+  return initialise(__func__, settings, size,
+                    {sizeof *settings, s.reach, s.errorBound, s.widestNormalCone});
+}
+
+palpate_status palpate_create(const palpate_settings* settings, palpate_cd** cd) {
+  return guarded(__func__, [&] {
+    given(cd, "cd");
+    *cd = new palpate_cd{OctreeBasedCD(settingsOf(settings))};
+  });
+}
+void palpate_destroy(palpate_cd* cd) { delete cd; }
+
+palpate_status palpate_add_triangle_mesh(palpate_cd* cd, const double* positions,
+                                         size_t vertex_count, const uint32_t* triangles,
+                                         size_t triangle_count, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = static_cast<palpate_id>(
+        of(cd).addTriangleMesh(c::positions(positions, vertex_count),
+                               elements<3>(triangles, triangle_count, "triangles")));
+  });
+}
+palpate_status palpate_add_tetrahedral_mesh(palpate_cd* cd, const double* positions,
+                                            size_t vertex_count, const uint32_t* tetrahedra,
+                                            size_t tetrahedron_count, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = static_cast<palpate_id>(
+        of(cd).addTetrahedralMesh(c::positions(positions, vertex_count),
+                                  elements<4>(tetrahedra, tetrahedron_count, "tetrahedra")));
+  });
+}
+palpate_status palpate_add_line_mesh(palpate_cd* cd, const double* positions, size_t vertex_count,
+                                     const uint32_t* segments, size_t segment_count,
+                                     const double* radii, size_t radius_count, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = addWithRadii(radii, radius_count, [&](const auto& all) {
+      return of(cd).addLineMesh(c::positions(positions, vertex_count),
+                                elements<2>(segments, segment_count, "segments"), all);
+    });
+  });
+}
+palpate_status palpate_add_point_set(palpate_cd* cd, const double* positions, size_t vertex_count,
+                                     const double* radii, size_t radius_count, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = addWithRadii(radii, radius_count, [&](const auto& all) {
+      return of(cd).addPointSet(c::positions(positions, vertex_count), all);
+    });
+  });
+}
+palpate_status palpate_add_shape(palpate_cd* cd, const palpate_shape* shape, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = static_cast<palpate_id>(of(cd).addAnalyticalGeometry(shapeOf(shape)));
+  });
+}
+palpate_status palpate_add_field(palpate_cd* cd, const palpate_field* field, palpate_id* id) {
+  return guarded(__func__, [&] {
+    given(id, "id") = static_cast<palpate_id>(of(cd).addDistanceField(given(field, "field").field));
+  });
+}
+palpate_status palpate_attach_field(palpate_cd* cd, palpate_id mesh, const palpate_field* field) {
+  return guarded(__func__, [&] {
+    of(cd).attachDistanceField(GeometryId{mesh}, field ? field->field : nullptr);
+  });
+}
+palpate_status palpate_attach_proxy(palpate_cd* cd, palpate_id mesh,
+                                    const palpate_proxy_settings* settings) {
+  return guarded(__func__, [&] {
+    std::optional<SurfaceProxySettings> proxy;
+    if (settings) {
+      const palpate_proxy_settings& s = sized(settings, "the settings");
+      proxy = {s.reach, s.error_bound, s.widest_normal_cone};
+    }
+    of(cd).attachSurfaceProxy(GeometryId{mesh}, proxy);
+  });
+}
+palpate_status palpate_remove(palpate_cd* cd, palpate_id id) {
+  return guarded(__func__, [&] { of(cd).removeGeometry(GeometryId{id}); });
+}
+palpate_status palpate_has(const palpate_cd* cd, palpate_id id, uint8_t* has) {
+  return guarded(__func__, [&] { given(has, "has") = of(cd).has(GeometryId{id}); });
+}
+
+palpate_status palpate_set_positions(palpate_cd* cd, palpate_id id, const double* now,
+                                     size_t count) {
+  return guarded(__func__,
+                 [&] { of(cd).setPositions(GeometryId{id}, positions(now, count, "now")); });
+}
+palpate_status palpate_set_step(palpate_cd* cd, palpate_id id, const double* before,
+                                const double* now, size_t count) {
+  return guarded(__func__, [&] {
+    of(cd).setPositions(GeometryId{id}, positions(before, count, "before"),
+                        positions(now, count, "now"));
+  });
+}
+palpate_status palpate_set_some_positions(palpate_cd* cd, palpate_id id, size_t first,
+                                          const double* now, size_t count) {
+  return guarded(__func__,
+                 [&] { of(cd).setPositions(GeometryId{id}, first, positions(now, count, "now")); });
+}
+palpate_status palpate_set_triangles(palpate_cd* cd, palpate_id id, const double* positions,
+                                     size_t vertex_count, const uint32_t* triangles,
+                                     size_t triangle_count) {
+  return guarded(__func__, [&] {
+    of(cd).setTriangles(GeometryId{id}, c::positions(positions, vertex_count),
+                        elements<3>(triangles, triangle_count, "triangles"));
+  });
+}
+palpate_status palpate_set_tetrahedra(palpate_cd* cd, palpate_id id, const double* positions,
+                                      size_t vertex_count, const uint32_t* tetrahedra,
+                                      size_t tetrahedron_count) {
+  return guarded(__func__, [&] {
+    of(cd).setTetrahedra(GeometryId{id}, c::positions(positions, vertex_count),
+                         elements<4>(tetrahedra, tetrahedron_count, "tetrahedra"));
+  });
+}
+palpate_status palpate_set_transform(palpate_cd* cd, palpate_id id, const palpate_pose* now) {
+  return guarded(__func__, [&] { of(cd).setTransform(GeometryId{id}, poseOf(now, "now")); });
+}
+palpate_status palpate_set_motion(palpate_cd* cd, palpate_id id, const palpate_motion* motion) {
+  return guarded(__func__, [&] {
+    const RigidMotion step = motionOf(motion, "motion");
+    of(cd).setTransform(GeometryId{id}, step.before, step.now);
+  });
+}
+palpate_status palpate_set_name(palpate_cd* cd, palpate_id id, const char* name) {
+  return guarded(__func__, [&] { of(cd).setName(GeometryId{id}, &given(name, "name")); });
+}
+palpate_status palpate_set_filter(palpate_cd* cd, palpate_id id, const palpate_filter* filter) {
+  return guarded(__func__, [&] {
+    const palpate_filter& f = sized(filter, "the filter");
+    of(cd).setCollisionFilter(
+        GeometryId{id}, {f.groups, f.mask, enumerator(f.sidedness, Sidedness::Outer, "sidedness")});
+  });
+}
+palpate_status palpate_set_disabled_elements(palpate_cd* cd, palpate_id id,
+                                             const uint32_t* elements, size_t count) {
+  return guarded(__func__, [&] {
+    of(cd).setDisabledElements(GeometryId{id}, array(elements, count, "elements"));
+  });
+}
+
+palpate_status palpate_get_positions(const palpate_cd* cd, palpate_id id, const double** positions,
+                                     size_t* count) {
+  return guarded(__func__, [&] {
+    given(positions, "positions"), given(count, "count");
+    const auto now = of(cd).positions(GeometryId{id});
+    *positions = reinterpret_cast<const double*>(now.data());
+    *count = now.size();
+  });
+}
+palpate_status palpate_get_bounds(const palpate_cd* cd, palpate_id id, double* lower,
+                                  double* upper) {
+  return guarded(__func__, [&] {
+    given(lower, "lower"), given(upper, "upper");
+    const Eigen::AlignedBox3d box = of(cd).bounds(GeometryId{id});
+    fromVector(box.min(), lower);
+    fromVector(box.max(), upper);
+  });
+}
+palpate_status palpate_get_transform(const palpate_cd* cd, palpate_id id, palpate_pose* now) {
+  return guarded(__func__, [&] { given(now, "now") = fromPose(of(cd).transform(GeometryId{id})); });
+}
+palpate_status palpate_get_name(const palpate_cd* cd, palpate_id id, const char** name) {
+  return guarded(__func__, [&] { given(name, "name") = of(cd).name(GeometryId{id}).c_str(); });
+}
+palpate_status palpate_get_surface(const palpate_cd* cd, palpate_id id, const uint32_t** triangles,
+                                   const uint32_t** tetrahedra, size_t* count) {
+  return guarded(__func__, [&] {
+    given(triangles, "triangles"), given(tetrahedra, "tetrahedra"), given(count, "count");
+    const TetrahedralSurface surface = of(cd).surface(GeometryId{id});
+    *triangles = reinterpret_cast<const uint32_t*>(surface.triangles.data());
+    *tetrahedra = surface.tetrahedra.data();
+    *count = surface.triangles.size();
+  });
+}
+
+palpate_status palpate_add_pair(palpate_cd* cd, palpate_id a, palpate_id b,
+                                const palpate_pair_settings* settings) {
+  return guarded(__func__, [&] {
+    of(cd).addCollisionPair(GeometryId{a}, GeometryId{b}, pairSettingsOf(settings));
+  });
+}
+palpate_status palpate_set_pair_settings(palpate_cd* cd, palpate_id a, palpate_id b,
+                                         const palpate_pair_settings* settings) {
+  return guarded(__func__, [&] {
+    of(cd).setPairSettings(GeometryId{a}, GeometryId{b}, pairSettingsOf(settings));
+  });
+}
+palpate_status palpate_set_predicate(palpate_cd* cd, palpate_id a, palpate_id b,
+                                     palpate_predicate predicate, void* context) {
+  return guarded(__func__, [&] {
+    ContactPredicate accepts;
+    if (predicate)
+      accepts = [=](const ContactFeatures& features) {
+        return predicate(context, fromTwins<palpate_features>(&features)) != 0;
+      };
+    of(cd).setContactPredicate(GeometryId{a}, GeometryId{b}, std::move(accepts));
+  });
+}
+palpate_status palpate_remove_pair(palpate_cd* cd, palpate_id a, palpate_id b) {
+  return guarded(__func__, [&] { of(cd).removeCollisionPair(GeometryId{a}, GeometryId{b}); });
+}
+palpate_status palpate_get_pair_settings(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                         palpate_pair_settings* settings) {
+  return guarded(__func__, [&] {
+    sized(settings, "the settings") =
+        fromPairSettings(of(cd).pairSettings(GeometryId{a}, GeometryId{b}));
+  });
+}
+palpate_status palpate_get_pairs(const palpate_cd* cd, palpate_pair* pairs, size_t capacity,
+                                 size_t* count) {
+  return guarded(__func__, [&] {
+    const List<palpate_pair> list(pairs, capacity, count, "pairs");
+    std::vector<ElementPair> all;
+    for (const CollisionPair& pair : of(cd).pairs())
+      all.push_back({static_cast<palpate_id>(pair.a), static_cast<palpate_id>(pair.b)});
+    list.fill(all);
+  });
+}
+palpate_status palpate_get_candidates(palpate_cd* cd, palpate_id a, palpate_id b,
+                                      palpate_pair* elements, size_t capacity, size_t* count) {
+  return guarded(__func__, [&] {
+    const List<palpate_pair> list(elements, capacity, count, "elements");
+    list.fill(of(cd).candidatePairs(GeometryId{a}, GeometryId{b}));
+  });
+}
+
+palpate_status palpate_update(palpate_cd* cd) {
+  return guarded(__func__, [&] { of(cd).update(); });
+}
+palpate_status palpate_detect(palpate_cd* cd) {
+  return guarded(__func__, [&] { of(cd).detectCollision(); });
+}
+palpate_status palpate_advance(palpate_cd* cd) {
+  return guarded(__func__, [&] { of(cd).advance(); });
+}
+palpate_status palpate_release_memory(palpate_cd* cd) {
+  return guarded(__func__, [&] { of(cd).releaseMemory(); });
+}
+palpate_status palpate_capture(const palpate_cd* cd, const char* path) {
+  return guarded(__func__, [&] { capture(of(cd), &given(path, "path")); });
+}

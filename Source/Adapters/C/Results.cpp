@@ -1,0 +1,196 @@
+// Part of <palpate/palpate_c.h>: contacts, constraint rows and statistics.
+#include "C/Handles.h"
+#include "C/Twins.h"
+
+using namespace palpate;
+using namespace palpate::c;
+
+namespace {
+
+static_assert(PALPATE_CORNER_A == static_cast<int>(TriangleFeature::CornerA));
+static_assert(PALPATE_CORNER_B == static_cast<int>(TriangleFeature::CornerB));
+static_assert(PALPATE_CORNER_C == static_cast<int>(TriangleFeature::CornerC));
+static_assert(PALPATE_EDGE_AB == static_cast<int>(TriangleFeature::EdgeAB));
+static_assert(PALPATE_EDGE_BC == static_cast<int>(TriangleFeature::EdgeBC));
+static_assert(PALPATE_EDGE_CA == static_cast<int>(TriangleFeature::EdgeCA));
+static_assert(PALPATE_FACE == static_cast<int>(TriangleFeature::Face));
+static_assert(PALPATE_EDGE_END == static_cast<int>(EdgeFeature::End));
+static_assert(PALPATE_EDGE_INTERIOR == static_cast<int>(EdgeFeature::Interior));
+static_assert(PALPATE_ELEMENT_EDGE == static_cast<int>(ShapeElement::Edge));
+static_assert(PALPATE_ELEMENT_FACE == static_cast<int>(ShapeElement::Face));
+static_assert(PALPATE_REASON_STILL == static_cast<int>(MethodReason::Still));
+static_assert(PALPATE_REASON_SLOW == static_cast<int>(MethodReason::Slow));
+static_assert(PALPATE_REASON_FAST == static_cast<int>(MethodReason::Fast));
+static_assert(PALPATE_REASON_MIXED == static_cast<int>(MethodReason::Mixed));
+static_assert(PALPATE_REASON_CHEAPEST == static_cast<int>(MethodReason::Cheapest));
+static_assert(PALPATE_REASON_NO_ALTERNATIVE == static_cast<int>(MethodReason::NoAlternative));
+static_assert(PALPATE_REASON_ALLOWED_ERROR == static_cast<int>(MethodReason::AllowedError));
+
+const CollisionData& dataOf(const palpate_cd* cd, palpate_id a, palpate_id b) {
+  return of(cd).collisionData(GeometryId{a}, GeometryId{b});
+}
+
+palpate_indices indices(const std::vector<std::uint32_t>& list) {
+  return {list.data(), list.size()};
+}
+
+SolverVertices verticesOf(const palpate_side* side, const char* name) {
+  const palpate_side& s = sized(side, name);
+  return {s.first, positions(s.before, s.count, "before"), positions(s.now, s.count, "now")};
+}
+
+ContactSide sideOf(const palpate_side* side, const char* name) {
+  return {verticesOf(side, name), array(side->radii, side->radius_count, "radii"),
+          motionOf(&side->motion, name)};
+}
+
+}  // namespace
+
+palpate_status palpate_get_contacts(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                    palpate_contacts* contacts) {
+  return guarded(__func__, [&] {
+    sized(contacts, "contacts");
+    const CollisionData::Parts parts = dataOf(cd, a, b).parts();
+    *contacts = {
+        .size = sizeof *contacts,
+        .vertex_triangle = fromTwins<palpate_vertex_triangle>(parts.vertexTriangle.data()),
+        .vertex_triangle_count = parts.vertexTriangle.size(),
+        .triangle_vertex = fromTwins<palpate_vertex_triangle>(parts.triangleVertex.data()),
+        .triangle_vertex_count = parts.triangleVertex.size(),
+        .edge_edge = fromTwins<palpate_edge_edge>(parts.edgeEdge.data()),
+        .edge_edge_count = parts.edgeEdge.size(),
+        .intersecting_triangles = fromTwins<palpate_pair>(parts.intersectingTriangles.data()),
+        .intersecting_triangle_count = parts.intersectingTriangles.size(),
+        .shape = fromTwins<palpate_shape_contact>(parts.shape.data()),
+        .shape_count = parts.shape.size(),
+        .shape_shape = fromTwins<palpate_shape_shape>(parts.shapeShape.data()),
+        .shape_shape_count = parts.shapeShape.size(),
+        .error_bound = parts.errorBound};
+  });
+}
+palpate_status palpate_get_validity(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                    palpate_validity* validity) {
+  return guarded(__func__, [&] {
+    sized(validity, "validity");
+    const Validity& v = dataOf(cd, a, b).validity();
+    *validity = {.size = sizeof *validity,
+                 .trusted = v.trusted,
+                 .started_apart = v.startedApart,
+                 .side_may_be_wrong = v.sideMayBeWrong,
+                 .unwelded = v.unwelded,
+                 .method = static_cast<int>(v.method),
+                 .reason = static_cast<int>(v.reason),
+                 .at_end = v.atEnd,
+                 .at_impact = v.atImpact,
+                 .displacement = v.displacement,
+                 .displacement_limit = v.displacementLimit,
+                 .arc_deviation = v.arcDeviation,
+                 .effective_thickness = v.effectiveThickness,
+                 .proxy_depth = v.proxyDepth,
+                 .untrusted_vertices_a = indices(v.untrustedVerticesA),
+                 .untrusted_vertices_b = indices(v.untrustedVerticesB),
+                 .degenerate_triangles_a = indices(v.degenerateTrianglesA),
+                 .degenerate_triangles_b = indices(v.degenerateTrianglesB),
+                 .outside_band = indices(v.outsideBand),
+                 .near_threshold = indices(v.nearThreshold),
+                 .unreliable_sign = indices(v.unreliableSign)};
+  });
+}
+palpate_status palpate_get_earliest_time(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                         double* time_of_impact) {
+  return guarded(__func__, [&] {
+    given(time_of_impact, "time_of_impact") = dataOf(cd, a, b).earliestTimeOfImpact();
+  });
+}
+palpate_status palpate_get_hash(const palpate_cd* cd, palpate_id a, palpate_id b, uint64_t* hash) {
+  return guarded(__func__, [&] { given(hash, "hash") = dataOf(cd, a, b).hash(); });
+}
+palpate_status palpate_get_free_motion(const palpate_cd* cd, palpate_id id, const double** motions,
+                                       size_t* count) {
+  return guarded(__func__, [&] {
+    given(motions, "motions"), given(count, "count");
+    const auto all = of(cd).freeMotion(GeometryId{id});
+    *motions = all.data();
+    *count = all.size();
+  });
+}
+
+palpate_status palpate_get_statistics(const palpate_cd* cd, palpate_statistics* statistics) {
+  return guarded(__func__, [&] {
+    sized(statistics, "statistics");
+    const FrameStatistics& s = of(cd).statistics();
+    *statistics = {.size = sizeof *statistics,
+                   .boxes_ms = s.milliseconds.boxes,
+                   .octree_ms = s.milliseconds.octree,
+                   .pairs_ms = s.milliseconds.pairs,
+                   .narrow_phase_ms = s.milliseconds.narrowPhase,
+                   .order_ms = s.milliseconds.order,
+                   .geometries = s.geometries,
+                   .triangles = s.triangles,
+                   .segments = s.segments,
+                   .points = s.points,
+                   .untested_vertices = s.untestedVertices,
+                   .rebuilt_octrees = s.rebuiltOctrees,
+                   .refitted_octrees = s.refittedOctrees,
+                   .unchanged_octrees = s.unchangedOctrees,
+                   .candidate_pairs = s.candidatePairs,
+                   .feature_pairs = s.featurePairs,
+                   .contacts = s.contacts,
+                   .intersecting_triangles = s.intersectingTriangles,
+                   .exact_decisions = s.exactDecisions,
+                   .validity_pairs = s.validityPairs,
+                   .memory = fromTwin<palpate_memory>(s.memory),
+                   .peak_memory = fromTwin<palpate_memory>(s.peakMemory)};
+  });
+}
+palpate_status palpate_get_pair_statistics(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                           palpate_pair_statistics* statistics) {
+  return guarded(__func__, [&] {
+    sized(statistics, "statistics");
+    const PairStatistics s = of(cd).pairStatistics(GeometryId{a}, GeometryId{b});
+    *statistics = {sizeof *statistics, s.milliseconds,   s.candidatePairs,
+                   s.featurePairs,     s.exactDecisions, s.contacts};
+  });
+}
+
+palpate_status palpate_init_side(palpate_side* side, size_t size) {
+  palpate_side rest{};
+  rest.size = sizeof rest;
+  rest.motion = fromMotion({});
+  return initialise(__func__, side, size, rest);
+}
+palpate_status palpate_get_rows(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                const palpate_side* side_a, const palpate_side* side_b,
+                                const palpate_motion* body, palpate_row* rows, size_t capacity,
+                                size_t* count) {
+  return guarded(__func__, [&] {
+    const List<palpate_row> list(rows, capacity, count, "rows");
+    std::vector<ConstraintRow> all;
+    appendRows(dataOf(cd, a, b), verticesOf(side_a, "side_a"), verticesOf(side_b, "side_b"), all,
+               body ? motionOf(body, "body") : RigidMotion{});
+    list.fill(all);
+  });
+}
+palpate_status palpate_get_motions(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                   const palpate_side* side_a, const palpate_side* side_b,
+                                   palpate_contact_motion* motions, size_t capacity,
+                                   size_t* count) {
+  return guarded(__func__, [&] {
+    const List<palpate_contact_motion> list(motions, capacity, count, "motions");
+    std::vector<ContactMotion> all;
+    appendMotions(dataOf(cd, a, b), sideOf(side_a, "side_a"), sideOf(side_b, "side_b"), all);
+    list.fill(all);
+  });
+}
+palpate_status palpate_get_tangents(const double* normal, const double (*previous)[3],
+                                    double (*tangents)[3]) {
+  return guarded(__func__, [&] {
+    given(tangents, "tangents");
+    const Eigen::Vector3d n = vector(normal, "normal");
+    const Tangents both =
+        previous ? tangentsOf(n, {vector(previous[0], "previous"), vector(previous[1], "previous")})
+                 : tangentsOf(n);
+    fromVector(both[0], tangents[0]);
+    fromVector(both[1], tangents[1]);
+  });
+}
