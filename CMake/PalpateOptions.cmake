@@ -22,11 +22,14 @@ if(PALPATE_SANITIZE)
   endif()
 endif()
 
-# A shared library of ours exports what is ours.
+# palpate_export_own_symbols(TARGET [MAP...]): a shared library of ours exports what is ours, and what the further linker
+# scripts of this folder name.
 function(palpate_export_own_symbols target)
   if(BUILD_SHARED_LIBS)
-    target_link_options(${target} PRIVATE LINKER:--version-script=${PROJECT_SOURCE_DIR}/CMake/exports.map)
-    set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/CMake/exports.map)
+    foreach(map exports.map ${ARGN})
+      target_link_options(${target} PRIVATE LINKER:--version-script=${PROJECT_SOURCE_DIR}/CMake/${map})
+      set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/CMake/${map})
+    endforeach()
   endif()
 endfunction()
 

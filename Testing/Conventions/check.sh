@@ -37,7 +37,7 @@ allowedIn() {
     CollisionDetection) echo "CollisionDetection/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
-    Vtk | Fcl | Python) echo "$1/" ;;
+    Vtk | Fcl | Python | C) echo "$1/" ;;
   esac
 }
 
@@ -70,6 +70,7 @@ checkPlaces() {
         "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
         "<tbb/"* | "<oneapi/"* | "<thread" | "<future" | "<execution" | "<pthread.h")
           place=Source/Core/Threads.cpp ;;
+        "<stddef.h" | "<stdint.h") place=Source/Public/palpate/palpate_c.h ;;
         "<condition_variable") place=Source/Core/ ;;
         "<hwy/"*) place=Source/Core/Simd.h ;;
         "<meshoptimizer.h") place=Source/Simplify/Meshoptimizer/Simplify.cpp ;;
@@ -85,8 +86,8 @@ checkPlaces() {
   done < <(sourceFiles)
 }
 
-# Each public header compiles alone, includes nothing of Eigen but Core and Geometry, and reaches no file
-# that these and the standard library do not. Palpate.h includes all headers of the library. OctreeBasedCD.h reaches no
+# Each public header compiles alone, palpate_c.h as C99, too. It includes nothing of Eigen but Core and Geometry, and
+# reaches no file that these and the standard library do not. Palpate.h includes all headers of the library. OctreeBasedCD.h reaches no
 # distance fields, captures and simplification.
 # Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
@@ -99,11 +100,16 @@ checkPublicHeaders() {
     reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
   for header in $(find Source -path '*Public/palpate/*.h' | sort); do
     files=$(set -o pipefail && reached -include "$header" /dev/null) || fault "$header does not compile alone"
+    if [[ $header == */palpate_c.h ]]; then
+      "$1" -x c -std=c99 -Wall -Wextra -Wc++-compat -pedantic -Werror -ISource/Public -fsyntax-only -include "$header" /dev/null ||
+        fault "$header is not C99"
+      continue
+    fi
     if [[ $header == */OctreeBasedCD.h ]]; then
       while read -r include; do fault "$header reaches $include"; done < <(grep -E '/(DistanceField|Capture|Simplify)\.h$' <<<"$files")
     fi
     if [[ $header == */Palpate.h ]]; then
-      for include in Source/Public/palpate/*.h; do
+      for include in Source/Public/palpate/[A-Z]*.h; do
         grep -qx "$include" <<<"$files" || fault "$header does not include $include"
       done
     fi
@@ -126,14 +132,15 @@ checkHeaders() {
     fault "headers do not compile together: $errors"
 }
 
-# A shared library exports nothing outside namespace palpate. Arguments: the libraries.
+# A shared library exports nothing but namespace palpate and the C interface (Testing/C has its list), and the names of
+# versions. Arguments: the libraries.
 checkSymbols() {
   local library symbol
   for library in "$@"; do
     nm -D --defined-only "$library" | grep 7palpate >/dev/null || fault "$library exports nothing of palpate"
     while read -r symbol; do fault "$library exports $symbol"; done < <(
-      nm -D --defined-only "$library" | awk '{print $3}' |
-        grep -vE '^_Z(T[ISVT]|G[VR]|Z)?N?[VKRO]*7palpate' | c++filt)
+      nm -D --defined-only "$library" | awk '$2 != "A" {print $3}' |
+        grep -vE '^palpate_[a-z_]+@@PALPATE_C_|^_Z(T[ISVT]|G[VR]|Z)?N?[VKRO]*7palpate' | c++filt)
   done
 }
 
@@ -191,7 +198,7 @@ checkParts() {
   while read -r file; do
     name=$(basename "$file" .cpp).h
     [[ -e ${file%.cpp}.h || -n $(find Source -path "*Public/*/$name") ]] && continue
-    header=$(sed -nE '1s|^// Part of <?([A-Za-z/]+\.h)>?: .*|\1|p' "$file")
+    header=$(sed -nE '1s|^// Part of <?([A-Za-z/_]+\.h)>?: .*|\1|p' "$file")
     [[ -n $header && -n $(find Source -path "*/$header") ]] || fault "$file: the first line names no header"
   done < <(sourceFiles | grep '\.cpp$')
 }

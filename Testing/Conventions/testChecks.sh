@@ -60,6 +60,8 @@ plant PublicHeaders Source/Public/palpate/A.h '#define LIBRARY <sys/mman.h>\n#in
 plant PublicHeaders Source/Adapters/Vtk/Public/palpate/vtk/A.h '#pragma once\n#include <vtkPolyData.h>\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/Palpate.h '#pragma once\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/OctreeBasedCD.h '#pragma once\n#include <palpate/Capture.h>\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/palpate_c.h '#pragma once\n#include <palpate/Export.h>\n#include <stddef.h>\n#include <stdint.h>\nstruct a; a* f();\n' "$compiler" "$eigen"
+plant PublicHeaders Source/Public/palpate/palpate_c.h '#pragma once\n#include <palpate/Types.h>\n' "$compiler" "$eigen"
 plant Assertions Source/Math/A.cpp 'int a;\n'
 printf '#pragma once\ninline int one() { return 1; }\n' >"$tree/Source/Math/One.h"
 plant Headers Source/Shapes/A.h '#pragma once\ninline int one() { return 2; }\n' "$compiler" "$eigen"

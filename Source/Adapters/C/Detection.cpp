@@ -79,11 +79,18 @@ palpate_pair_settings fromPairSettings(const PairSettings& s) {
           .earliest_time_only = s.continuous.earliestTimeOnly};
 }
 
+/// Sets the id of what add() adds. Nothing is added if there is no place for it.
+template <class Add>
+void giveId(palpate_id* id, const Add& add) {
+  given(id, "id");
+  *id = static_cast<palpate_id>(add());
+}
+
 /// add() with one radius for all vertices, or with one per vertex.
 template <class Add>
-palpate_id addWithRadii(const double* radii, std::size_t count, const Add& add) {
+GeometryId withRadii(const double* radii, std::size_t count, const Add& add) {
   const auto all = array(radii, count, "radii");
-  return static_cast<palpate_id>(count > 1 ? add(all) : add(count == 1 ? all[0] : 0.0));
+  return count > 1 ? add(all) : add(count == 1 ? all[0] : 0.0);
 }
 
 }  // namespace
@@ -117,46 +124,51 @@ palpate_status palpate_add_triangle_mesh(palpate_cd* cd, const double* positions
                                          size_t vertex_count, const uint32_t* triangles,
                                          size_t triangle_count, palpate_id* id) {
   return guarded(__func__, [&] {
-    given(id, "id") = static_cast<palpate_id>(
-        of(cd).addTriangleMesh(c::positions(positions, vertex_count),
-                               elements<3>(triangles, triangle_count, "triangles")));
+    giveId(id, [&] {
+      return of(cd).addTriangleMesh(c::positions(positions, vertex_count),
+                                    elements<3>(triangles, triangle_count, "triangles"));
+    });
   });
 }
 palpate_status palpate_add_tetrahedral_mesh(palpate_cd* cd, const double* positions,
                                             size_t vertex_count, const uint32_t* tetrahedra,
                                             size_t tetrahedron_count, palpate_id* id) {
   return guarded(__func__, [&] {
-    given(id, "id") = static_cast<palpate_id>(
-        of(cd).addTetrahedralMesh(c::positions(positions, vertex_count),
-                                  elements<4>(tetrahedra, tetrahedron_count, "tetrahedra")));
+    giveId(id, [&] {
+      return of(cd).addTetrahedralMesh(c::positions(positions, vertex_count),
+                                       elements<4>(tetrahedra, tetrahedron_count, "tetrahedra"));
+    });
   });
 }
 palpate_status palpate_add_line_mesh(palpate_cd* cd, const double* positions, size_t vertex_count,
                                      const uint32_t* segments, size_t segment_count,
                                      const double* radii, size_t radius_count, palpate_id* id) {
   return guarded(__func__, [&] {
-    given(id, "id") = addWithRadii(radii, radius_count, [&](const auto& all) {
-      return of(cd).addLineMesh(c::positions(positions, vertex_count),
-                                elements<2>(segments, segment_count, "segments"), all);
+    giveId(id, [&] {
+      return withRadii(radii, radius_count, [&](const auto& all) {
+        return of(cd).addLineMesh(c::positions(positions, vertex_count),
+                                  elements<2>(segments, segment_count, "segments"), all);
+      });
     });
   });
 }
 palpate_status palpate_add_point_set(palpate_cd* cd, const double* positions, size_t vertex_count,
                                      const double* radii, size_t radius_count, palpate_id* id) {
   return guarded(__func__, [&] {
-    given(id, "id") = addWithRadii(radii, radius_count, [&](const auto& all) {
-      return of(cd).addPointSet(c::positions(positions, vertex_count), all);
+    giveId(id, [&] {
+      return withRadii(radii, radius_count, [&](const auto& all) {
+        return of(cd).addPointSet(c::positions(positions, vertex_count), all);
+      });
     });
   });
 }
 palpate_status palpate_add_shape(palpate_cd* cd, const palpate_shape* shape, palpate_id* id) {
-  return guarded(__func__, [&] {
-    given(id, "id") = static_cast<palpate_id>(of(cd).addAnalyticalGeometry(shapeOf(shape)));
-  });
+  return guarded(__func__,
+                 [&] { giveId(id, [&] { return of(cd).addAnalyticalGeometry(shapeOf(shape)); }); });
 }
 palpate_status palpate_add_field(palpate_cd* cd, const palpate_field* field, palpate_id* id) {
   return guarded(__func__, [&] {
-    given(id, "id") = static_cast<palpate_id>(of(cd).addDistanceField(given(field, "field").field));
+    giveId(id, [&] { return of(cd).addDistanceField(given(field, "field").field); });
   });
 }
 palpate_status palpate_attach_field(palpate_cd* cd, palpate_id mesh, const palpate_field* field) {

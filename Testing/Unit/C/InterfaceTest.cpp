@@ -699,6 +699,7 @@ TEST_F(CScene, FieldsAreThoseOfCpp) {
             PALPATE_CANCELLED);
   EXPECT_EQ(none, nullptr);
 
+  EXPECT_OK(palpate_remove(m_cd, field));
   EXPECT_OK(palpate_capture(m_cd, (folder.path / "Frame.txt").string().c_str()));
   EXPECT_EQ(folder.fileCount(), 2u);
 }
