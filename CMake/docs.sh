@@ -56,7 +56,7 @@ export PALPATE_VERSION PALPATE_DOXYGEN_XML=$out/doxygen/xml
 } >"$out/Doxyfile"
 doxygen "$out/Doxyfile"
 mkdir "$out/source/reference"
-find Source -path '*Public/palpate/*.h' | sort | xargs python3 Docs/Site/reference.py "$out/doxygen/xml" "$out/source/reference"
+find Source -path '*Public/palpate/*.h' ! -name palpate_c.h | sort | xargs python3 Docs/Site/reference.py "$out/doxygen/xml" "$out/source/reference"
 python3 -B Docs/Site/pythonReference.py "$out/source/reference/python"
 sphinx-build -W --keep-going -q -b html -c Docs/Site "$out/source" "$out/html"
 # Debian's furo refers to a style sheet by an address of the server.

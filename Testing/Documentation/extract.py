@@ -9,6 +9,7 @@ C++     all cpp blocks of a page form the body of one function. Only hidden code
         <!-- not compiled: ... -->  code of another library, or calls that no longer exist
         A block with `int main(` is a program alone. Hidden code is a comment that starts with a line `<!-- hidden` or
         `<!-- hidden, file scope` and ends with a line `-->`.
+C       a c block is a program of its own, compiled as C99.
 Output  <!-- output --> before a text block: the program before it prints exactly this.
 CMake   each cmake block becomes a project of its own, which is configured; see Testing/Documentation/CMakeLists.txt.
 Shell   each bash block must be valid, and the files of the repository that it names must exist.
@@ -29,6 +30,7 @@ class Program:
     def __init__(self, page, number):
         self.name = re.sub(r"\W", "_", str(page.with_suffix(""))) + f"_{number}"
         self.head, self.body, self.whole, self.output = [], [], None, None
+        self.suffix = "cpp"
         self.runs = True
 
     def add(self, code, where, file_scope):
@@ -100,7 +102,7 @@ def main():
         for language, marks, code, line in blocks(page, (root / page).read_text().splitlines()):
             if any(mark.startswith("not compiled") for mark in marks) or language.startswith("{"):
                 continue
-            if language == "cpp":
+            if language in ("c", "cpp"):
                 if "hidden" not in marks and "example::" in code:
                     sys.exit(f"{page}:{line}: the block shows a name of ExampleMeshes.h, which readers do not have")
                 alone, runs = "int main(" in code, not any(mark.startswith("not run") for mark in marks)
@@ -108,6 +110,7 @@ def main():
                     number += 1
                     program = Program(page, number)
                     program.runs = runs
+                    program.suffix = language
                     programs.append(program)
                 program.add(code, (page, line), "file scope" in marks)
             elif language == "text" and "output" in marks and page.stem != "Python":
@@ -125,7 +128,7 @@ def main():
 
     (out / "programs").mkdir(parents=True, exist_ok=True)
     for program in programs:
-        (out / "programs" / f"{program.name}.cpp").write_text(program.text())
+        (out / "programs" / f"{program.name}.{program.suffix}").write_text(program.text())
         expected = out / "programs" / f"{program.name}.txt"
         expected.unlink(missing_ok=True)
         if program.output is not None:
@@ -139,7 +142,8 @@ def main():
         (folder / "CMakeLists.txt").write_text(head + code)
         for source in {"main.cpp", *re.findall(r"\b\w+\.cpp\b", code)}:
             (folder / source).write_text("#include <palpate/Palpate.h>\nint main() { palpate::OctreeBasedCD collisions; }\n")
-    names = {"programs": [program.name for program in programs],
+    names = {"programs": [program.name for program in programs if program.suffix == "cpp"],
+             "programsInC": [program.name for program in programs if program.suffix == "c"],
              "notRun": [program.name for program in programs if not program.runs],
              "projects": [name for name, _ in projects]}
     (out / "names.cmake").write_text("".join(f"set({key} {' '.join(value)})\n" for key, value in names.items()))
