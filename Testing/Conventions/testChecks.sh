@@ -112,6 +112,14 @@ expect holds Symbols "$tree/lib.so"
 printf 'namespace palpate { int a; } int b;\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
 expect fails Symbols "$tree/lib.so"
 
+printf 'namespace palpate { int a; } extern "C" int palpate_b() { return 1; }\n' |
+  "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
+expect fails Symbols "$tree/lib.so"
+"$compiler" -shared -fPIC -o "$tree/lib.so" -x c++ -Wl,--version-script="$root/CMake/exports.map" \
+  -Wl,--version-script="$root/CMake/exportsOfC.map" - \
+  <<<'namespace palpate { int a; } extern "C" int palpate_b() { return 1; }'
+expect holds Symbols "$tree/lib.so"
+
 planted="flags of one file"
 commands=$tree/compile_commands.json
 printf '"command": "c++ -O2 -o a.o -c /p/Source/Math/a.cpp",\n' >"$commands"
