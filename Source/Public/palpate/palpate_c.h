@@ -317,7 +317,7 @@ PALPATE_EXPORT palpate_status palpate_update(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_detect(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_advance(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_release_memory(palpate_cd* cd);
-/// Writes the problem of the next detection to a file, which palpate-replay reads.
+/// Writes the problem of the next detection to a file, which readCapture() of C++ reads.
 PALPATE_EXPORT palpate_status palpate_capture(const palpate_cd* cd, const char* path);
 
 // Contacts. <palpate/CollisionData.h> has the law that all satisfy, and signs and sides.
