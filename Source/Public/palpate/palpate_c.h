@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-// Palpate in C99. Each function does what the C++ function of its name does, with the same bits.
+// Palpate in C99. Functions do what C++ functions of like names do, with the same bits.
 // The C++ headers state laws, accuracy, order and cost; Docs/HowTo/C.md has a program.
 // Status   unless it is PALPATE_OK, palpate_last_error() says why, nothing has changed, and arrays
 //          and structs that the call fills have no meaning. Null is refused unless this header
