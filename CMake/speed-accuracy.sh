@@ -12,4 +12,4 @@ out=out/speed-accuracy
 build/demo/Examples/SpeedAccuracy/SpeedAccuracy "$@" --out "$out"
 /usr/bin/python3 Docs/Figures/speedAccuracy.py "$out/speed-accuracy.csv" "$out/speed-accuracy"
 [[ ! -f $out/rigid-bodies.csv ]] || /usr/bin/python3 Docs/Figures/rigidBodies.py "$out/rigid-bodies.csv" "$out/rigid-bodies"
-echo "charts    $out/speed-accuracy.svg, .png, $out/rigid-bodies.svg, .png"
+echo "charts    $out/speed-accuracy.svg, $out/rigid-bodies.svg"

@@ -6,7 +6,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
-from PIL import Image  # noqa: E402
 
 # Colours of Okabe and Ito, which colour-blind readers can tell apart. The sky blue is darker, for thin lines on white.
 VERMILLION, BLUE, GREEN, SKY, BLACK = "#D55E00", "#0072B2", "#009E73", "#3E9BD0", "#333333"
@@ -41,12 +40,8 @@ def distinct(values):
 
 
 def save(figure, path):
-    """Writes PATH.svg and PATH.png. The files have no date, so that the same figures give the same bytes."""
+    """Writes PATH.svg, without a date: the same figures give the same bytes."""
     figure.savefig(f"{path}.svg", metadata={"Date": None, "Creator": None})
-    figure.savefig(f"{path}.png", dpi=130)
-    with Image.open(f"{path}.png") as image:
-        small = image.convert("RGB").quantize(128, dither=Image.Dither.NONE)
-    small.save(f"{path}.png", optimize=True)
 
 
 def distanceTo(box, x, y):

@@ -641,6 +641,31 @@ def validityStates():
     return page
 
 
+def validityActions():
+    """What a user does for each cause of HowTo/Validity.md."""
+    rows = [
+        (GREEN, "trusted = true", "no touch is missing, sides are right", "Use the answer."),
+        (ORANGE, "Proximity, Intersection, Continuous", "the method cannot exclude a touch",
+         "Detect the same step again with Auto,\nbefore advance()."),
+        (RED, "Auto, and the step begins in touch", "the surfaces touch or intersect",
+         "Nothing, if they only touch. Otherwise\nrecover the surfaces: see below."),
+        (ORANGE, "A body turned too far", "its arcs leave the thickness", "Take shorter steps or a larger thickness."),
+        (ORANGE, "Neighbours are not welded", "copies of a vertex tear a surface", "Call weld() once, when you load the mesh."),
+        (ORANGE, "Two shapes met without a side", "there is no thickness", "Set a thickness."),
+        (GREY, "Distance field or proxy; separated groups", "the answer is as you asked for it",
+         "Nothing: the error bound holds, or nothing\nwas tested."),
+    ]
+    page = Page(46 + 50 * len(rows), "What you do for each state of an answer")
+    for k, (colour, state, meaning, action) in enumerate(rows):
+        top = 44 + 50 * k
+        page.card(16, top, 270, 42, fill=tint(colour), edge=colour)
+        page.text(28, top + 17, state, weight="bold")
+        page.text(28, top + 32, meaning, size=SMALL)
+        page.arrow((287, top + 21), (316, top + 21), color=colour)
+        page.text(324, top + (25 if "\n" not in action else 18), action)
+    return page
+
+
 def snapshots():
     page = Page(292, "A simulation at 60 Hz, a haptic loop at 1 kHz")
     left, step, count = 96, 108, 4
@@ -692,6 +717,7 @@ DIAGRAMS = {
     "Frame": frame,
     "FeatureOwnership": featureOwnership,
     "ContactDistance": contactDistance,
+    "ValidityActions": validityActions,
     "ValidityStates": validityStates,
     "Snapshots": snapshots,
 }

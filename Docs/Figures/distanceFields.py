@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws build time and memory of distance fields: distanceFields.py CSV PICTURE writes PICTURE.svg and PICTURE.png.
+"""Draws build time and memory of distance fields: distanceFields.py CSV PICTURE writes PICTURE.svg.
 
 The CSV is that of palpate_race --tables fields. The rows with a band of three bounds are drawn.
 """

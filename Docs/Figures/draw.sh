@@ -7,8 +7,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")"
 python=/usr/bin/python3  # the interpreter of Debian's packages
 mkdir -p ../Pictures
 "$python" speedAccuracy.py ../Data/SpeedAccuracy.csv ../Pictures/SpeedAccuracy
+"$python" fastNeedle.py ../Data/SpeedAccuracy.csv ../Pictures/FastNeedleSpeed
 "$python" distanceFields.py ../Data/DistanceFields.csv ../Pictures/DistanceFields
 "$python" rigidBodies.py ../Data/RigidBodies.csv ../Pictures/RigidBodies
+"$python" performance.py ../Data/Performance.csv ../Pictures
 "$python" stability.py ../Data/Stability.csv ../Pictures/Stability
 if [[ -f diagrams.py ]]; then
   "$python" diagrams.py

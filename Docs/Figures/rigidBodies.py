@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws speed against accuracy at a rigid body: rigidBodies.py CSV PICTURE writes PICTURE.svg and PICTURE.png.
+"""Draws speed against accuracy at a rigid body: rigidBodies.py CSV PICTURE writes PICTURE.svg.
 
 The CSV is the rigid-bodies.csv of Examples/SpeedAccuracy.
 """

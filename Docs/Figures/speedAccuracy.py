@@ -1,31 +1,28 @@
 #!/usr/bin/python3
-"""Draws speed against accuracy: speedAccuracy.py CSV PICTURE writes PICTURE.svg and PICTURE.png.
+"""Draws speed against accuracy: speedAccuracy.py CSV PICTURE writes PICTURE.svg.
 
 The CSV is the speed-accuracy.csv of Examples/SpeedAccuracy. Six series of its methods are drawn; its page shows all.
 """
 import sys
 
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from chartStyle import COLOUR, MARK, distinct, placeLabels, plt, read, save
 
-# Method, setting, label at the point, group and name in the list of the front. The points of a method are one series.
-SHOWN = [("Intersection", "once a frame", "Intersection", "Intersection", ""),
-         ("Proximity", "1/20 edge", "Proximity 1/20", "Proximity", "1/20"), ("Proximity", "1/5 edge", "1/5", "Proximity", "1/5"),
-         ("Proximity", "4/5 edge", "4/5", "Proximity", "4/5"),
-         ("Proximity in substeps", "1/20 edge; 2 substeps", "2 substeps", "substeps", "2"),
-         ("Proximity in substeps", "1/20 edge; 4 substeps", "4", "substeps", "4"),
-         ("Proximity in substeps", "1/20 edge; 8 substeps", "8", "substeps", "8"),
-         ("Proximity in substeps", "1/20 edge; 16 substeps", "16", "substeps", "16"),
-         ("FCL", "collide()", "FCL", "FCL", ""), ("Continuous", "exact", "Continuous", "Continuous", ""),
-         ("Auto", "touching", "Auto", "Auto", "")]
+# Method, setting and label at the point. The points of a method are one series; the key of each panel names it.
+SHOWN = [("Intersection", "once a frame", ""), ("Proximity", "1/20 edge", "1/20"), ("Proximity", "1/5 edge", "1/5"),
+         ("Proximity", "4/5 edge", "4/5"), ("Proximity in substeps", "1/20 edge; 2 substeps", "2"),
+         ("Proximity in substeps", "1/20 edge; 4 substeps", "4"), ("Proximity in substeps", "1/20 edge; 8 substeps", "8"),
+         ("Proximity in substeps", "1/20 edge; 16 substeps", "16"), ("FCL", "collide()", ""), ("Continuous", "exact", ""),
+         ("Auto", "touching", "")]
 RECOMMENDED = ("Auto", "Continuous")
 LONGEST = 40  # milliseconds; longer times stand at the edge of the chart, with their value
 CAPTION = """\
 Filled marks above the line: touching pairs of triangles that a method does not report. White marks below: reported pairs that do not touch.
 The best place is on the zero line, far to the left. Orange: the recommended methods, both without a thickness. Bars: quartiles of the time over repetitions.
 Dashed: the best (Pareto) front of time and false negatives. No other method beats its methods in both. Times whose bars overlap count as equal.
-Proximity reports near features by definition, within 1/20, 1/5 or 4/5 of the mean edge. Substeps run Proximity 1/20 several times in each step.
+Proximity reports near features by definition, within 1/20, 1/5 or 4/5 of the mean edge. Substeps run Proximity 1/20 2 to 16 times in each step.
 Continuous reports impacts within the step, and misses none. Triangles that intersect throughout the step count as its false negatives."""
 
 
@@ -88,11 +85,13 @@ def drawScene(axes, rows):
         covered += drawSeries(axes, [row for row in rows if row["method"] == method], method)
     front = frontOf(rows)
     covered += drawFront(axes, front)
-    groups = {group: ", ".join(row["name"] for row in front if row["group"] == group) for group in distinct(row["group"] for row in front)}
-    axes.text(0, 1.03, "Pareto front: " + "; ".join(f"{group} {names}".strip() for group, names in groups.items()),
-              transform=axes.transAxes, fontsize=8, color="#555555")
-    labels = [(row["label"] if row["ms"] <= LONGEST else f"{row['label']}: {row['ms']:.0f} ms →", min(row["ms"], LONGEST), row["false_negatives"], COLOUR[row["method"]], row["method"] in RECOMMENDED) for row in rows]
-    placeLabels(axes, sorted(labels, key=lambda label: not label[4]), covered)
+    methods = distinct(row["method"] for row in rows)
+    key = [Line2D([], [], marker=MARK[method], color=COLOUR[method], linestyle="none") for method in methods]
+    axes.legend(key, [method.removeprefix("Proximity in ") for method in methods], loc="lower left", bbox_to_anchor=(-0.02, 0.99),
+                ncol=len(methods), frameon=False, fontsize=8, handletextpad=0, handlelength=1.5, columnspacing=0.7, borderaxespad=0)
+    labels = [(row["label"] if row["ms"] <= LONGEST else f"{row['label']}: {row['ms']:.0f} ms →", min(row["ms"], LONGEST),
+               row["false_negatives"], COLOUR[row["method"]], False) for row in rows if row["label"]]
+    placeLabels(axes, labels, covered)
 
 
 def prepare(axes, scene, first, last):
@@ -110,7 +109,7 @@ def prepare(axes, scene, first, last):
 
 
 def main(source, picture):
-    shown = {(method, setting): {"label": label, "group": group, "name": name} for method, setting, label, group, name in SHOWN}
+    shown = {(method, setting): {"label": label} for method, setting, label in SHOWN}
     measured = {(row["scene"], row["method"], row["setting"]): row for row in read(source)}
     scenes = distinct(scene for scene, _, _ in measured)
     rows = [{**measured[scene, *key], **names} for scene in scenes for key, names in shown.items() if (scene, *key) in measured]
