@@ -13,7 +13,7 @@ test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev 
   mono-mcs mono-runtime"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe python3-sphinx-copybutton nodejs chromium"
 package="lintian dpkg-dev fakeroot help2man"
-figures="python3 python3-matplotlib python3-pil"
+figures="python3 python3-matplotlib python3-pil pngquant"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev
   libopenvdb-dev"
 coverage="python3 gcovr"

@@ -4,16 +4,17 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
+size="--size 1200 750"
 declare -A options=(
-  [OrganScene]="--frames 120"
-  [FastNeedle]="--frames 6"
-  [Palpation]="--frames 60"
-  [LiverLift]="--frames 90 --size 830 519"
-  [Suturing]="--frames 85"
-  [Retraction]="--frames 75"
-  [RobotArms]="--frames 170"
+  [OrganScene]="$size --frames 120"
+  [FastNeedle]="$size --frames 6"
+  [Palpation]="$size --frames 60"
+  [LiverLift]="$size --frames 90"
+  [Suturing]="$size --frames 58"
+  [Retraction]="$size --frames 75"
+  [RobotArms]="$size --frames 170"
   [XRay]="--frames 20 --pixels 512"
-  [BoneDrilling]="--frames 60 --particles 12000 --triangles 100000")
+  [BoneDrilling]="$size --frames 60 --particles 12000 --triangles 100000")
 [[ $# -gt 0 ]] || set -- "${!options[@]}"
 
 CMake/packages.sh build figures
@@ -25,5 +26,5 @@ for scene in "$@"; do
   # shellcheck disable=SC2086
   xvfb-run -a "build/demo/Examples/$scene/$scene" ${options[$scene]} --out "$folder"
   [[ -e $folder/scene.png ]] || python3 -c "from PIL import Image; Image.open('$folder/scene.pgm').save('$folder/scene.png')"
-  mv "$folder/scene.png" "Docs/Pictures/$scene.png"
+  pngquant --speed 1 --strip --force --output "Docs/Pictures/$scene.png" "$folder/scene.png"  # 256 colours
 done

@@ -1,5 +1,5 @@
-// A spherical burr on a large bone under flowing water: debris and blood sink over bone and organs.
-// Bone and organs stay where setTransform() put them, so only the particles' octree changes. The
+// A spherical burr in the hollow that it has drilled into a large bone, under flowing water: debris
+// and blood sink over the bone. The bone does not move, so only the particles' octree changes. The
 // particles meet the bone by planes in an octree's leaves, built before the first frame.
 #include "CommandLine.h"
 #include "SceneProgram.h"
@@ -24,15 +24,19 @@ using Eigen::Vector3d, std::numbers::pi;
 constexpr double kFrame = 1.0 / 60, kReach = 0.4, kSpeed = 48, kParticle = 0.1, kBurr = 4,
                  kGap = 0.02, kBrick = 5;
 constexpr double kBone = 120, kFloor = -180;
+constexpr double kHollow = 7;  // its depth, and the width at which the depth is 0.6 of that
 const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);  // less what water carries
+const Vector3d kDrilled = Vector3d(0, -0.3, 1).normalized();
 
 struct Size {
   int particles = 100'000, triangles = 500'000;
 };
 /// Of the bone, which is seen whole from its middle, along a unit vector.
 double boneRadius(const Vector3d& d) {
+  const double away = kBone * (d - kDrilled).norm() / kHollow;
   return kBone * (1 + 0.06 * std::sin(5 * d.x() + 1) * std::cos(4 * d.y()) - 0.1 * d.y() * d.y() +
-                  0.01 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z()));
+                  0.01 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z())) -
+         kHollow * std::exp(-away * away / 2);
 }
 
 class BoneDrilling : public LiveScene {
@@ -40,16 +44,19 @@ class BoneDrilling : public LiveScene {
   BoneDrilling(const Size& size, int threads) : m_sag(12'000.0 / size.triangles), m_world(threads) {
     SceneMesh bone = cubeSphere(static_cast<int>(std::ceil(std::sqrt(size.triangles / 12.0))));
     for (Vector3d& p : bone.positions) p = (boneRadius(p) * p).eval();
-    addRigid("bone", std::move(bone), 1, kMiddle);
-    addRigid("liver", organMeshes()[0].mesh, 50, {-70, -120, -60});
-    addRigid("stomach", organMeshes()[1].mesh, 50, {65, -125, -60});
+    m_bone = m_world.addRigidMesh("bone", bone);
     m_burrAt = burrTarget(0) + 5 * Vector3d::UnitZ();
     m_burr = m_world.addShape("burr", Sphere{kMiddle, kBurr}, capsule(kMiddle, kMiddle, kBurr, 8));
-    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
+    m_shaft = m_world.addRigidMesh("shaft", capsule(kMiddle, {12, 0, 40}, 1.5, 8));  // shown only
+    placeBurr();
     std::vector<Vector3d> positions(size.particles);
-    for (Vector3d& p : positions) {  // sinking already, beside and above all else
-      do p = {between(-130, 130), between(-150, 120), between(kFloor, kBone + 180)};
-      while (p.norm() < 1.2 * kBone || (p.z() < 0 && p.y() < 0));
+    for (std::size_t i = 0; i < positions.size(); ++i) {  // sinking already; an eighth at the burr
+      Vector3d& p = positions[i];
+      do
+        p = i % 8 == 0
+                ? m_burrAt + Vector3d(between(-14, 14), between(-14, 14), between(-9, 14))
+                : Vector3d(between(-130, 130), between(-150, 120), between(kFloor, kBone + 180));
+      while (p.norm() < (i % 8 == 0 ? boneRadius(p.normalized()) + 1 : 1.2 * kBone));
     }
     // Neighbours have near indices, as solvers of particles arrange them: they share cache lines.
     std::sort(positions.begin(), positions.end(), [](const Vector3d& a, const Vector3d& b) {
@@ -57,28 +64,27 @@ class BoneDrilling : public LiveScene {
       return std::tuple(s.x(), s.y(), a.z()) < std::tuple(t.x(), t.y(), b.z());
     });
     m_particles = m_world.addPoints("particles", positions, kParticle, 1.0);
-    PairSettings nearby{.method = Method::Proximity, .thickness = kReach};
-    for (const World::BodyId id : {m_rigid[1], m_rigid[2]})
-      m_world.addPair(m_particles, id, nearby, kGap);
     // Of the bone a particle needs no more than a plane, which may be off by half its radius.
-    m_world.addPair(m_particles, m_rigid[0],
+    m_world.addPair(m_particles, m_bone,
                     {.method = Method::Proxy, .thickness = kReach, .allowedError = kParticle / 2},
                     kGap);
-    nearby.contacts = Contacts::All;
-    m_world.addPair(m_rigid[0], m_burr, nearby, 0);
+    m_world.addPair(m_bone, m_burr,
+                    {.method = Method::Proximity, .thickness = kReach, .contacts = Contacts::All},
+                    0);
     m_world.detectOnly();  // builds the leaves
   }
 
   World& world() override { return m_world; }
 
   std::vector<BodyLook> looks() override {
-    return {{m_rigid[0], "Bone", kBoneColour},
-            {m_rigid[1], "Liver", kLiverColour},
-            {m_rigid[2], "Stomach", kStomachColour},
-            {m_burr, "Burr", kSteelColour},
+    return {{m_bone, "Bone", kBoneColour, 1, true, 0, 0.7},
+            {m_burr, "", kSteelColour, 1, true, 0, 0.3, 1},
+            {m_shaft, "Burr", kSteelColour, 1, true, 0, 0.3, 1},
             {m_particles, "", kBloodColour}};
   }
-  PictureView view() override { return {.from = {0.5, -1, 0.9}}; }
+  PictureView view() override {
+    return {.from = {0.3, -1, 0.35}, .centre = kBone * kDrilled + Vector3d(2, 0, 1), .height = 44};
+  }
   void computeFrame(int frame) override {
     double fastest = 0;
     for (const Vector3d& v : m_world.solver().velocities) fastest = std::max(fastest, v.norm());
@@ -104,20 +110,13 @@ class BoneDrilling : public LiveScene {
             {"rebuilt", m_rebuilt}};
   }
 
-  /// The bone by the surface that its mesh was made of, organs by winding numbers.
+  /// By the surface that the bone's mesh was made of.
   std::string fault() override {
     const std::span<const Vector3d> particles = m_world.positions(m_particles);
     for (std::size_t i = 0; i < particles.size(); ++i)
       if (particles[i].norm() < boneRadius(particles[i].normalized()) - m_sag)
         return "particle " + std::to_string(i) + " is inside the bone.";
-    OctreeBasedCD& detection = m_world.detection();
-    const auto id = [&](World::BodyId body) { return m_world.bodies()[body].id; };
-    detection.setPositions(id(m_particles), particles);
-    for (const World::BodyId organ : {m_rigid[1], m_rigid[2]}) {
-      detection.queries().findInsideVertices(id(m_particles), id(organ), m_inside);
-      if (!m_inside.empty()) return "particles are inside an organ.";
-    }
-    for (const Vector3d& p : m_world.bodies()[m_rigid[0]].rest)
+    for (const Vector3d& p : m_world.bodies()[m_bone].rest)
       if ((p - m_burrAt).norm() < (1 - 1e-9) * kBurr) return "the burr is in the bone.";
     return "";
   }
@@ -127,23 +126,18 @@ class BoneDrilling : public LiveScene {
     return low + (high - low) * m_random() / m_random.max();
   }
 
-  void addRigid(const char* name, SceneMesh mesh, double scale, const Vector3d& at) {
-    for (Vector3d& p : mesh.positions) p *= scale;
-    m_rigid.push_back(m_world.addRigidMesh(name, mesh));
-    m_world.place(m_rigid.back(), Eigen::Matrix3d::Identity(), at);
-  }
-
   /// The hand presses 1 mm deep, along an eight.
   static Vector3d burrTarget(double frame) {
-    const double phase = 2 * pi * frame / 300, y = 0.15 * std::sin(2 * phase) - 0.3;
-    const Vector3d d = Vector3d(0.3 * std::sin(phase), y, 1).normalized();
+    const double phase = 2 * pi * frame / 60;
+    const Vector3d way(0.05 * std::sin(phase), 0.03 * std::sin(2 * phase), 0);
+    const Vector3d d = (kDrilled + way).normalized();
     return (boneRadius(d) + kBurr - 1) * d;
   }
 
   /// What lies within reach is behind the plane through its nearest point: so the burr, on its side
   /// of all planes, is in nothing.
   void moveBurr(const Vector3d& target) {
-    const auto contacts = m_world.contacts(m_rigid[0], m_burr).shape();
+    const auto contacts = m_world.contacts(m_bone, m_burr).shape();
     Vector3d way = target - m_burrAt;
     way *= std::min(1.0, kReach / way.norm());
     m_burrDistance = kReach;
@@ -156,11 +150,17 @@ class BoneDrilling : public LiveScene {
       if (const double towards = way.dot(c.normal); towards > c.distance)
         share = std::min(share, std::max(0.0, c.distance / towards));
     m_burrAt += share * way;
-    m_world.place(m_burr, Eigen::Matrix3d::Identity(), m_burrAt);
+    placeBurr();
   }
 
-  /// None goes further than contacts were looked for. Rows are met one after another: who would
-  /// end behind a plane goes only as far as the plane.
+  void placeBurr() {
+    for (const World::BodyId body : {m_burr, m_shaft})
+      m_world.place(body, Eigen::Matrix3d::Identity(), m_burrAt);
+  }
+
+  /// None goes further than contacts were looked for, and at the bone, where water stands, a
+  /// quarter of that: a plane says nothing about the next facet of the hollow. Rows are met one
+  /// after another: who would end behind a plane goes only as far as the plane.
   void keepOut() {
     const std::span<const Vector3d> before = m_world.before(m_particles);
     const std::span<Vector3d> now = m_world.positions(m_particles);
@@ -168,17 +168,15 @@ class BoneDrilling : public LiveScene {
       now[i] =
           before[i] + std::min(1.0, kReach / (now[i] - before[i]).norm()) * (now[i] - before[i]);
     m_touching = 0;
-    const auto keep = [&](std::uint32_t vertex, const auto& c) {
-      const Vector3d way = now[vertex] - before[vertex];
+    const auto keep = [&](std::uint32_t vertex, const ShapeContact& c) {
+      Vector3d way = now[vertex] - before[vertex];
+      way *= std::min(1.0, kReach / 4 / way.norm());
+      now[vertex] = before[vertex] + way;
       const double room = std::max(0.0, c.distance), towards = -way.dot(c.normal);
       if (towards > room) now[vertex] = before[vertex] + room / towards * way;
       m_touching += c.distance < 2 * kGap;
     };
-    for (const World::BodyId body : m_rigid) {
-      const CollisionData& contacts = m_world.contacts(m_particles, body);
-      for (const VertexTriangleContact& c : contacts.vertexTriangle()) keep(c.vertex, c);
-      for (const ShapeContact& c : contacts.shape()) keep(c.id, c);
-    }
+    for (const ShapeContact& c : m_world.contacts(m_particles, m_bone).shape()) keep(c.id, c);
   }
 
   /// What is below all else comes again: debris from the burr, blood from a vessel beside it.
@@ -200,9 +198,7 @@ class BoneDrilling : public LiveScene {
   double m_burrDistance = 0, m_sag;  // m_sag: of the bone's mesh: edge² x curvature / 8
   World m_world;
   std::minstd_rand m_random;
-  std::vector<World::BodyId> m_rigid;  // the bone, then organs
-  std::vector<InsideVertex> m_inside;
-  World::BodyId m_burr = 0, m_particles = 0;
+  World::BodyId m_bone = 0, m_burr = 0, m_shaft = 0, m_particles = 0;
   Vector3d m_burrAt;
   int m_touching = 0, m_fallen = 0, m_rebuilt = 0;
 };
@@ -216,7 +212,7 @@ int main(int count, char** arguments) {
   return runScene(
       {.name = "BoneDrilling",
        .description =
-           "A burr on a bone of half a million triangles, debris and blood sinking over it.",
+           "A burr in a hollow of a bone of half a million triangles, under debris and blood.",
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
        .keys = "n",

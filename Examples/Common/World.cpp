@@ -1,8 +1,11 @@
 #include "World.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <utility>
 
 namespace palpate::scenes {
 
@@ -97,6 +100,39 @@ void World::addVolume(BodyId id, double compliance) {
   const Body& body = m_bodies[id];
   m_solver.volumes.push_back({body.first, body.count, body.triangles,
                               volumeOf(positions(id), body.triangles), compliance});
+}
+
+void World::addInside(BodyId body, double kilograms,
+                      const std::function<bool(const Vector3d&)>& isIn,
+                      const std::function<bool(const Vector3d&)>& isPinned) {
+  constexpr double kSpacing = 12, kReach = 1.8 * kSpacing, kCompliance = 4e-4;  // mm; mm/mN
+  constexpr std::size_t kNearest = 5;
+  const std::vector<Vector3d> surface(positions(body).begin(), positions(body).end());
+  std::vector<Vector3d> inside;
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : surface) box.extend(p);
+  for (double z = box.min().z(); z < box.max().z(); z += kSpacing)
+    for (double y = box.min().y(); y < box.max().y(); y += kSpacing)
+      for (double x = box.min().x(); x < box.max().x(); x += kSpacing)
+        if (isIn({x, y, z})) inside.emplace_back(x, y, z);
+  const std::uint32_t first = m_solver.add(inside, static_cast<double>(inside.size()) / kilograms);
+  for (std::uint32_t i = 0; i < inside.size(); ++i)
+    if (isPinned(inside[i])) m_solver.inverseMasses[first + i] = 0;
+  const auto keep = [&](std::uint32_t a, std::uint32_t b) {
+    m_solver.distances.push_back({a, b, (m_solver.now[a] - m_solver.now[b]).norm(), kCompliance});
+  };
+  for (std::uint32_t j = 0; j < inside.size(); ++j)
+    for (std::uint32_t i = 0; i < j; ++i)
+      if ((inside[i] - inside[j]).norm() < kReach) keep(first + i, first + j);
+  std::vector<std::pair<double, std::uint32_t>> near;
+  for (std::uint32_t v = 0; v < surface.size(); ++v) {
+    near.clear();
+    for (std::uint32_t i = 0; i < inside.size(); ++i)
+      near.emplace_back((inside[i] - surface[v]).norm(), i);
+    std::partial_sort(near.begin(), near.begin() + kNearest, near.end());
+    for (std::size_t i = 0; i < kNearest; ++i)
+      keep(m_bodies[body].first + v, first + near[i].second);
+  }
 }
 
 void World::pin(BodyId body, const std::function<bool(const Vector3d&)>& holds) {

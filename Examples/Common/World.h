@@ -65,6 +65,10 @@ class World {
   /// thread: distances along each segment, and each vertex in the middle of its neighbours.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
   void addVolume(BodyId, double compliance);
+  /// Particles inside a body, which keep their distances to each other and to its surface; pinned
+  /// ones stay at their places.
+  void addInside(BodyId, double kilograms, const std::function<bool(const Eigen::Vector3d&)>& isIn,
+                 const std::function<bool(const Eigen::Vector3d&)>& isPinned);
   /// Vertices for which this holds stay at their places, or are moved by hand.
   void pin(BodyId, const std::function<bool(const Eigen::Vector3d&)>&);
   /// The first vertices of a body make one fraction of their steps in hold().

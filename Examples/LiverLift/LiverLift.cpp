@@ -46,9 +46,10 @@ class LiverLift : public LiveScene {
     m_vein = m_world.addRigidMesh("portal vein", portalVein(2.5));
     m_artery = m_world.addRigidMesh("hepatic artery", hepaticArtery(1.2));
     m_duct = m_world.addRigidMesh("bile duct", bileDuct(1.4));
-    m_world.pin(m_liver, [](const Vector3d& p) { return p.y() > kGrown; });
+    const auto isGrown = [](const Vector3d& p) { return p.y() > kGrown; };
+    m_world.pin(m_liver, isGrown);
     m_world.addStiffness(m_liver, 1e-2, 1e-2);
-    addInside(liver);
+    m_world.addInside(m_liver, kMass, isInLiver, isGrown);
     m_world.addVolume(m_liver, 0);
     const std::array<SceneMesh, 2> jaws{jaw(-1, 0.8), jaw(1, 0.8)};
     m_start = startOf(liver);
@@ -141,38 +142,6 @@ class LiverLift : public LiveScene {
   }
 
  private:
-  /// Particles inside the body, which keep their distances to each other and to the surface.
-  void addInside(const SceneMesh& mesh) {
-    constexpr double kSpacing = 12, kReach = 1.8 * kSpacing, kCompliance = 4e-4;
-    constexpr std::size_t kNearest = 5;
-    std::vector<Vector3d> inside;
-    AlignedBox3d box;
-    for (const Vector3d& p : mesh.positions) box.extend(p);
-    for (double z = box.min().z(); z < box.max().z(); z += kSpacing)
-      for (double y = box.min().y(); y < box.max().y(); y += kSpacing)
-        for (double x = box.min().x(); x < box.max().x(); x += kSpacing)
-          if (isInLiver({x, y, z})) inside.emplace_back(x, y, z);
-    Xpbd& solver = m_world.solver();
-    const std::uint32_t surface = m_world.bodies()[m_liver].first,
-                        first = solver.add(inside, static_cast<double>(inside.size()) / kMass);
-    for (std::uint32_t i = 0; i < inside.size(); ++i)
-      if (inside[i].y() > kGrown) solver.inverseMasses[first + i] = 0;
-    const auto keep = [&](std::uint32_t a, std::uint32_t b) {
-      solver.distances.push_back({a, b, (solver.now[a] - solver.now[b]).norm(), kCompliance});
-    };
-    for (std::uint32_t j = 0; j < inside.size(); ++j)
-      for (std::uint32_t i = 0; i < j; ++i)
-        if ((inside[i] - inside[j]).norm() < kReach) keep(first + i, first + j);
-    std::vector<std::pair<double, std::uint32_t>> near;
-    for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
-      near.clear();
-      for (std::uint32_t i = 0; i < inside.size(); ++i)
-        near.emplace_back((inside[i] - mesh.positions[v]).norm(), i);
-      std::partial_sort(near.begin(), near.begin() + kNearest, near.end());
-      for (std::size_t i = 0; i < kNearest; ++i) keep(surface + v, first + near[i].second);
-    }
-  }
-
   /// Where the grasper takes the edge: the lowest vertex in front, beside the gallbladder.
   static Vector3d startOf(const SceneMesh& liver) {
     constexpr double kX = 2;

@@ -1,7 +1,7 @@
 // A rigid probe, or the user's own tool, presses and strokes a soft organ; no vertex of the organ
 // is inside the probe at the end of any frame.
+#include "Anatomy.h"
 #include "SceneProgram.h"
-#include "Scenes.h"
 
 #include <palpate/Error.h>
 
@@ -16,9 +16,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kFrame = 1.0 / 60;                // s
-constexpr double kOrganLength = 150;               // mm, of the liver's longest side
-constexpr double kMass = 1.5, kCompliance = 0.02;  // kg; mm/mN of edges
+constexpr double kFrame = 1.0 / 60;                 // s
+constexpr double kEdge = 4.5;                       // mm, of the liver's triangles
+constexpr double kMass = 1.5, kCompliance = 0.002;  // kg; mm/mN of edges
 constexpr int kRounds = 2, kIterations = 8;
 
 struct Files {
@@ -43,27 +43,33 @@ SceneMesh closedMesh(const std::filesystem::path& path) {
   return mesh;
 }
 
-/// Centred, standing on z = 0.
-SceneMesh organMesh(const std::filesystem::path& path) {
-  SceneMesh mesh = path.empty() ? liver(23) : closedMesh(path);
-  const Eigen::AlignedBox3d box = boxOf(mesh.positions);
-  const double scale = path.empty() ? kOrganLength / box.sizes().maxCoeff() : 1.0;
-  const Vector3d foot(box.center().x(), box.center().y(), box.min().z());
-  for (Vector3d& p : mesh.positions) p = scale * (p - foot);
+/// Standing on z = 0, its highest point above the origin, which was at `foot`.
+SceneMesh organMesh(const std::filesystem::path& path, Vector3d& foot) {
+  SceneMesh mesh = path.empty() ? anatomicalLiver(kEdge) : closedMesh(path);
+  const auto [low, high] =
+      std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
+                          [](const Vector3d& a, const Vector3d& b) { return a.z() < b.z(); });
+  foot = {high->x(), high->y(), low->z()};
+  for (Vector3d& p : mesh.positions) p -= foot;
   return mesh;
 }
 
 class Palpation : public LiveScene {
  public:
   Palpation(const Files& files, int threads) : m_world(threads) {
-    SceneMesh organ = organMesh(files.organ);
+    Vector3d origin;
+    SceneMesh organ = organMesh(files.organ, origin);
     m_box = boxOf(organ.positions);
     m_size = m_box.sizes().maxCoeff(), m_gap = 0.003 * m_size;
     m_organ = m_world.addMesh(files.organ.empty() ? "Liver" : "Organ", organ,
                               static_cast<double>(organ.positions.size()) / kMass);
     const double foot = 0.25 * m_box.max().z();  // it grows on what is below
-    m_world.pin(m_organ, [foot](const Vector3d& p) { return p.z() < foot; });
+    const auto isGrown = [foot](const Vector3d& p) { return p.z() < foot; };
+    m_world.pin(m_organ, isGrown);
     m_world.addStiffness(m_organ, kCompliance, 3 * kCompliance);
+    if (files.organ.empty())
+      m_world.addInside(
+          m_organ, kMass, [&](const Vector3d& p) { return isInLiver(p + origin); }, isGrown);
     m_world.addVolume(m_organ, 0);
     addTool(files.tool);
   }
@@ -75,13 +81,11 @@ class Palpation : public LiveScene {
             {m_tool, m_world.bodies()[m_tool].name, kSteelColour, 0.35, true, 0, 0.3, 1}};
   }
 
-  PictureView view() override {
-    return {.from = {0.3, -1, 0.8}, .inset = m_tip, .insetHeight = 0.24 * m_size};
-  }
+  PictureView view() override { return {.from = {0.3, -1, 0.8}}; }
 
   /// What the organ does to the tool.
   std::vector<PictureNote> notes() override {
-    return forceNotes(m_tip, m_world.force(m_tool) / 1000, m_size / 10);
+    return forceNotes(m_tip, m_world.force(m_tool) / 1000, m_size / 2);
   }
 
   void computeFrame(int frame) override {
@@ -152,8 +156,8 @@ class Palpation : public LiveScene {
   /// Down into the organ, along it, and up again.
   Vector3d tip(int frame) const {
     const double phase = 2 * std::numbers::pi * frame / 240, height = m_box.max().z();
-    return {0.22 * m_size * std::sin(phase), 0.05 * m_size * std::sin(2 * phase),
-            height + m_radius + 2 * m_gap - 0.2 * height * (1 - std::cos(2 * phase))};
+    return {0.1 * m_size * std::sin(phase), 0.05 * m_size * std::sin(2 * phase),
+            height + m_radius + 2 * m_gap - 0.03 * height * (1 - std::cos(2 * phase))};
   }
 
   void drive(int frame) {
@@ -200,7 +204,7 @@ int main(int count, char** arguments) {
   palpate::scenes::Files files;
   return runScene(
       {.name = "Palpation",
-       .description = "A probe presses and strokes a liver of 10,580 triangles.",
+       .description = "A probe presses and strokes a liver.",
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,

@@ -79,12 +79,17 @@ class Retraction : public LiveScene {
 
   std::vector<BodyLook> looks() override {
     const auto [liver, stomach, membrane] = m_bodies;
-    return {{liver, "Liver", kLiverColour, 0.35},
+    return {{liver, "Liver", kLiverColour},
             {stomach, "Stomach", kStomachColour},
-            {membrane, "Membrane", kGallbladderColour}};
+            {membrane, "Membrane", kGallbladderColour, 0.6}};
   }
 
-  PictureView view() override { return {.from = {0.5, -1, 0.75}}; }
+  PictureView view() override { return {.from = {0.5, -1, 0.55}}; }
+
+  /// What the membrane and the stomach do to the liver.
+  std::vector<PictureNote> notes() override {
+    return forceNotes(touched(), m_world.force(m_bodies[0]) / 1000, 50);
+  }
 
   void computeFrame(int frame) override {
     for (int substep = 1; substep <= kSubsteps; ++substep) {
@@ -144,6 +149,15 @@ class Retraction : public LiveScene {
       if (i >= membraneBegin && m_rest[i].x() > 0) solver.now[i] = m_rest[i] + gathered;
       if (i >= membraneBegin && m_rest[i].x() < -100) solver.now[i] = m_rest[i] + folded;
     }
+  }
+
+  /// The middle of the contacts at the liver.
+  Vector3d touched() {
+    std::vector<Vector3d> at;
+    for (const World::BodyId other : {m_bodies[1], m_bodies[2]})
+      for (const VertexTriangleContact& c : m_world.contacts(m_bodies[0], other).vertexTriangle())
+        at.push_back(m_world.positions(m_bodies[0])[c.vertex]);
+    return at.empty() ? Vector3d::Zero() : meanOf(at);
   }
 
   double foldContacts() {

@@ -79,11 +79,7 @@ class RobotArms : public LiveScene {
     return looks;
   }
   PictureView view() override {
-    return {.from = {-0.1, -1, 1.0},
-            .centre = {0, 5, 0},
-            .height = 105,
-            .inset = middle(),
-            .insetHeight = 24};
+    return {.from = {-0.1, -1, 1.0}, .centre = {0, 2, 0}, .height = 120};
   }
   void computeFrame(int frame) override {
     const std::vector<InstrumentArm> arms = m_arms;
@@ -175,12 +171,6 @@ class RobotArms : public LiveScene {
         addRow(a, b, c.distance, c.normal, c.pointA, c.pointB);
     }
     return m_nearest;
-  }
-
-  /// Between the jaws of both arms.
-  Vector3d middle() const {
-    return (m_arms[0].link(kLinks - 1).translation() + m_arms[1].link(kLinks - 1).translation()) /
-           2;
   }
 
   /// normal: towards a, which is a link.

@@ -98,11 +98,11 @@ class Suturing : public LiveScene {
   World& world() override { return m_world; }
 
   std::vector<BodyLook> looks() override {
-    return {{m_thread, "", kSteelColour, 1, true, 0, 0.3, 1},
-            {.body = m_thread, .label = "", .colour = kThreadColour, .firstElement = kNeedle},
+    return {{m_thread, "Needle", kSteelColour, 1, true, 0, 0.3, 1},
+            {.body = m_thread, .label = "Thread", .colour = kThreadColour, .firstElement = kNeedle},
             {m_sheets[0], "", kTissueColour, 1, true, 0, 0.5},
             {m_sheets[1], "", kTissueColour, 1, true, 0, 0.5},
-            {m_bed, "", {0.45, 0.05, 0.05}, 1, true, 0, 0.25}};
+            {m_bed, "Wound", {0.45, 0.05, 0.05}, 1, true, 0, 0.25}};
   }
 
   PictureView view() override {

@@ -263,5 +263,13 @@ checkLinks() {
   done < <(find README.md CHANGELOG.md Docs Data Examples Testing -name '*.md' 2>/dev/null)
 }
 
+# Pages load soon: a picture has at most 400 kB, an animation 1500 kB.
+checkPictures() {
+  local file
+  while read -r file; do fault "$file: too large for a page"; done < <(
+    find Docs Data Examples \( -name '*.png' -o -name '*.svg' -o -name '*.jpg' \) -size +400000c 2>/dev/null
+    find Docs Data Examples \( -name '*.webp' -o -name '*.gif' \) -size +1500000c 2>/dev/null)
+}
+
 "check$check" "$@"
 exit $faults

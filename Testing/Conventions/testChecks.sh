@@ -106,6 +106,13 @@ printf '```cpp\n[](double x) {}\n```\n' >"$tree/Examples/A.md"
 expect holds Links
 rm -r "$tree/Examples/A.md"
 
+planted="a picture of 400,001 bytes"
+truncate --size 400001 "$tree/Examples/A.png"
+expect fails Pictures
+truncate --size 400000 "$tree/Examples/A.png"
+expect holds Pictures
+rm "$tree/Examples/A.png"
+
 planted="a stray symbol"
 printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
 expect holds Symbols "$tree/lib.so"

@@ -401,10 +401,12 @@ void Window::Implementation::draw() {
   if (cells != Cells::None) drawCells();
   drawAnnotations();
   for (vtkRenderer* shown : {renderer.Get(), inset.Get()}) {
-    const double height = 2 * shown->GetActiveCamera()->GetParallelScale();
-    shown->SetSSAORadius(0.08 * height);
-    shown->SetSSAOBias(0.003 * height);
+    constexpr double kHalf = 1.0 / 1024;  // VTK keeps positions as halves: less would be bands
     shown->ResetCameraClippingRange();
+    const double height = 2 * shown->GetActiveCamera()->GetParallelScale(),
+                 depth = shown->GetActiveCamera()->GetClippingRange()[1];
+    shown->SetSSAORadius(0.08 * height);
+    shown->SetSSAOBias(std::max(0.003 * height, kHalf * depth));
   }
   window->Render();
 }
