@@ -57,7 +57,9 @@ CollisionData::CollisionData(const Parts& parts) {
                          listOf(parts.shapeShape),
                          parts.earliestTimeOfImpact,
                          parts.errorBound,
-                         parts.validity};
+                         parts.validity,
+                         {},
+                         {}};
 }
 
 const CollisionData::Contents& CollisionData::read() const {
@@ -89,6 +91,21 @@ std::span<const ElementPair> CollisionData::intersectingTriangles() const {
 }
 std::span<const ShapeContact> CollisionData::shape() const { return read().shape; }
 std::span<const ShapeShapeContact> CollisionData::shapeShape() const { return read().shapeShape; }
+std::span<const TrackedContact> CollisionData::trackedVertexTriangle() const {
+  return read().tracked.vertexTriangle;
+}
+std::span<const TrackedContact> CollisionData::trackedTriangleVertex() const {
+  return read().tracked.triangleVertex;
+}
+std::span<const TrackedContact> CollisionData::trackedEdgeEdge() const {
+  return read().tracked.edgeEdge;
+}
+std::span<const TrackedContact> CollisionData::trackedShape() const { return read().tracked.shape; }
+std::span<const TrackedContact> CollisionData::trackedShapeShape() const {
+  return read().tracked.shapeShape;
+}
+std::span<const TrackedContact> CollisionData::ended() const { return read().tracked.ended; }
+std::span<const Crossing> CollisionData::crossings() const { return read().crossings; }
 double CollisionData::errorBound() const { return read().errorBound; }
 const Validity& CollisionData::validity() const { return read().validity; }
 

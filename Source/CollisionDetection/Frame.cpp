@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <limits>
 #include <mutex>
+#include <tuple>
 #include <variant>
 
 namespace palpate {
@@ -101,11 +102,14 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
   const MemoryScope memory(MemoryStage::Results);
   PairRecord& record = *pair.record;
   const std::size_t exactBefore = join.statistics.exactDecisions;
+  CountedVector<Crossing>& crossings = CollisionData::Contents::of(record.next).crossings;
+  crossings.clear();
   for (const auto& job : jobsOf(pair)) {
     const ContactBuffers& found = job->contacts;
     const std::size_t features = found.featurePairs + found.shapes.featurePairs,
                       exact = found.exactDecisions + found.shapes.exactDecisions +
                               job->intersections.exactDecisions;
+    crossings.insert(crossings.end(), found.passages.begin(), found.passages.end());
     join.statistics.candidatePairs += job->candidateCount;
     join.statistics.featurePairs += features;
     join.statistics.exactDecisions += exact;
@@ -113,6 +117,9 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
     record.statistics.candidatePairs += job->candidateCount;
     record.statistics.featurePairs += features;
   }
+  std::sort(crossings.begin(), crossings.end(), [](const Crossing& l, const Crossing& r) {
+    return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
+  });
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
   record.statistics.exactDecisions += join.statistics.exactDecisions - exactBefore;
 }

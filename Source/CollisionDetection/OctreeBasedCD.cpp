@@ -359,6 +359,20 @@ const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) co
   return record.data;
 }
 
+void OctreeBasedCD::setUserData(GeometryId a, GeometryId b, const ContactKey& key,
+                                std::uint64_t data) {
+  const Implementation::ChangeGuard all(m_implementation);
+  PairRecord& record = all->pairs.inOrder(all->geometries, a, b);
+  if (!record.tracker ||
+      !record.tracker->setUserData(CollisionData::Contents::of(record.data), key, data))
+    throw Error(ErrorCode::NotAvailable,
+                nameOf(*record.a, *record.b) +
+                    (record.tracker ? ": the last detection has no contact with this key"
+                                    : ": no detection has tracked contacts: "
+                                      "PairSettings::trackContacts is not set"),
+                a);
+}
+
 std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {
   read();
   Implementation& all = *m_implementation;

@@ -234,6 +234,12 @@ void OctreeBasedCD::Implementation::detect() {
   else
     frame.detectByBruteForce(records, next, traced);
   freeMotions.find(geometries, pairs, settings.engine, threads);
+  {
+    const MemoryScope results(MemoryStage::Results);
+    watch.lap();
+    for (const auto& record : pairs.records()) record->track(geometries.stepNumber());
+    next.milliseconds.order += watch.lap();
+  }
   freeMotions.commit(geometries);
   for (PairRecord* record : records) {
     record->commit();
@@ -242,6 +248,7 @@ void OctreeBasedCD::Implementation::detect() {
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
       record->commitEmpty();
+    if (record->tracker) record->tracker->commit(CollisionData::Contents::of(record->data));
     const CollisionData& data = record->data;
     record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
     next.contacts += record->statistics.contacts;

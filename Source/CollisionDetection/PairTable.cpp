@@ -53,6 +53,26 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
   return builds;
 }
 
+void PairRecord::track(std::uint64_t step) {
+  using Contents = CollisionData::Contents;
+  const bool changes = !dataVersion.isCurrent(state());
+  if (changes && !collides()) next = {};
+  if (!pair.settings.trackContacts) {
+    tracker.reset();
+    if (changes && collides()) Contents::of(next).tracked = {};
+    return;
+  }
+  if (!tracker) tracker = std::make_unique<ContactTracker>();
+  const bool begins = tracker->startStep(step, Contents::of(data));
+  if (!changes) {
+    if (begins) tracker->keep();
+  } else if (collides() || tracker->hadContacts()) {
+    Contents& contents = Contents::of(next);
+    contents.tracked.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
+    tracker->track(meshes(), collides(), Contents::of(data), contents);
+  }
+}
+
 void PairRecord::commit() noexcept {
   PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
                  sizeOf(CollisionData::Contents::of(next)));
@@ -67,11 +87,11 @@ void PairRecord::releaseMemory() {
   fieldScratch.reset();
   CollisionData::Contents& contents = CollisionData::Contents::of(data);
   forEachTimed(contents, [](auto& list) { releaseSpare(list); });
+  if (tracker) tracker->releaseMemory(contents);
   releaseSpare(contents.intersectingTriangles);
 }
 
 void PairRecord::commitEmpty() noexcept {
-  next = {};
   commit();
   trust.forget();
 }

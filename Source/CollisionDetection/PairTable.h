@@ -8,6 +8,7 @@
 #include "Validity/Trust.h"
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/SurfaceProxy.h"
+#include "Tracking/ContactTracker.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
@@ -82,6 +83,9 @@ struct PairRecord : CountedObject {
   bool anyDisabled() const {
     return !a->body.mesh.topology.disabled.empty() || !b->body.mesh.topology.disabled.empty();
   }
+  /// Follows the contacts into `next`, or where it holds, the result into the step with this number
+  /// (PairSettings::trackContacts). Empties `next` of a pair that does not collide.
+  void track(std::uint64_t step);
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// Commits an empty result, for a pair that does not collide.
@@ -120,8 +124,9 @@ struct PairRecord : CountedObject {
   bool byBodies = false;       ///< whether BodyContacts changed the last answer
   std::atomic<double>
       earliest;  ///< ContinuousSettings::earliestTimeOnly: found so far in this frame
-  std::size_t candidateCount = 0;  ///< number of candidates when last found
-  PairStatistics statistics;       ///< of the last detection
+  std::size_t candidateCount = 0;           ///< number of candidates when last found
+  PairStatistics statistics;                ///< of the last detection
+  std::unique_ptr<ContactTracker> tracker;  ///< with PairSettings::trackContacts
   std::unique_ptr<FieldScratch> fieldScratch;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest

@@ -99,8 +99,8 @@ class PairCheck {
   }
 
   void range() const {
-    const auto [method, thickness, contacts, rest, allowedError, freeReach, continuous, automatic,
-                proxy] = m_settings;
+    const auto [method, thickness, contacts, rest, allowedError, freeReach, tracks, crossings,
+                continuous, automatic, proxy] = m_settings;
     const auto [timeTolerance, earliestTimeOnly] = continuous;
     const double motionTolerance = automatic.motionTolerance, normalCone = proxy.widestNormalCone;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);
@@ -115,6 +115,12 @@ class PairCheck {
          "contacts must be Distinct or All");
     need(!earliestTimeOnly || method == Method::Continuous,
          "earliestTimeOnly is for Method::Continuous only");
+    support(!tracks || !earliestTimeOnly,
+            "trackContacts needs contacts, and earliestTimeOnly reports none");
+    support(!crossings || (method == Method::Continuous && !earliestTimeOnly && !m_a.body.shape &&
+                           !m_b.body.shape),
+            "reportCrossings is for Method::Continuous of meshes, lines and points, without "
+            "earliestTimeOnly");
     need(method >= Method::Auto && method <= Method::Proxy,
          "method is " + std::to_string(static_cast<int>(method)) +
              "; it must be Auto, Intersection, Proximity, Continuous, DistanceField or Proxy");

@@ -25,7 +25,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 12;
+constexpr int kVersion = 13;
 
 // Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",       "Intersection",  "Proximity",
@@ -238,6 +238,8 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 11) file.real(pair.settings.allowedError);
   if (version >= 11) file.real(pair.settings.proxy.widestNormalCone);
   if (version >= 12) file.real(pair.settings.freeMotionReach);
+  if (version >= 13) fieldOf(file, pair.settings.trackContacts);
+  if (version >= 13) fieldOf(file, pair.settings.reportCrossings);
 }
 
 template <class File, class FilterType>

@@ -251,6 +251,38 @@ const char* toString(ContactFeatures::Kind value) noexcept {
   return kUnknown;
 }
 
+const char* toString(ContactKind value) noexcept {
+  switch (value) {
+    case ContactKind::VertexTriangle:
+      return "VertexTriangle";
+    case ContactKind::TriangleVertex:
+      return "TriangleVertex";
+    case ContactKind::EdgeEdge:
+      return "EdgeEdge";
+    case ContactKind::Shape:
+      return "Shape";
+    case ContactKind::ShapeShape:
+      return "ShapeShape";
+  }
+  return kUnknown;
+}
+
+const char* toString(ContactEnd value) noexcept {
+  switch (value) {
+    case ContactEnd::None:
+      return "None";
+    case ContactEnd::Cut:
+      return "Cut";
+    case ContactEnd::Disabled:
+      return "Disabled";
+    case ContactEnd::Filtered:
+      return "Filtered";
+    case ContactEnd::Apart:
+      return "Apart";
+  }
+  return kUnknown;
+}
+
 const char* toString(GeometryType value) noexcept {
   switch (value) {
     case GeometryType::Triangles:

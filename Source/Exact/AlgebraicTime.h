@@ -128,6 +128,8 @@ CriticalPoints criticalPoints(const Form<3>&);
 /// The sign of the highest coefficient that is not zero, which is the form's sign just before t =
 /// 1.
 int signBeforeEnd(const Form<3>&);
+/// The sign of the lowest coefficient that is not zero, which is the form's sign just after t = 0.
+int signAfterStart(const Form<3>&);
 /// Divides by t until the form is not zero at 0.
 void removeRootsAtStart(Form<3>&);
 

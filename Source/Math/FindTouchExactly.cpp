@@ -1,5 +1,6 @@
-// Part of Math/ImpactQuery.h: findTouchExactly().
+// Part of Math/ImpactQuery.h: findTouchExactly(), findPassages().
 #include "Math/ImpactQuery.h"
+#include "Math/Tolerances.h"
 #include "Exact/AlgebraicTime.h"
 #include "Core/Assert.h"
 
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <type_traits>
 
 namespace palpate {
 
@@ -114,6 +116,7 @@ class ExactQuery {
  public:
   explicit ExactQuery(const ImpactQuery& query);
   std::optional<double> firstTouch(double tolerance) const;
+  Passages passages() const;
 
  private:
   Form<3> coplanarity() const;
@@ -210,7 +213,50 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
   return first;
 }
 
+/// The volume A x B · C is positive or negative between its roots. Simple roots change its sign. It
+/// has one multiple root at most, and its signs at both ends tell whether that changes it.
+Passages ExactQuery::passages() const {
+  Passages found;
+  const Form<3> volume = coplanarity();
+  if (isZero(volume)) return found;
+  const auto add = [&](double time, bool forward) {
+    PALPATE_ASSERT(found.count < 3);
+    found.all[static_cast<std::size_t>(found.count++)] = {time, forward};
+  };
+  int sign = signAfterStart(volume);
+  const int last = signBeforeEnd(volume);
+  if (volume[0] == 0 && sign < 0 && touchAt(StartOfStep{})) add(0.0, false);
+  int simple = 0;
+  anyRootInside(volume, [&]<class Root>(const Root&) {
+    simple += std::is_same_v<Root, CubicTime>;
+    return false;
+  });
+  const bool multipleChanges = (sign != last) != (simple % 2 == 1);
+  anyRootInside(volume, [&]<class Root>(const Root& root) {
+    constexpr bool isSimple = std::is_same_v<Root, CubicTime>;
+    if (!isSimple && !multipleChanges) return false;
+    sign = -sign;
+    if (!touchAt(root)) return false;
+    if constexpr (isSimple)
+      add(root.timeLowerBound(kSmallestTimeTolerance), sign > 0);
+    else
+      add(root.timeLowerBound(), sign > 0);
+    return false;
+  });
+  PALPATE_ASSERT(sign == last);
+  if (volume[3] == 0 && sign < 0 && touchAt(EndOfStep{})) add(1.0, true);
+  return found;
+}
+
 }  // namespace
+
+Passages findPassages(const ImpactQuery& query) {
+  const ImpactResult touch = findTouch(query, 1.0);
+  Passages found;
+  if (touch.impact) found = ExactQuery(query).passages();
+  found.exact = touch.impact || touch.exact;
+  return found;
+}
 
 ImpactResult findTouchExactly(const ImpactQuery& query, double tolerance) {
   PALPATE_ASSERT(tolerance > 0.0);

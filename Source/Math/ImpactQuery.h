@@ -62,6 +62,18 @@ ImpactResult findTouchExactly(const ImpactQuery&, double tolerance);
 /// findImpact() for a distance > 0: when the features come within it.
 ImpactResult findApproach(const ImpactQuery&, double distance, double tolerance, double upTo = 1.0);
 
+/// The moments at which features pass through each other (Crossing in palpate/Tracking.h).
+struct Passages {
+  struct Passage {
+    double time;   ///< at most 2^-50 before the exact time, never after it
+    bool forward;  ///< A x B · C becomes positive
+  };
+  std::array<Passage, 3> all{};  ///< ascending; a cubic has no more roots
+  int count = 0;
+  bool exact = false;  ///< floating point could not decide
+};
+Passages findPassages(const ImpactQuery&);
+
 /// The side of the contact plane on which the first feature last was before the time. 1: the side
 /// of A x B, towards which C points; this is the triangle's winding normal, or (p1 - p0) x (q0 -
 /// q1). -1: the other side. 0: it was always in the plane. exactDecisions: incremented if floating

@@ -20,6 +20,12 @@ struct CollisionData::Contents : CountedObject {
   double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
   double errorBound = 0.0;
   Validity validity;
+  struct Tracked {  ///< PairSettings::trackContacts: parallel to the lists
+    CountedVector<TrackedContact> vertexTriangle, triangleVertex, edgeEdge, shape, shapeShape;
+    CountedVector<TrackedContact> ended;
+    bool elementsOfSecond = false;  ///< shape() has elements of the pair's second geometry
+  } tracked{};
+  CountedVector<Crossing> crossings{};
 
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {

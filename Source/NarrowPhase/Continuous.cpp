@@ -115,6 +115,8 @@ class ContactFinder {
                                         m_settings.timeTolerance)
                           : findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
+    if (m_pair.settings.reportCrossings && answer.impact)
+      addPassages(features, firstId, secondId, swapped, query);
     return answer.impact && boxesMeet(query, m_settings.minimumDistance) &&
            add(features, firstId, secondId, swapped, query, answer.time, true);
   }
@@ -178,6 +180,32 @@ class ContactFinder {
   }
 
  private:
+  /// Appends the passages of two features, unless a filter suppresses them.
+  template <Kind kind>
+  void addPassages(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
+                   bool swapped, const ImpactQuery& query) {
+    const Passages passages = findPassages(query);
+    m_out.exactDecisions += passages.exact;
+    if (passages.count == 0) return;
+    Crossing crossing;
+    if constexpr (kind == Kind::VertexTriangle) {
+      if (rejectsVertex(m_pair, firstId, secondId, swapped)) return;
+      const bool ofSecond = swapped && !m_pair.self();
+      crossing.kind = ofSecond ? ContactKind::TriangleVertex : ContactKind::VertexTriangle;
+      crossing.ids = {firstId, secondId, kNoElement, kNoElement};
+      if (ofSecond) std::swap(crossing.ids[0], crossing.ids[1]);
+    } else {
+      if (rejectsEdges(m_pair, firstId, secondId)) return;
+      crossing.kind = ContactKind::EdgeEdge;
+      crossing.ids = features.vertices(firstId, secondId);
+    }
+    for (int i = 0; i < passages.count; ++i) {
+      crossing.time = passages.all[static_cast<std::size_t>(i)].time;
+      crossing.forward = passages.all[static_cast<std::size_t>(i)].forward;
+      m_out.passages.push_back(crossing);
+    }
+  }
+
   /// The radii with which features keep apart. Features that are near at rest have none, because
   /// the surfaces of a thread overlap there.
   template <Kind kind>

@@ -39,6 +39,7 @@ void ContactBuffers::clear() {
   triangleVertex.clear();
   edgeEdge.clear();
   intersectingTriangles.clear();
+  passages.clear();
   crossings.clear();
   crossingsAtStart.clear();
   pierced.clear();

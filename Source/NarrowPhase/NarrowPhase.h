@@ -153,6 +153,7 @@ struct ContactBuffers {
   Buffer<VertexTriangleContact> vertexTriangle, triangleVertex;
   Buffer<EdgeEdgeContact> edgeEdge;
   Buffer<ElementPair> intersectingTriangles;
+  Buffer<Crossing> passages;              ///< PairSettings::reportCrossings
   Buffer<EdgeCrossing> crossings;         ///< Intersection: of all batches
   Buffer<EdgeCrossing> crossingsAtStart;  ///< Auto, where the step begins in intersection
   Buffer<PiercedPair> pierced;            ///< the same

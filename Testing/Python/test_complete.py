@@ -42,6 +42,7 @@ CLASSES = {
     "AuditFailure": "palpate.AuditFailure",
     "CollisionProblem": "ProblemGeometry, ProblemPair",
     "Stencil": "Stencils",
+    "TrackedContact": "records of CollisionData.tracked_vertex_triangle and so on",
     "Ray": "origin, direction, t_min, t_max",
     "CellTypes": "fills structs of a C++ simulator",
     "TimeOfImpactSettings": "keyword arguments",

@@ -93,6 +93,8 @@ inline constexpr auto kFields<PairSettings> = std::tuple(
         "earliest_time_only", [](auto& s) -> auto& { return s.continuous.earliestTimeOnly; }),
     field("allowed_error", &PairSettings::allowedError),
     field("free_motion_reach", &PairSettings::freeMotionReach),
+    field("track_contacts", &PairSettings::trackContacts),
+    field("report_crossings", &PairSettings::reportCrossings),
     field(
         "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }));
 template <>

@@ -21,6 +21,27 @@ void addList(DataClass& data, const char* name, std::span<const T> (CollisionDat
       text);
 }
 
+void addTracked(DataClass& data, const char* name,
+                std::span<const TrackedContact> (CollisionData::*list)() const, const char* text) {
+  data.def_property_readonly(
+      name,
+      [list](const CollisionData& self) {
+        const auto contacts = (self.*list)();
+        py::array records = newRecords<TrackedRecord>(contacts.size());
+        std::transform(contacts.begin(), contacts.end(), recordsIn<TrackedRecord>(records).begin(),
+                       [](const TrackedContact& c) {
+                         return TrackedRecord{c.key,
+                                              c.predecessor.value_or(ContactKey{}),
+                                              c.predecessor.has_value(),
+                                              c.age,
+                                              c.userData,
+                                              c.end};
+                       });
+        return records;
+      },
+      text);
+}
+
 py::object stencils(const CollisionData& data, const py::object& firstA, const py::object& firstB) {
   const std::uint32_t a = elementIndex(firstA, "first_a"), b = elementIndex(firstB, "first_b");
   const std::size_t count =
@@ -223,6 +244,34 @@ point_a, point_b  (3,), L, on the surfaces
 normal            (3,), unit, from shape b to shape a
 distance          L; negative: how deep they overlap
 time_of_impact    in [0, 1] of the step)");
+  addTracked(data, "tracked_vertex_triangle", &CollisionData::trackedVertexTriangle,
+             R"(With track_contacts one record for each contact of vertex_triangle; else empty.
+
+key              kind, a ContactKind, and ids (4,): the two features
+predecessor      the key of the contact of the last step from which it slid
+has_predecessor  whether there is one
+age              in steps; 0: it began in this one
+user_data        OctreeBasedCD.set_user_data()
+end              a ContactEnd, as a number
+
+A pickled copy has none.)");
+  addTracked(data, "tracked_triangle_vertex", &CollisionData::trackedTriangleVertex,
+             "The same for triangle_vertex.");
+  addTracked(data, "tracked_edge_edge", &CollisionData::trackedEdgeEdge, "The same for edge_edge.");
+  addTracked(data, "tracked_shape", &CollisionData::trackedShape, "The same for shape.");
+  addTracked(data, "tracked_shape_shape", &CollisionData::trackedShapeShape,
+             "The same for shape_shape.");
+  addTracked(data, "ended", &CollisionData::ended,
+             "Contacts of the last step that ended, by key; `end` says why.");
+  addList(data, "crossings", &CollisionData::crossings,
+          R"(With report_crossings the passages within the step, as a record array (n,).
+
+kind     a ContactKind, as a number
+ids      (4,) as in a contact's key
+time     in [0, 1] of the step
+forward  whether the vertex passed to the side of the triangle's normal
+
+A pickled copy has none.)");
   data.def_property_readonly("earliest_time_of_impact", &CollisionData::earliestTimeOfImpact,
                              "The least time of impact, in [0, 1]; infinity without contacts.")
       .def_property_readonly("error_bound", &CollisionData::errorBound,

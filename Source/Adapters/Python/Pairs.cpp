@@ -2,6 +2,7 @@
 
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
+#include "Python/Records.h"
 
 namespace palpate::python {
 namespace {
@@ -131,6 +132,29 @@ exception ends the frame, and detect_collision() raises it.)")
           R"(collision_data(a, b) -> CollisionData
 
 A copy of the answer of the last detection, in the order in which the pair was added.)")
+      .def(
+          "set_user_data",
+          [](Collisions& self, Object first, Object second, Object keys, Object data) {
+            const GeometryId a = geometryId(first), b = geometryId(second);
+            const std::vector<ContactKey> contacts = structsIn<ContactKey>(keys);
+            const auto values = py::array_t<std::uint64_t, py::array::forcecast>(
+                py::reinterpret_borrow<py::object>(data));
+            const auto count = static_cast<std::size_t>(values.size());
+            if (count != 1 && count != contacts.size())
+              throw py::value_error("data has " + std::to_string(count) + " numbers for " +
+                                    std::to_string(contacts.size()) + " keys");
+            self.change([&](OctreeBasedCD& d) {
+              for (std::size_t i = 0; i < contacts.size(); ++i)
+                d.setUserData(a, b, contacts[i],
+                              values.data()[count == 1 ? 0 : static_cast<py::ssize_t>(i)]);
+            });
+          },
+          py::arg("a"), py::arg("b"), py::arg("keys"), py::arg("data"),
+          R"(set_user_data(a, b, keys, data) -> None
+
+Gives 64 bits each to contacts of the last detection, for as long as they last and then to their
+successors. keys: the field `key` of records such as CollisionData.tracked_edge_edge, or one of
+them. data: one integer, or one for each key.)")
       .def(
           "free_motion",
           [](Collisions& self, Object geometry) {

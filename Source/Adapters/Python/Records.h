@@ -51,6 +51,27 @@ inline constexpr auto kFields<ShapeShapeContact> = std::tuple(
     field("normal", &ShapeShapeContact::normal), field("distance", &ShapeShapeContact::distance),
     field("time_of_impact", &ShapeShapeContact::timeOfImpact));
 template <>
+inline constexpr auto kFields<ContactKey> = std::tuple(field("kind", &ContactKey::kind),
+                                                       field("ids", &ContactKey::ids));
+/// TrackedContact, without an optional member.
+struct TrackedRecord {
+  ContactKey key, predecessor;
+  bool hasPredecessor = false;
+  std::uint32_t age = 0;
+  std::uint64_t userData = 0;
+  ContactEnd end = ContactEnd::None;
+};
+template <>
+inline constexpr auto kFields<TrackedRecord> = std::tuple(
+    field("key", &TrackedRecord::key), field("predecessor", &TrackedRecord::predecessor),
+    field("has_predecessor", &TrackedRecord::hasPredecessor), field("age", &TrackedRecord::age),
+    field("user_data", &TrackedRecord::userData), field("end", &TrackedRecord::end));
+template <>
+inline constexpr auto kFields<Crossing> = std::tuple(field("kind", &Crossing::kind),
+                                                     field("ids", &Crossing::ids),
+                                                     field("time", &Crossing::time),
+                                                     field("forward", &Crossing::forward));
+template <>
 inline constexpr auto kFields<SurfacePoint> = std::tuple(field("geometry", &SurfacePoint::geometry),
                                                          field("element", &SurfacePoint::element),
                                                          field("vertices", &SurfacePoint::vertices),

@@ -2,6 +2,7 @@
 
 #include <palpate/Export.h>
 #include <palpate/FeaturePairs.h>
+#include <palpate/Tracking.h>
 #include <palpate/Types.h>
 #include <palpate/Validity.h>
 
@@ -163,7 +164,22 @@ class PALPATE_EXPORT CollisionData {
 
   const Validity& validity() const;
 
-  /// Of all contacts in their order, without validity(): the same bits on every machine.
+  /// With PairSettings::trackContacts one for each contact, in the same order; else empty.
+  std::span<const TrackedContact> trackedVertexTriangle() const;
+  std::span<const TrackedContact> trackedTriangleVertex() const;
+  std::span<const TrackedContact> trackedEdgeEdge() const;
+  std::span<const TrackedContact> trackedShape() const;
+  std::span<const TrackedContact> trackedShapeShape() const;
+  /// Contacts at the last advance() that are neither here now nor the predecessor of one that is.
+  /// Order    by key.
+  std::span<const TrackedContact> ended() const;
+
+  /// With PairSettings::reportCrossings every passage within the step; else empty.
+  /// Order    by kind, ids, time.
+  std::span<const Crossing> crossings() const;
+
+  /// Of all contacts in their order, without validity() and tracking: the same bits on every
+  /// machine.
   std::uint64_t hash() const;
 
   struct Contents;  ///< not part of the interface

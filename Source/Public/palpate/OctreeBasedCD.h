@@ -215,6 +215,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The answer of the last detectCollision(); (a, b) in the order of the addition.
   /// Errors   NotAvailable before the first detection of the pair.
   const CollisionData& collisionData(GeometryId a, GeometryId b) const;
+  /// Gives 64 bits to a contact of the last detection, for as long as it lasts and then to its
+  /// successor. (a, b) in the order of the addition.
+  /// Errors   NotAvailable if the detection has no such contact, or does not track contacts.
+  void setUserData(GeometryId a, GeometryId b, const ContactKey&, std::uint64_t);
   /// L, one per vertex, or one for a shape. While no point has moved further since the last
   /// detection, no new contact or crossing exists, rounding included
   /// (Docs/Algorithms/FreeMotion.md). Infinity without PairSettings::freeMotionReach. Valid until

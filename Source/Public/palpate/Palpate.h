@@ -19,5 +19,6 @@
 #include <palpate/Snapshot.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/StepGuard.h>
+#include <palpate/Tracking.h>
 #include <palpate/Types.h>
 #include <palpate/Validity.h>

@@ -142,6 +142,10 @@ struct PairSettings {
   /// Positive: detections find OctreeBasedCD::freeMotion(), at most half of this, at growing cost.
   /// A distance field that is a geometry accepts only 0.
   double freeMotionReach = 0.0;
+  /// Contacts have an identity from step to step: CollisionData::trackedVertexTriangle() and so on.
+  bool trackContacts = false;
+  /// Of Continuous for meshes, lines and points: CollisionData::crossings().
+  bool reportCrossings = false;
   ContinuousSettings continuous{};
   AutoSettings automatic{};
   LeafSettings proxy{};

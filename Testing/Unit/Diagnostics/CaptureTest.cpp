@@ -108,6 +108,7 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
                             {.method = Method::Proxy,
                              .thickness = 0.1,
                              .allowedError = 0.0123,
+                             .trackContacts = true,
                              .proxy = {.widestNormalCone = 0.21}});
   detection.setCollisionFilter(scene.organ, {3, 5, Sidedness::Outer});
   detection.setDisabledElements(scene.floor, std::vector<std::uint32_t>{1, 5, 9});
@@ -134,6 +135,8 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
     const PairSettings &kept = found.pairs[i].settings, &given = truth.pairs[i].settings;
     EXPECT_EQ(kept.restDistance, given.restDistance);
     EXPECT_EQ(kept.allowedError, given.allowedError);
+    EXPECT_EQ(kept.trackContacts, given.trackContacts);
+    EXPECT_EQ(kept.reportCrossings, given.reportCrossings);
     EXPECT_EQ(kept.proxy.widestNormalCone, given.proxy.widestNormalCone);
   }
   // The file does not contain a predicate, but says that there was one. The audit calls it.
@@ -231,10 +234,10 @@ TEST_F(Capture, ErrorsNameTheFault) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 12", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 12", "palpate-capture 13",
+  expectRefusedWith("palpate-capture 13", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 13", "palpate-capture 14",
                     "its version is 13; versions up to 12");
-  expectRefusedWith("palpate-capture 12", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 13", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");
@@ -289,6 +292,10 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n",
+             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0\n");  // trackContacts, reportCrossings
+  EXPECT_FALSE(asVersion(12).pairs[0].settings.trackContacts);
+  EXPECT_FALSE(asVersion(12).pairs[0].settings.reportCrossings);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0\n",
              " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2\n");  // freeMotionReach
   EXPECT_EQ(asVersion(11).pairs[0].settings.freeMotionReach, 0.0);

@@ -311,6 +311,38 @@ class Query {
     return first;
   }
 
+  /// The times in [0, 1] at which the signed volume changes its sign while the features touch. It
+  /// counts as positive where it is 0 at an end.
+  struct Passage {
+    Real time;
+    bool forward;
+  };
+  std::vector<Passage> passages() const {
+    std::vector<Passage> all;
+    if (m_separated || m_coplanarity.empty()) return all;
+    const Polynomial volume = Polynomial{Integer(m_edges ? 1 : -1)} * m_coplanarity;
+    std::vector<Real> roots = rootsInStep(volume);
+    const Features features = featuresOf(m_edges, m_vertices);
+    const auto signAtEnd = [&](int end) { return signAt(volume, end) < 0 ? -1 : 1; };
+    int sign = signAtEnd(0);
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+      int after = signAtEnd(1);
+      if (roots[i].compare(1) < 0) {
+        // A number between this root and the next one, or the end.
+        Real next = i + 1 < roots.size() ? roots[i + 1] : Real{{}, 1, 1};
+        while (roots[i].high >= next.low) {
+          if (!roots[i].p.empty()) roots[i].refine();
+          if (!next.p.empty()) next.refine();
+        }
+        after = signAt(volume, (roots[i].high + next.low) / 2);
+      }
+      if (after != sign && touchesInPlaneAt(features, roots[i]))
+        all.push_back({roots[i], after > 0});
+      sign = after;
+    }
+    return all;
+  }
+
   /// For (v, a, b, c): det(a - v, b - v, c - v).
   const Polynomial& coplanarity() const { return m_coplanarity; }
 

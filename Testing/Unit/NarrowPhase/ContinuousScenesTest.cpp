@@ -4,6 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 
 #include "PublishedFrames.h"
+#include "Unit/Math/ImpactOracle.h"
 
 #include <gtest/gtest.h>
 
@@ -12,6 +13,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <tuple>
 
 namespace palpate {
 
@@ -100,6 +102,57 @@ TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
   const double second =
       findEarliestImpact(pair, std::span(candidates).subspan(half.size()), infinity, counts);
   EXPECT_EQ(findEarliestImpact(pair, half, second, counts), earliest);
+}
+
+/// PairSettings::reportCrossings: the passages of all features that touch, by rational arithmetic.
+TEST_P(ContinuousScenes, ReportExactlyThePassages) {
+  const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
+  const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
+  if (!std::filesystem::is_directory(folder))
+    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
+  const TriangleMesh mesh = testing::readStep(folder / "frames" / (std::string(before) + ".ply"),
+                                              folder / "frames" / (std::string(now) + ".ply"));
+  const std::vector<ElementPair> candidates = testing::sweptCandidates(mesh);
+  std::vector<Crossing> truth;
+  const auto addTruth = [&](bool edges, const ContactKey& key,
+                            const std::array<std::uint32_t, 4>& vertices) {
+    impact::Positions p;
+    for (std::size_t i = 0; i < 4; ++i)
+      p[i] = mesh.before[vertices[i]], p[4 + i] = mesh.now[vertices[i]];
+    for (const auto& passage : impact::Query(edges, p).passages())
+      truth.push_back({key.kind, key.ids, 0, passage.forward});
+  };
+  ContactBuffers found{};
+  findContinuous({mesh, mesh, {.method = Method::Continuous, .contacts = Contacts::All}},
+                 candidates, found);
+  EXPECT_TRUE(found.passages.empty());
+  for (const auto& c : found.vertexTriangle)
+    addTruth(false, {ContactKind::VertexTriangle, {c.vertex, c.triangle, kNoElement, kNoElement}},
+             {c.vertex, c.vertices[0], c.vertices[1], c.vertices[2]});
+  for (const auto& c : found.edgeEdge)
+    addTruth(true, {ContactKind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}},
+             {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]});
+  for (const double thickness : {0.0, 1e-3}) {
+    ContactBuffers with{};
+    findContinuous({mesh,
+                    mesh,
+                    {.method = Method::Continuous,
+                     .thickness = thickness,
+                     .contacts = Contacts::All,
+                     .reportCrossings = true}},
+                   candidates, with);
+    std::vector<Crossing> passages(with.passages.begin(), with.passages.end());
+    const auto sort = [](std::vector<Crossing>& all) {
+      for (Crossing& each : all) each.time = 0;
+      std::stable_sort(all.begin(), all.end(), [](const Crossing& l, const Crossing& r) {
+        return std::tie(l.kind, l.ids) < std::tie(r.kind, r.ids);
+      });
+    };
+    sort(passages);
+    sort(truth);
+    EXPECT_EQ(passages, truth);
+    EXPECT_GT(truth.size(), (vertexTriangle + edgeEdge) / 10);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Published, ContinuousScenes,

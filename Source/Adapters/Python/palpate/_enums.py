@@ -70,6 +70,26 @@ class Sidedness(_Named):
     OUTER = 1
 
 
+class ContactKind(_Named):
+    """In which list of CollisionData a contact is."""
+
+    VERTEX_TRIANGLE = 0
+    TRIANGLE_VERTEX = 1
+    EDGE_EDGE = 2
+    SHAPE = 3
+    SHAPE_SHAPE = 4
+
+
+class ContactEnd(_Named):
+    """Why a contact ended."""
+
+    NONE = 0
+    CUT = 1
+    DISABLED = 2
+    FILTERED = 3
+    APART = 4
+
+
 class ContactFeaturesKind(_Named):
     """The features that a contact predicate receives."""
 

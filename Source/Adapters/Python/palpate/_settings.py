@@ -110,6 +110,8 @@ class PairSettings:
     earliest_time_only  Continuous only: report earliest_time_of_impact and no contacts
     allowed_error       L: what an answer by a proxy or a field may be off by
     free_motion_reach   L: positive: detect_collision() also finds free_motion(), up to half of this
+    track_contacts      contacts have an identity: CollisionData.tracked_vertex_triangle and so on
+    report_crossings    Continuous only: CollisionData.crossings
     widest_normal_cone  rad, in (0, 1.5], Proxy only
     """
 
@@ -122,6 +124,8 @@ class PairSettings:
     earliest_time_only: bool = False
     allowed_error: float = 0.0
     free_motion_reach: float = 0.0
+    track_contacts: bool = False
+    report_crossings: bool = False
     widest_normal_cone: float = 0.25
 
     def __post_init__(self) -> None:

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <palpate/Tracking.h>
+
+#include "NarrowPhase/CollisionContents.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+namespace palpate {
+
+/// The contacts of one pair over time (PairSettings::trackContacts). Docs/HowTo/ContactsOverTime.md
+/// has the rules. Its scratch remembers its peak.
+class ContactTracker : public CountedObject {
+ public:
+  using Contents = CollisionData::Contents;
+
+  /// Takes over the contacts of the last detection if a step has begun since. Call before the
+  /// other functions. step: the number of the present one. Returns whether it did. If it throws,
+  /// nothing is taken over.
+  bool startStep(std::uint64_t step, const Contents& last);
+  bool hadContacts() const { return !m_before.empty(); }  ///< at the last advance()
+
+  /// Writes Contents::tracked of an answer in this step. last: of the last detection, maybe in this
+  /// step. collides: false if groups exclude the pair.
+  void track(const MeshPair&, bool collides, const Contents& last, Contents& next);
+  /// An answer that needs no detection lasts into this step. Call commit() then.
+  void keep() { m_keeps = true; }
+  void commit(Contents& kept) noexcept;
+
+  void releaseMemory(Contents&);  ///< keeps what contacts have been
+
+  /// Returns whether the answer has the contact.
+  bool setUserData(Contents&, const ContactKey&, std::uint64_t);
+
+ private:
+  /// The vertices of a contact's two features, some of them twice. What has no vertices, as a
+  /// shape, has kNoElement.
+  using Vertices = std::array<std::array<std::uint32_t, 3>, 2>;
+  struct Entry {
+    TrackedContact contact;
+    Vertices vertices;
+    bool isPredecessor;  ///< of a contact of the answer at hand
+  };
+  /// A contact that began.
+  struct Begun {
+    TrackedContact* contact;
+    Vertices vertices;
+  };
+  struct VertexOf {
+    std::uint32_t vertex, entry;  ///< entry: by its index in m_ended
+    auto operator<=>(const VertexOf&) const = default;
+  };
+  /// begun, entry: by their indices in m_begun and m_ended.
+  struct Slide {
+    int shared;  ///< number of vertices that both contacts have
+    std::uint32_t begun, entry;
+  };
+
+  template <class Contact>
+  static Vertices verticesOf(ContactKind, const Contact&);
+  template <class Contact>
+  static ContactKey keyOf(ContactKind, const Contact&);
+  void match(Contents& next);
+  void findSlides(bool self);
+  void takeUserData(const Contents& last);
+  ContactEnd endOf(const MeshPair&, bool collides, const Entry&) const;
+
+  static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t m_step = kNoStep;  ///< the one after m_before
+  Buffer<Entry> m_before;          ///< at the last advance(), by key
+  bool m_beforeOfSecond = false;   ///< Tracked::elementsOfSecond
+  bool m_keeps = false;
+  Buffer<Entry*> m_ended;  ///< of m_before: not in the answer at hand
+  Buffer<Begun> m_begun;   ///< in the answer at hand
+  Buffer<VertexOf> m_vertices;
+  Buffer<Slide> m_slides;
+};
+
+}  // namespace palpate

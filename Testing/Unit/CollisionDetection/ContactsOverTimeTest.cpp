@@ -1,0 +1,443 @@
+#include "Common/ExpectRefused.h"
+#include "Common/PairRun.h"
+#include "Common/TestGeometry.h"
+
+#include <palpate/DistanceField.h>
+#include <palpate/Error.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <unordered_set>
+
+// PairSettings::trackContacts, beside maps over the keys of contacts that brute force finds.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+
+using Vertices = std::set<std::uint32_t>;
+using Features = std::array<Vertices, 2>;
+constexpr Vertices::value_type kShape = kNoElement;
+
+struct Known {
+  Features features;
+  std::uint32_t age = 0;
+  std::uint64_t data = 0;
+  std::optional<ContactKey> predecessor{};
+};
+using Answer = std::map<ContactKey, Known>;
+
+/// The contacts of all lists, written out anew.
+Answer contactsOf(const CollisionData& data) {
+  Answer all;
+  const auto add = [&](const ContactKey& key, const Features& features) {
+    EXPECT_TRUE(all.emplace(key, Known{features}).second);
+  };
+  const auto corners = [](const Triangle& t) { return Vertices(t.begin(), t.end()); };
+  for (const auto& c : data.vertexTriangle())
+    add({ContactKind::VertexTriangle, {c.vertex, c.triangle, kNoElement, kNoElement}},
+        {Vertices{c.vertex}, corners(c.vertices)});
+  for (const auto& c : data.triangleVertex())
+    add({ContactKind::TriangleVertex, {c.triangle, c.vertex, kNoElement, kNoElement}},
+        {corners(c.vertices), Vertices{c.vertex}});
+  for (const auto& c : data.edgeEdge())
+    add({ContactKind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}},
+        {Vertices{c.edgeA[0], c.edgeA[1]}, Vertices{c.edgeB[0], c.edgeB[1]}});
+  for (const auto& c : data.shape())
+    add({ContactKind::Shape,
+         {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1], c.vertices[2]}},
+        {corners(c.vertices), Vertices{kShape}});
+  for (std::size_t i = 0; i < data.shapeShape().size(); ++i)
+    add({ContactKind::ShapeShape, {kNoElement, kNoElement, kNoElement, kNoElement}},
+        {Vertices{kShape}, Vertices{kShape}});
+  return all;
+}
+
+std::vector<TrackedContact> trackedOf(const CollisionData& data) {
+  std::vector<TrackedContact> all;
+  for (const auto list : {data.trackedVertexTriangle(), data.trackedTriangleVertex(),
+                          data.trackedEdgeEdge(), data.trackedShape(), data.trackedShapeShape()})
+    all.insert(all.end(), list.begin(), list.end());
+  return all;
+}
+
+std::size_t common(const Vertices& a, const Vertices& b) {
+  return static_cast<std::size_t>(
+      std::count_if(a.begin(), a.end(), [&](std::uint32_t v) { return b.contains(v); }));
+}
+
+/// The number of vertices in common, or 0 unless both features have one.
+std::size_t common(const Features& a, const Features& b, bool self) {
+  const auto inOrder = [&](int first) {
+    const std::size_t p = common(a[0], b[first]), q = common(a[1], b[1 - first]);
+    return p > 0 && q > 0 ? p + q : 0;
+  };
+  return std::max(inOrder(0), self ? inOrder(1) : 0);
+}
+
+class Oracle {
+ public:
+  explicit Oracle(bool self) : m_self(self) {}
+  std::size_t slides = 0, lasting = 0, ends = 0;
+
+  void detect(const CollisionData& data) {
+    Answer next = contactsOf(data);
+    m_ended = m_before;
+    std::vector<ContactKey> begun;
+    for (auto& [key, contact] : next) {
+      const auto found = m_before.find(key);
+      if (found == m_before.end() || found->second.features != contact.features) {
+        begun.push_back(key);
+        continue;
+      }
+      contact.age = found->second.age + 1;
+      contact.data = found->second.data;
+      m_ended.erase(key);
+      ++lasting;
+    }
+    std::set<std::tuple<int, ContactKey, ContactKey>> candidates;
+    for (const ContactKey& key : begun)
+      for (const auto& [before, ended] : m_ended)
+        if (const auto shared = common(next[key].features, ended.features, m_self))
+          candidates.insert({-static_cast<int>(shared), key, before});
+    for (const auto& [shared, key, before] : candidates) {
+      if (next[key].predecessor || !m_ended.contains(before)) continue;
+      next[key].predecessor = before;
+      next[key].age = m_ended[before].age + 1;
+      next[key].data = m_ended[before].data;
+      m_ended.erase(before);
+      ++slides;
+    }
+    for (const ContactKey& key : begun)
+      if (const auto now = m_now.find(key); m_detected && now != m_now.end())
+        next[key].data = now->second.data;
+    ends += m_ended.size();
+    m_now = next;
+    m_detected = true;
+  }
+  void advance() {
+    m_before = m_now;
+    m_detected = false;
+  }
+  void setUserData(const ContactKey& key, std::uint64_t data) {
+    m_now.at(key).data = data;
+    if (m_before.contains(key)) m_before[key].data = data;
+  }
+  void expect(const CollisionData& data) const {
+    const std::vector<TrackedContact> found = trackedOf(data);
+    ASSERT_EQ(found.size(), m_now.size());
+    auto expected = m_now.begin();
+    for (const TrackedContact& contact : found) {
+      EXPECT_EQ(contact.key, expected->first);
+      EXPECT_EQ(contact.age, expected->second.age);
+      EXPECT_EQ(contact.userData, expected->second.data);
+      EXPECT_EQ(contact.predecessor, expected->second.predecessor);
+      EXPECT_EQ(contact.end, ContactEnd::None);
+      ++expected;
+    }
+    ASSERT_EQ(data.ended().size(), m_ended.size());
+    auto ended = m_ended.begin();
+    for (const TrackedContact& contact : data.ended()) {
+      EXPECT_EQ(contact.key, ended->first);
+      EXPECT_EQ(contact.age, ended->second.age);
+      EXPECT_EQ(contact.userData, ended->second.data);
+      EXPECT_EQ(contact.end, ContactEnd::Apart);
+      ++ended;
+    }
+  }
+
+ private:
+  bool m_self, m_detected = false;
+  Answer m_before, m_now, m_ended;
+};
+
+/// Two bodies; the second slides over the first. Of a body with itself, both are the same.
+struct Scene {
+  std::string name;
+  std::function<std::array<GeometryId, 2>(OctreeBasedCD&)> add;
+  std::function<void(OctreeBasedCD&, const std::array<GeometryId, 2>&, double time)> move;
+  PairSettings settings;
+};
+
+std::vector<Scene> scenes() {
+  Random random(5);
+  const TestGeometry ball = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.3)),
+                     floor = testGeometry(sheet(9, 0.25, 0.4)),
+                     line = thread(random, 60, 0.15, 0.02, false),
+                     points = particles(random, 80, 0.03);
+  const auto moved = [](const Positions& positions, double t) {
+    Positions now = positions;
+    for (Vector3d& p : now)
+      p += Vector3d(0.03 * t, 0.02 * t, 0.01 * std::sin(t + 9 * p.x()) + 0.02 * std::sin(3 * t));
+    return now;
+  };
+  std::vector<Scene> all;
+  const auto meshes = [&](std::string name, const TestGeometry& a, const TestGeometry& b,
+                          PairSettings settings) {
+    const bool self = &a == &b;
+    all.push_back({std::move(name),
+                   [=](OctreeBasedCD& collisions) {
+                     const GeometryId first = a.addTo(collisions);
+                     return std::array{first, self ? first : b.addTo(collisions)};
+                   },
+                   [=](OctreeBasedCD& collisions, const auto& ids, double t) {
+                     Positions now = moved(b.positions, t);
+                     if (self)  // folds
+                       for (Vector3d& p : now) p.z() *= std::cos(7 * p.x() + 0.1 * t);
+                     collisions.setPositions(ids[1], now);
+                   },
+                   settings});
+  };
+  for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous})
+    for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+      const PairSettings settings{method, 0.05, contacts};
+      meshes("ball on floor", floor, ball, settings);
+      meshes("line on floor", floor, line, settings);
+      meshes("points on floor", points, floor, settings);
+      meshes("lines", line, line, settings);
+    }
+  meshes("floor with itself", floor, floor, {Method::Proximity, 0.1, Contacts::Distinct});
+  meshes("triangles", floor, ball, {Method::Intersection});
+  for (const bool shapeFirst : {false, true})
+    all.push_back({"shape",
+                   [=](OctreeBasedCD& collisions) {
+                     const GeometryId mesh = floor.addTo(collisions),
+                                      tool = collisions.addAnalyticalGeometry(
+                                          Capsule{{0.3, 0.4, 0.3}, {0.5, 0.4, 0.35}, 0.1});
+                     return shapeFirst ? std::array{tool, mesh} : std::array{mesh, tool};
+                   },
+                   [=](OctreeBasedCD& collisions, const auto& ids, double t) {
+                     collisions.setTransform(ids[shapeFirst ? 0 : 1],
+                                             {Eigen::Matrix3d::Identity(),
+                                              {0.05 * t, 0.02 * t, 0.04 * std::sin(3 * t)}});
+                   },
+                   {Method::Proximity, 0.02}});
+  all.push_back(
+      {"shapes",
+       [](OctreeBasedCD& collisions) {
+         return std::array{collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 0.3}),
+                           collisions.addAnalyticalGeometry(Sphere{{0.6, 0, 0}, 0.3})};
+       },
+       [](OctreeBasedCD& collisions, const auto& ids, double t) {
+         collisions.setTransform(ids[1], {Eigen::Matrix3d::Identity(), {0.05 * std::sin(t), 0, 0}});
+       },
+       {Method::Proximity, 0.01}});
+  const Mesh body = sphere(8, 12, {0.5, 0.5, 0.25}, 0.3);
+  const auto field = std::make_shared<const DistanceField>(DistanceField::build(
+      {body.positions, body.triangles}, {.errorBound = 0.01, .band = 0.3, .threads = 1}));
+  for (const bool fieldFirst : {false, true})
+    all.push_back({"field",
+                   [=](OctreeBasedCD& collisions) {
+                     const GeometryId mesh = floor.addTo(collisions),
+                                      other = collisions.addDistanceField(field);
+                     return fieldFirst ? std::array{other, mesh} : std::array{mesh, other};
+                   },
+                   [=](OctreeBasedCD& collisions, const auto& ids, double t) {
+                     collisions.setTransform(
+                         ids[fieldFirst ? 0 : 1],
+                         {Eigen::Matrix3d::Identity(), {0.05 * t, 0.02 * t, 0.3 * std::sin(t)}});
+                   },
+                   {Method::DistanceField, 0.02}});
+  return all;
+}
+
+/// Steps with several detections each, and some without, with user data that is set between them.
+TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
+  std::size_t slides = 0, lasting = 0, ends = 0;
+  std::set<std::string> sliding;
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(scene.name + " by " + toString(scene.settings.method));
+    std::vector<Settings> settings = octreeSettings();
+    settings.insert(settings.begin(), testing::settingsOf(Engine::BruteForce));
+    std::vector<OctreeBasedCD> all;
+    std::array<GeometryId, 2> ids{};
+    for (const Settings& each : settings) {
+      ids = scene.add(all.emplace_back(each));
+      PairSettings pair = scene.settings;
+      pair.trackContacts = true;
+      all.back().addCollisionPair(ids[0], ids[1], pair);
+    }
+    // The reference tracks nothing.
+    OctreeBasedCD reference(testing::settingsOf(Engine::BruteForce));
+    scene.add(reference);
+    reference.addCollisionPair(ids[0], ids[1], scene.settings);
+    Oracle oracle(ids[0] == ids[1]);
+    Random random(3);
+    for (int step = 0; step < 12; ++step) {
+      const int rounds = step == 5 ? 0 : 1 + step % 3;
+      for (int round = 0; round < rounds; ++round) {
+        const bool rests = step % 4 == 3;
+        if (!rests) scene.move(reference, ids, step + 0.3 * round);
+        reference.detectCollision();
+        const CollisionData& truth = reference.collisionData(ids[0], ids[1]);
+        oracle.detect(truth);
+        const Answer contacts = contactsOf(truth);
+        std::vector<std::pair<ContactKey, std::uint64_t>> data;
+        for (const auto& [key, contact] : contacts)
+          if (random() % 4 == 0) data.emplace_back(key, random());
+        for (OctreeBasedCD& each : all) {
+          if (!rests) scene.move(each, ids, step + 0.3 * round);
+          each.detectCollision();
+          EXPECT_EQ(each.collisionData(ids[0], ids[1]).hash(), truth.hash());
+          oracle.expect(each.collisionData(ids[0], ids[1]));
+          EXPECT_TRUE(truth.trackedVertexTriangle().empty() && truth.ended().empty());
+          for (const auto& [key, value] : data) each.setUserData(ids[0], ids[1], key, value);
+        }
+        for (const auto& [key, value] : data) oracle.setUserData(key, value);
+      }
+      if (rounds > 0) oracle.advance();
+      reference.advance();
+      for (OctreeBasedCD& each : all) each.advance();
+    }
+    if (oracle.slides > 0) sliding.insert(scene.name);
+    EXPECT_GT(oracle.lasting, 0u);
+    slides += oracle.slides, lasting += oracle.lasting, ends += oracle.ends;
+  }
+  EXPECT_GT(slides, 1000u);
+  EXPECT_GT(lasting, 10000u);
+  EXPECT_GT(ends, 1000u);
+  EXPECT_GE(sliding.size(), 7u);
+}
+
+/// A point over a floor, in contact with it when the step ended.
+struct Reasons : ::testing::Test {
+  Mesh floor = sheet(6, 0, 0);
+  Positions tool{{0.45, 0.4, 0.05}};
+  OctreeBasedCD collisions;
+  GeometryId a = testing::addMesh(collisions, floor), b = collisions.addPointSet(tool);
+
+  void SetUp() override {
+    for (Vector3d& p : floor.positions) p.z() = 0;
+    collisions.setPositions(a, floor.positions, floor.positions);
+    collisions.addCollisionPair(
+        a, b, {.method = Method::Proximity, .thickness = 0.1, .trackContacts = true});
+    collisions.detectCollision();
+    ASSERT_EQ(data().triangleVertex().size(), 1u);
+    EXPECT_EQ(data().trackedTriangleVertex()[0].age, 0u);
+    collisions.advance();
+  }
+  const CollisionData& data() { return collisions.collisionData(a, b); }
+  void expectEnd(ContactEnd end, OctreeBasedCD& object) {
+    object.detectCollision();
+    const CollisionData& found = object.collisionData(a, b);
+    ASSERT_EQ(found.ended().size(), 1u);
+    EXPECT_EQ(found.ended()[0].end, end);
+    EXPECT_EQ(found.ended()[0].key.kind, ContactKind::TriangleVertex);
+    object.detectCollision();
+    EXPECT_EQ(object.collisionData(a, b).ended().size(), 1u);
+    object.advance();
+    object.detectCollision();
+    EXPECT_TRUE(object.collisionData(a, b).ended().empty());
+  }
+  void moveTool(const Vector3d& by) {
+    tool[0] += by;
+    collisions.setPositions(b, tool);
+  }
+};
+
+TEST_F(Reasons, Apart) {
+  moveTool({0, 0, 1});
+  expectEnd(ContactEnd::Apart, collisions);
+}
+
+TEST_F(Reasons, Disabled) {
+  const std::vector<std::uint32_t> only{0};
+  collisions.setDisabledElements(b, only);
+  expectEnd(ContactEnd::Disabled, collisions);
+}
+
+TEST_F(Reasons, Groups) {
+  collisions.setCollisionFilter(b, {.groups = 2, .mask = 2});
+  expectEnd(ContactEnd::Filtered, collisions);
+}
+
+TEST_F(Reasons, Predicate) {
+  collisions.setContactPredicate(a, b, [](const ContactFeatures&) { return false; });
+  expectEnd(ContactEnd::Filtered, collisions);
+}
+
+/// A cut keeps contacts of triangles that stay, and ends those of triangles that go.
+TEST_F(Reasons, Cut) {
+  const std::uint32_t touched = data().triangleVertex()[0].triangle;
+  std::vector<Triangle> triangles = floor.triangles;
+  std::vector<Triangle> without = triangles;
+  const std::uint32_t other = touched == 0 ? 1 : 0;
+  without[other] = {0, 0, 0};
+  collisions.setTriangles(a, floor.positions, without);
+  collisions.detectCollision();
+  ASSERT_EQ(data().trackedTriangleVertex().size(), 1u);
+  EXPECT_EQ(data().trackedTriangleVertex()[0].age, 1u);
+  collisions.advance();
+  without[touched] = {0, 0, 0};
+  collisions.setTriangles(a, floor.positions, without);
+  moveTool({0, 0, 0.5});
+  expectEnd(ContactEnd::Cut, collisions);
+}
+
+/// A vertex slides over the edges of a mesh and keeps one contact.
+TEST_F(Reasons, SlidingLastsAsOneContact) {
+  collisions.detectCollision();
+  std::set<ContactKey> keys;
+  ContactKey last = data().trackedTriangleVertex()[0].key;
+  collisions.setUserData(a, b, last, 17);
+  for (std::uint32_t step = 2; step < 12; ++step) {
+    collisions.advance();
+    moveTool({0.03, 0.01, 0});
+    collisions.detectCollision();
+    ASSERT_EQ(data().trackedTriangleVertex().size(), 1u);
+    const TrackedContact contact = data().trackedTriangleVertex()[0];
+    EXPECT_EQ(contact.age, step);
+    EXPECT_EQ(contact.userData, 17u);
+    EXPECT_TRUE(data().ended().empty());
+    EXPECT_EQ(contact.predecessor, contact.key == last ? std::nullopt : std::optional(last));
+    keys.insert(last = contact.key);
+  }
+  EXPECT_GE(keys.size(), 3u);
+}
+
+TEST_F(Reasons, NoPairWithoutTheSetting) {
+  collisions.setPairSettings(a, b, {.method = Method::Proximity, .thickness = 0.1});
+  collisions.detectCollision();
+  EXPECT_TRUE(data().trackedTriangleVertex().empty() && data().ended().empty());
+  const ContactKey key{ContactKind::TriangleVertex, {0, 0, kNoElement, kNoElement}};
+  expectRefused(ErrorCode::NotAvailable, "trackContacts is not set",
+                [&] { collisions.setUserData(a, b, key, 1); });
+}
+
+TEST_F(Reasons, ErrorsNameThePair) {
+  const ContactKey key{ContactKind::TriangleVertex, {0, 1, kNoElement, kNoElement}};
+  expectRefused(ErrorCode::NotAvailable, "no contact with this key",
+                [&] { collisions.setUserData(a, b, key, 1); });
+  expectRefused(ErrorCode::UnsupportedMethod, "earliestTimeOnly reports none", [&] {
+    collisions.setPairSettings(a, b,
+                               {.method = Method::Continuous,
+                                .trackContacts = true,
+                                .continuous = {.earliestTimeOnly = true}});
+  });
+}
+
+TEST(ContactKey, HashesAndCompares) {
+  std::unordered_set<ContactKey> keys;
+  std::set<std::size_t> hashes;
+  for (std::uint32_t i = 0; i < 20; ++i)
+    for (std::uint32_t j = 0; j < 20; ++j)
+      for (const auto kind : {ContactKind::VertexTriangle, ContactKind::TriangleVertex}) {
+        const ContactKey key{kind, {i, j, kNoElement, kNoElement}};
+        EXPECT_TRUE(keys.insert(key).second);
+        EXPECT_FALSE(keys.insert(key).second);
+        hashes.insert(std::hash<ContactKey>()(key));
+      }
+  EXPECT_EQ(hashes.size(), 800u);
+  EXPECT_LT((ContactKey{ContactKind::VertexTriangle, {1, 2, 0, 0}}),
+            (ContactKey{ContactKind::VertexTriangle, {1, 3, 0, 0}}));
+}
+
+}  // namespace
+}  // namespace palpate

@@ -1,0 +1,141 @@
+// findPassages() against rational arithmetic.
+#include "Common/PublishedQueries.h"
+#include "ImpactCheck.h"
+
+#include <gtest/gtest.h>
+
+namespace palpate {
+
+namespace {
+
+/// Returns the number of passages.
+std::size_t expectPassages(const ImpactCase& query) {
+  auto truth = impact::Query(query.edges, query.positions).passages();
+  const Passages found = findPassages(query.query());
+  EXPECT_EQ(static_cast<std::size_t>(found.count), truth.size()) << text(query);
+  if (static_cast<std::size_t>(found.count) != truth.size()) return 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const auto& [time, forward] = found.all[i];
+    EXPECT_EQ(forward, truth[i].forward) << text(query);
+    EXPECT_GE(truth[i].time.compare(time), 0) << time << ", " << text(query);
+    EXPECT_LE(truth[i].time.compare(impact::Rational(time) + impact::Rational(0x1p-50)), 0)
+        << time << ", " << text(query);
+  }
+  return truth.size();
+}
+
+/// By how often the first feature passes forward more than back.
+int netOf(const ImpactCase& query) {
+  const Passages found = findPassages(query.query());
+  int net = 0;
+  for (int i = 0; i < found.count; ++i)
+    net += found.all[static_cast<std::size_t>(i)].forward ? 1 : -1;
+  return net;
+}
+
+TEST(Passages, AgreeWithTheOracleOnHardCases) {
+  HardCases cases(11);
+  std::array<std::size_t, 4> byCount{};
+  for (int kind = 0; kind < static_cast<int>(ImpactKind::Count); ++kind)
+    for (int i = 0; i < 300; ++i) {
+      const ImpactCase query = cases.next(static_cast<ImpactKind>(kind));
+      ++byCount[expectPassages(query)];
+      if (::testing::Test::HasFailure()) return;
+    }
+  EXPECT_GT(byCount[1], 300u);
+  EXPECT_GT(byCount[2], 10u);
+}
+
+/// Most cases touch at borders, several times, or at an end.
+TEST(Passages, AgreeWithTheOracleOnSmallGrids) {
+  test::Random random(3);
+  std::array<std::size_t, 4> byCount{};
+  for (int i = 0; i < 20000; ++i) {
+    const ImpactCase query = randomGridCase(random, i % 2 == 0, 1 + i % 3);
+    ++byCount[expectPassages(query)];
+    if (::testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(byCount[1], 1000u);
+  EXPECT_GT(byCount[2], 30u);
+  EXPECT_GT(byCount[3], 0u);
+}
+
+TEST(Passages, AgreeWithTheOracleOnPublishedQueries) {
+  const auto published = testing::publishedQueries(PALPATE_SHARED_DATA);
+  if (published.empty()) GTEST_SKIP() << "no ccd-queries in PALPATE_SHARED_DATA";
+  std::size_t passages = 0;
+  for (const auto& set : published)
+    for (std::size_t i = 0; i < set.queries.size(); ++i) {
+      SCOPED_TRACE(set.name + ", query " + std::to_string(i));
+      passages += expectPassages({set.edges, set.queries[i].positions});
+      if (!set.queries[i].impact) {
+        EXPECT_EQ(findPassages(ImpactCase{set.edges, set.queries[i].positions}.query()).count, 0);
+      }
+    }
+  EXPECT_GT(passages, 100u);
+}
+
+/// A vertex that keeps clear of the triangle's border passes as often as its side changes, over
+/// all steps. It starts and stops in the triangle's plane.
+TEST(Passages, NoneIsLostBetweenSteps) {
+  test::Random random(5);
+  for (const bool edges : {false, true}) {
+    int side = 1, sum = 0, zeros = 0, changes = 0;
+    double height = 1.0;
+    for (int step = 0; step < 2000; ++step) {
+      const double next = random.below(5) - 2;
+      ImpactCase query{edges, {}};
+      if (edges)
+        query.positions = {Eigen::Vector3d{-8, 0, height},
+                           {8, 0, height},
+                           {0, -8, 0},
+                           {0, 8, 0},
+                           {-8, 0, next},
+                           {8, 0, next},
+                           {0, -8, 0},
+                           {0, 8, 0}};
+      else
+        query.positions = {Eigen::Vector3d{1, 1, height},
+                           {0, 0, 0},
+                           {4, 0, 0},
+                           {0, 4, 0},
+                           {1, 1, next},
+                           {0, 0, 0},
+                           {4, 0, 0},
+                           {0, 4, 0}};
+      const int net = netOf(query);
+      sum += net;
+      changes += net != 0;
+      zeros += next == 0;
+      height = next;
+      side = next < 0 ? -1 : 1;
+      ASSERT_EQ(sum, side > 0 ? 0 : -1);
+    }
+    EXPECT_GT(zeros, 100);
+    EXPECT_GT(changes, 100);
+  }
+}
+
+/// The first feature comes from the other side.
+TEST(Passages, ReversedStepsPassBack) {
+  HardCases cases(4);
+  std::size_t passages = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const ImpactCase query = cases.next(ImpactKind::FullDoubles);
+    const Passages there = findPassages(query.query()),
+                   back = findPassages(query.reversed().query());
+    ASSERT_EQ(there.count, back.count);
+    for (int k = 0; k < there.count; ++k) {
+      const auto &p = there.all[static_cast<std::size_t>(k)],
+                 &q = back.all[static_cast<std::size_t>(there.count - 1 - k)];
+      EXPECT_NE(p.forward, q.forward);
+      EXPECT_NEAR(p.time, 1.0 - q.time, 1e-14);
+      ++passages;
+    }
+  }
+  EXPECT_GT(passages, 100u);
+}
+
+}  // namespace
+
+}  // namespace palpate
