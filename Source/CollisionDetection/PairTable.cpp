@@ -69,7 +69,8 @@ void PairRecord::track(std::uint64_t step) {
   } else if (collides() || tracker->hadContacts()) {
     Contents& contents = Contents::of(next);
     contents.tracked.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
-    tracker->track(meshes(), collides(), Contents::of(data), contents);
+    tracker->track(meshes(), collides(), {a->body.revisions.elements, b->body.revisions.elements},
+                   Contents::of(data), contents);
   }
 }
 

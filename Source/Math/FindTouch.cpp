@@ -1,4 +1,4 @@
-// Part of Math/ImpactQuery.h: findTouch().
+// Part of Math/ImpactQuery.h: findTouch(), findPassages().
 #include "Math/ImpactQuery.h"
 #include "Math/RelativeMotion.h"
 #include "Math/Tolerances.h"
@@ -68,6 +68,7 @@ class ImpactSearch {
 
   /// None if floating point could not decide.
   std::optional<ImpactResult> run(double upTo);
+  std::optional<Passages> passages();
 
  private:
   enum class Verdict { Inside, Outside, Unknown };
@@ -153,6 +154,26 @@ typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::classify(const Interval
   }
 }
 
+/// Passages where the volume certainly changes its sign once at most. None if floating point cannot
+/// decide them.
+template <Kind kind>
+std::optional<Passages> ImpactSearch<kind>::passages() {
+  if (!(m_largest.maxCoeff() <= kLargestImpactDifference)) return {};
+  const Coplanarity cubic = coplanarity(m_motion);
+  if (certainSign(cubic.coefficients, cubic.error) != 0) return Passages{};
+  m_cubic = cubic.coefficients;
+  m_error = cubic.error + kBlossomError * largestMagnitude(m_cubic);
+  const int signAfter = signAfterOnlyRoot(m_cubic, m_error);
+  if (signAfter == 0) return {};
+  const std::optional<Interval> bracket = bracketRoot({0.0, 1.0}, signAfter);
+  if (!bracket) return {};
+  const Verdict verdict = classify(*bracket);
+  if (verdict == Verdict::Unknown) return {};
+  Passages found;
+  if (verdict == Verdict::Inside) found.all[found.count++] = {bracket->low, signAfter > 0};
+  return found;
+}
+
 template <Kind kind>
 std::optional<ImpactResult> ImpactSearch<kind>::run(double upTo) {
   if (!(m_largest.maxCoeff() <= kLargestImpactDifference)) return {};
@@ -211,7 +232,24 @@ ImpactResult find(const ImpactQuery& query, double tolerance, double upTo) {
   return result ? *result : findTouchExactly(query, tolerance);
 }
 
+template <Kind kind>
+Passages findPassagesOf(const ImpactQuery& query, double tolerance) {
+  const RelativeMotion<kind> motion(query);
+  if (motion.boxesSeparate()) return {};
+  if (const auto found = ImpactSearch<kind>(motion, tolerance).passages()) return *found;
+  // Only features that touch can pass.
+  const ImpactResult touch = find<kind>(query, tolerance, 1.0);
+  if (touch.impact) return findPassagesExactly(query, tolerance);
+  return {{}, 0, touch.exact};
+}
+
 }  // namespace
+
+Passages findPassages(const ImpactQuery& query, double tolerance) {
+  PALPATE_ASSERT(tolerance >= kSmallestTimeTolerance && tolerance <= 1.0);
+  return query.kind == Kind::VertexTriangle ? findPassagesOf<Kind::VertexTriangle>(query, tolerance)
+                                            : findPassagesOf<Kind::EdgeEdge>(query, tolerance);
+}
 
 ImpactResult findTouch(const ImpactQuery& query, double tolerance, double upTo) {
   PALPATE_ASSERT(tolerance >= kSmallestTimeTolerance && tolerance <= 1.0);

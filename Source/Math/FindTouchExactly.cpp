@@ -1,6 +1,5 @@
-// Part of Math/ImpactQuery.h: findTouchExactly(), findPassages().
+// Part of Math/ImpactQuery.h: findTouchExactly(), findPassagesExactly().
 #include "Math/ImpactQuery.h"
-#include "Math/Tolerances.h"
 #include "Exact/AlgebraicTime.h"
 #include "Core/Assert.h"
 
@@ -116,7 +115,7 @@ class ExactQuery {
  public:
   explicit ExactQuery(const ImpactQuery& query);
   std::optional<double> firstTouch(double tolerance) const;
-  Passages passages() const;
+  Passages passages(double tolerance) const;
 
  private:
   Form<3> coplanarity() const;
@@ -215,7 +214,7 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
 
 /// The volume A x B · C is positive or negative between its roots. Simple roots change its sign. It
 /// has one multiple root at most, and its signs at both ends tell whether that changes it.
-Passages ExactQuery::passages() const {
+Passages ExactQuery::passages(double tolerance) const {
   Passages found;
   const Form<3> volume = coplanarity();
   if (isZero(volume)) return found;
@@ -238,7 +237,7 @@ Passages ExactQuery::passages() const {
     sign = -sign;
     if (!touchAt(root)) return false;
     if constexpr (isSimple)
-      add(root.timeLowerBound(kSmallestTimeTolerance), sign > 0);
+      add(root.timeLowerBound(tolerance), sign > 0);
     else
       add(root.timeLowerBound(), sign > 0);
     return false;
@@ -250,11 +249,10 @@ Passages ExactQuery::passages() const {
 
 }  // namespace
 
-Passages findPassages(const ImpactQuery& query) {
-  const ImpactResult touch = findTouch(query, 1.0);
-  Passages found;
-  if (touch.impact) found = ExactQuery(query).passages();
-  found.exact = touch.impact || touch.exact;
+Passages findPassagesExactly(const ImpactQuery& query, double tolerance) {
+  PALPATE_ASSERT(tolerance > 0.0);
+  Passages found = ExactQuery(query).passages(tolerance);
+  found.exact = true;
   return found;
 }
 

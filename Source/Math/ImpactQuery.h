@@ -65,14 +65,16 @@ ImpactResult findApproach(const ImpactQuery&, double distance, double tolerance,
 /// The moments at which features pass through each other (Crossing in palpate/Tracking.h).
 struct Passages {
   struct Passage {
-    double time;   ///< at most 2^-50 before the exact time, never after it
+    double time;   ///< at most the tolerance before the exact time, never after it
     bool forward;  ///< A x B · C becomes positive
   };
   std::array<Passage, 3> all{};  ///< ascending; a cubic has no more roots
   int count = 0;
   bool exact = false;  ///< floating point could not decide
 };
-Passages findPassages(const ImpactQuery&);
+Passages findPassages(const ImpactQuery&, double tolerance);
+/// The same by exact arithmetic alone.
+Passages findPassagesExactly(const ImpactQuery&, double tolerance);
 
 /// The side of the contact plane on which the first feature last was before the time. 1: the side
 /// of A x B, towards which C points; this is the triangle's winding normal, or (p1 - p0) x (q0 -

@@ -184,7 +184,7 @@ class ContactFinder {
   template <Kind kind>
   void addPassages(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
                    bool swapped, const ImpactQuery& query) {
-    const Passages passages = findPassages(query);
+    const Passages passages = findPassages(query, m_settings.timeTolerance);
     m_out.exactDecisions += passages.exact;
     if (passages.count == 0) return;
     Crossing crossing;

@@ -4,6 +4,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <bit>
 #include <type_traits>
 #include <utility>
 
@@ -23,6 +24,17 @@ void forEachTracked(Contents& contents, F&& f) {
 }
 
 bool precedes(const TrackedContact& contact, const ContactKey& key) { return contact.key < key; }
+
+/// Comparison of few numbers without a call, as most contacts last.
+template <std::size_t N>
+bool areSame(const std::array<std::uint32_t, N>& a, const std::array<std::uint32_t, N>& b) {
+  std::uint32_t difference = 0;
+  for (std::size_t i = 0; i < N; ++i) difference |= a[i] ^ b[i];
+  return difference == 0;
+}
+bool areSame(const ContactKey& a, const ContactKey& b) {
+  return a.kind == b.kind && areSame(a.ids, b.ids);
+}
 
 /// Number of vertices that two features have in common.
 int sharedVertices(const Triangle& a, const Triangle& b) {
@@ -77,32 +89,47 @@ ContactKey ContactTracker::keyOf(ContactKind kind, const Contact& contact) {
 }
 
 template <class Contact>
-ContactTracker::Vertices ContactTracker::verticesOf(ContactKind kind, const Contact& contact) {
+Triangle ContactTracker::cornersOf(const Contact& contact) {
+  if constexpr (requires { contact.vertices; })
+    return contact.vertices;
+  else
+    return {};
+}
+
+ContactTracker::Vertices ContactTracker::verticesOf(const ContactKey& key,
+                                                    const Triangle& corners) {
   constexpr Triangle kNone{kNoElement, kNoElement, kNoElement};
-  if constexpr (std::is_same_v<Contact, VertexTriangleContact>) {
-    const Triangle vertex{contact.vertex, contact.vertex, contact.vertex};
-    if (kind == ContactKind::TriangleVertex) return {contact.vertices, vertex};
-    return {vertex, contact.vertices};
-  } else if constexpr (std::is_same_v<Contact, EdgeEdgeContact>) {
-    const Segment &a = contact.edgeA, &b = contact.edgeB;
-    return {{{a[0], a[1], a[1]}, {b[0], b[1], b[1]}}};
-  } else if constexpr (std::is_same_v<Contact, ShapeContact>) {
-    return {contact.vertices, kNone};
-  } else {
-    return {kNone, kNone};
+  const auto& ids = key.ids;
+  switch (key.kind) {
+    case ContactKind::VertexTriangle:
+      return {{{ids[0], ids[0], ids[0]}, corners}};
+    case ContactKind::TriangleVertex:
+      return {{corners, {ids[1], ids[1], ids[1]}}};
+    case ContactKind::EdgeEdge:
+      return {{{ids[0], ids[1], ids[1]}, {ids[2], ids[3], ids[3]}}};
+    case ContactKind::Shape:
+      return {corners, kNone};
+    case ContactKind::ShapeShape:
+      break;
   }
+  return {kNone, kNone};
 }
 
 bool ContactTracker::startStep(std::uint64_t step, const Contents& last) {
   if (m_step == step) return false;
   m_step = kNoStep;
   m_before.clear();
-  forEachTracked(last, [&](ContactKind kind, const auto& contacts, const auto& tracked) {
+  forEachTracked(last, [&](ContactKind, const auto& contacts, const auto& tracked) {
     PALPATE_ASSERT(tracked.empty() || tracked.size() == contacts.size());
+    const std::size_t first = m_before.size();
+    m_before.resize(first + tracked.size());
     for (std::size_t i = 0; i < tracked.size(); ++i)
-      m_before.push_back({tracked[i], verticesOf(kind, contacts[i]), false});
+      m_before[first + i] = {tracked[i].key, cornersOf(contacts[i]), tracked[i].age, false,
+                             tracked[i].userData};
   });
   m_beforeOfSecond = last.tracked.elementsOfSecond;
+  m_elementsBefore = m_elements;
+  m_repeats = false;
   m_step = step;
   return true;
 }
@@ -116,66 +143,87 @@ void ContactTracker::match(Contents& next) {
     tracked.resize(contacts.size());
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const ContactKey key = keyOf(kind, contacts[i]);
+      const Triangle corners = cornersOf(contacts[i]);
       PALPATE_ASSERT(i == 0 || tracked[i - 1].key < key);
-      const Vertices vertices = verticesOf(kind, contacts[i]);
-      for (; before != end && before->contact.key < key; ++before) m_ended.push_back(before);
-      tracked[i] = {};
-      tracked[i].key = key;
-      if (before == end || before->contact.key != key || before->vertices != vertices) {
-        m_begun.push_back({&tracked[i], vertices});
-        continue;
+      while (before != end && !areSame(before->key, key) && before->key < key)
+        m_ended.push_back(before++);
+      if (before != end && areSame(before->key, key) && areSame(before->corners, corners)) {
+        tracked[i] = {key, {}, before->age + 1, before->userData, ContactEnd::None};
+        ++before;
+      } else {
+        tracked[i] = {key, {}, 0, 0, ContactEnd::None};
+        m_begun.push_back({&tracked[i], corners, 0});
       }
-      tracked[i].age = before->contact.age + 1;
-      tracked[i].userData = before->contact.userData;
-      ++before;
     }
   });
   for (; before != end; ++before) m_ended.push_back(before);
 }
 
-/// Names the predecessors of contacts that began: of all pairs of one that ended and one that began
-/// whose features have common vertices on both sides, those with the most such vertices first, then
-/// the lowest keys. Each contact is in one such pair at most.
-void ContactTracker::findSlides(bool self) {
-  for (Entry* entry : m_ended) entry->isPredecessor = false;
-  if (m_begun.empty() || m_ended.empty()) return;
-  m_vertices.clear();
-  for (std::uint32_t i = 0; i < m_ended.size(); ++i)
+/// Links the vertices of contacts that ended: those of the first geometry, with self of both sides.
+void ContactTracker::linkVertices(bool self) {
+  constexpr std::uint32_t kNone = 0xffffffffu;
+  m_links.clear();
+  m_heads.assign(std::bit_ceil(4 * m_ended.size()), kNone);
+  for (std::uint32_t i = 0; i < m_ended.size(); ++i) {
+    const Vertices vertices = verticesOf(m_ended[i]->key, m_ended[i]->corners);
     for (int side = 0; side < (self ? 2 : 1); ++side)
-      for (const std::uint32_t v : m_ended[i]->vertices[side]) m_vertices.push_back({v, i});
-  std::sort(m_vertices.begin(), m_vertices.end());
-  m_vertices.erase(std::unique(m_vertices.begin(), m_vertices.end()), m_vertices.end());
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t vertex = vertices[side][k];
+        if (k > 0 && vertex == vertices[side][k - 1]) continue;
+        std::uint32_t& head = m_heads[vertex & (m_heads.size() - 1)];
+        m_links.push_back(
+            {vertex, i, std::exchange(head, static_cast<std::uint32_t>(m_links.size()))});
+      }
+  }
+}
+
+/// Lists for each contact that began those that ended and have common vertices with it on both
+/// sides.
+void ContactTracker::findSlides(bool self) {
   m_slides.clear();
-  for (std::uint32_t i = 0; i < m_begun.size(); ++i) {
-    const Vertices& now = m_begun[i].vertices;
+  for (Begun& begun : m_begun) {
+    begun.firstSlide = m_slides.size();
+    const Vertices now = verticesOf(begun.contact->key, begun.corners);
     for (int k = 0; k < 3; ++k) {
-      if (k > 0 && now[0][k] == now[0][k - 1]) continue;
-      auto at = std::lower_bound(m_vertices.begin(), m_vertices.end(), VertexOf{now[0][k], 0});
-      for (; at != m_vertices.end() && at->vertex == now[0][k]; ++at) {
-        const Vertices& before = m_ended[at->entry]->vertices;
+      const std::uint32_t vertex = now[0][k];
+      if (k > 0 && vertex == now[0][k - 1]) continue;
+      std::uint32_t link = m_heads[vertex & (m_heads.size() - 1)];
+      for (; link < m_links.size(); link = m_links[link].next) {
+        if (m_links[link].vertex != vertex) continue;
+        const Entry& entry = *m_ended[m_links[link].entry];
+        const Vertices before = verticesOf(entry.key, entry.corners);
         const auto shared = [&](int first) {
           const int a = sharedVertices(now[0], before[first]),
                     b = sharedVertices(now[1], before[1 - first]);
           return a > 0 && b > 0 ? a + b : 0;
         };
         const int most = std::max(shared(0), self ? shared(1) : 0);
-        if (most > 0) m_slides.push_back({most, i, at->entry});
+        if (most > 0) m_slides.push_back({m_links[link].entry, most});
       }
     }
   }
-  std::sort(m_slides.begin(), m_slides.end(), [](const Slide& l, const Slide& r) {
-    if (l.shared != r.shared) return l.shared > r.shared;
-    return l.begun != r.begun ? l.begun < r.begun : l.entry < r.entry;
-  });
-  for (const Slide& slide : m_slides) {
-    TrackedContact& contact = *m_begun[slide.begun].contact;
-    Entry& entry = *m_ended[slide.entry];
-    if (contact.predecessor || entry.isPredecessor) continue;
-    entry.isPredecessor = true;
-    contact.predecessor = entry.contact.key;
-    contact.age = entry.contact.age + 1;
-    contact.userData = entry.contact.userData;
-  }
+}
+
+/// Of all pairs of a contact that ended and one that began, takes those with the most common
+/// vertices first, then those with the lowest keys. Each contact is in one such pair at most.
+void ContactTracker::takePredecessors() {
+  constexpr int kMostShared = 6;
+  for (int shared = kMostShared; shared >= 2; --shared)
+    for (std::size_t i = 0; i < m_begun.size(); ++i) {
+      TrackedContact& contact = *m_begun[i].contact;
+      if (contact.predecessor) continue;
+      const std::size_t end = i + 1 < m_begun.size() ? m_begun[i + 1].firstSlide : m_slides.size();
+      std::size_t lowest = m_ended.size();
+      for (std::size_t s = m_begun[i].firstSlide; s < end; ++s)
+        if (m_slides[s].shared == shared && !m_ended[m_slides[s].entry]->isPredecessor)
+          lowest = std::min<std::size_t>(lowest, m_slides[s].entry);
+      if (lowest == m_ended.size()) continue;
+      Entry& entry = *m_ended[lowest];
+      entry.isPredecessor = true;
+      contact.predecessor = entry.key;
+      contact.age = entry.age + 1;
+      contact.userData = entry.userData;
+    }
 }
 
 /// Contacts that began in this step keep what an earlier detection of it was given for them.
@@ -187,24 +235,23 @@ void ContactTracker::takeUserData(const Contents& last) {
       const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
       if (found == tracked.end() || found->key != key) return;
       const auto& contact = contacts[static_cast<std::size_t>(found - tracked.begin())];
-      if (verticesOf(kind, contact) == begun.vertices) begun.contact->userData = found->userData;
+      if (cornersOf(contact) == begun.corners) begun.contact->userData = found->userData;
     });
 }
 
 ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Entry& entry) const {
-  const auto& [kind, ids] = entry.contact.key;
-  const auto& [ofA, ofB] = entry.vertices;
+  const auto& [kind, ids] = entry.key;
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
   ContactEnd end = ContactEnd::None;
   bool filtered = !collides;
   switch (kind) {
     case ContactKind::VertexTriangle:
-      end = firstOf(endOfVertex(a, ids[0]), endOfElement(b, ids[1], ofB));
+      end = firstOf(endOfVertex(a, ids[0]), endOfElement(b, ids[1], entry.corners));
       if (end == ContactEnd::None)
         filtered = filtered || rejectsVertex(pair, ids[0], ids[1], false);
       break;
     case ContactKind::TriangleVertex:
-      end = firstOf(endOfElement(a, ids[0], ofA), endOfVertex(b, ids[1]));
+      end = firstOf(endOfElement(a, ids[0], entry.corners), endOfVertex(b, ids[1]));
       if (end == ContactEnd::None) filtered = filtered || rejectsVertex(pair, ids[1], ids[0], true);
       break;
     case ContactKind::EdgeEdge: {
@@ -224,7 +271,7 @@ ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Entr
           end = endOfEdge(mesh, {ids[1], ids[2]});
           break;
         case ShapeElement::Face:
-          end = endOfElement(mesh, ids[1], ofA);
+          end = endOfElement(mesh, ids[1], entry.corners);
           break;
       }
       break;
@@ -236,18 +283,27 @@ ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Entr
   return filtered ? ContactEnd::Filtered : ContactEnd::Apart;
 }
 
-void ContactTracker::track(const MeshPair& pair, bool collides, const Contents& last,
+void ContactTracker::track(const MeshPair& pair, bool collides,
+                           const std::array<ElementsState, 2>& elements, const Contents& last,
                            Contents& next) {
   PALPATE_ASSERT(m_step != kNoStep);
   m_keeps = false;
+  m_elements = elements;
   match(next);
-  findSlides(pair.self());
-  takeUserData(last);
+  for (Entry* entry : m_ended) entry->isPredecessor = false;
+  if (!m_begun.empty() && !m_ended.empty()) {
+    linkVertices(pair.self());
+    findSlides(pair.self());
+    takePredecessors();
+  }
+  if (std::exchange(m_repeats, true)) takeUserData(last);
   next.tracked.ended.clear();
+  const bool hasReasons =
+      !collides || pair.predicate || pair.nearAtRest || m_elementsBefore != elements;
   for (const Entry* entry : m_ended) {
     if (entry->isPredecessor) continue;
-    next.tracked.ended.push_back(entry->contact);
-    next.tracked.ended.back().end = endOf(pair, collides, *entry);
+    const ContactEnd end = hasReasons ? endOf(pair, collides, *entry) : ContactEnd::Apart;
+    next.tracked.ended.push_back({entry->key, {}, entry->age, entry->userData, end});
   }
 }
 
@@ -257,7 +313,7 @@ void ContactTracker::commit(Contents& kept) noexcept {
   forEachTracked(kept, [&](ContactKind, const auto&, auto& tracked) {
     for (TrackedContact& contact : tracked) {
       contact.predecessor.reset();
-      contact.age = before++->contact.age + 1;
+      contact.age = before++->age + 1;
     }
   });
   PALPATE_ASSERT(before == m_before.data() + m_before.size());
@@ -270,27 +326,26 @@ void ContactTracker::releaseMemory(Contents& contents) {
   releaseSpare(m_before);
   m_ended = {};
   m_begun = {};
-  m_vertices = {};
+  m_heads = {};
+  m_links = {};
   m_slides = {};
 }
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {
   bool isFound = false;
-  const auto set = [&](TrackedContact* contact) {
-    contact->userData = data;
-    isFound = true;
-  };
   forEachTracked(contents, [&](ContactKind kind, const auto&, auto& tracked) {
     if (kind != key.kind) return;
     const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
-    if (found != tracked.end() && found->key == key) set(&*found);
+    if (found == tracked.end() || found->key != key) return;
+    found->userData = data;
+    isFound = true;
   });
   if (!isFound) return false;
   // Detections of this step that are repeated read it here.
   const auto found =
       std::lower_bound(m_before.begin(), m_before.end(), key,
-                       [](const Entry& e, const ContactKey& k) { return e.contact.key < k; });
-  if (found != m_before.end() && found->contact.key == key) set(&found->contact);
+                       [](const Entry& e, const ContactKey& k) { return e.key < k; });
+  if (found != m_before.end() && found->key == key) found->userData = data;
   return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Mesh/Revision.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
 
@@ -27,8 +28,9 @@ class ContactTracker : public CountedObject {
   bool hadContacts() const { return !m_before.empty(); }  ///< at the last advance()
 
   /// Writes Contents::tracked of an answer in this step. last: of the last detection, maybe in this
-  /// step. collides: false if groups exclude the pair.
-  void track(const MeshPair&, bool collides, const Contents& last, Contents& next);
+  /// step. collides: false if groups exclude the pair. elements: of the pair's geometries.
+  void track(const MeshPair&, bool collides, const std::array<ElementsState, 2>& elements,
+             const Contents& last, Contents& next);
   /// An answer that needs no detection lasts into this step. Call commit() then.
   void keep() { m_keeps = true; }
   void commit(Contents& kept) noexcept;
@@ -43,42 +45,50 @@ class ContactTracker : public CountedObject {
   /// shape, has kNoElement.
   using Vertices = std::array<std::array<std::uint32_t, 3>, 2>;
   struct Entry {
-    TrackedContact contact;
-    Vertices vertices;
+    ContactKey key;
+    Triangle corners;  ///< of the element that key does not describe; else 0
+    std::uint32_t age;
     bool isPredecessor;  ///< of a contact of the answer at hand
+    std::uint64_t userData;
   };
   /// A contact that began.
   struct Begun {
     TrackedContact* contact;
-    Vertices vertices;
+    Triangle corners;
+    std::size_t firstSlide;
   };
-  struct VertexOf {
-    std::uint32_t vertex, entry;  ///< entry: by its index in m_ended
-    auto operator<=>(const VertexOf&) const = default;
+  /// Vertices of m_ended, in lists by the vertex modulo the number of lists.
+  struct VertexLink {
+    std::uint32_t vertex, entry, next;
   };
-  /// begun, entry: by their indices in m_begun and m_ended.
+  /// A contact that ended and has `shared` vertices in common with one that began.
   struct Slide {
-    int shared;  ///< number of vertices that both contacts have
-    std::uint32_t begun, entry;
+    std::uint32_t entry;
+    int shared;
   };
 
   template <class Contact>
-  static Vertices verticesOf(ContactKind, const Contact&);
+  static Triangle cornersOf(const Contact&);
   template <class Contact>
   static ContactKey keyOf(ContactKind, const Contact&);
+  static Vertices verticesOf(const ContactKey&, const Triangle& corners);
   void match(Contents& next);
+  void linkVertices(bool self);
   void findSlides(bool self);
+  void takePredecessors();
   void takeUserData(const Contents& last);
   ContactEnd endOf(const MeshPair&, bool collides, const Entry&) const;
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
-  std::uint64_t m_step = kNoStep;  ///< the one after m_before
-  Buffer<Entry> m_before;          ///< at the last advance(), by key
-  bool m_beforeOfSecond = false;   ///< Tracked::elementsOfSecond
-  bool m_keeps = false;
-  Buffer<Entry*> m_ended;  ///< of m_before: not in the answer at hand
-  Buffer<Begun> m_begun;   ///< in the answer at hand
-  Buffer<VertexOf> m_vertices;
+  std::uint64_t m_step = kNoStep;                             ///< the one after m_before
+  Buffer<Entry> m_before;                                     ///< at the last advance(), by key
+  bool m_beforeOfSecond = false;                              ///< Tracked::elementsOfSecond
+  std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< of m_before; of the last answer
+  bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
+  Buffer<Entry*> m_ended;                   ///< of m_before: not in the answer at hand
+  Buffer<Begun> m_begun;                    ///< in the answer at hand
+  Buffer<std::uint32_t> m_heads;            ///< of lists in m_links
+  Buffer<VertexLink> m_links;
   Buffer<Slide> m_slides;
 };
 

@@ -60,7 +60,7 @@ struct TrackedContact {
 struct Crossing {
   ContactKind kind = ContactKind::VertexTriangle;
   std::array<std::uint32_t, 4> ids{};  ///< those of ContactKey
-  double time = 0.0;                   ///< [0, 1] of the step, at most 2^-50 before the exact time
+  double time = 0.0;                   ///< [0, 1]: the exact one, or up to timeTolerance before it
   /// The vertex passed to the side of the triangle's winding normal; edge a, with the vertices p0
   /// and p1, passed to the side of edge b to which (p1 - p0) x (q1 - q0) points.
   bool forward = false;

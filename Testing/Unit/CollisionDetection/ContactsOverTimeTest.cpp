@@ -22,45 +22,45 @@ namespace {
 
 using namespace testing;
 
-using Vertices = std::set<std::uint32_t>;
-using Features = std::array<Vertices, 2>;
-constexpr Vertices::value_type kShape = kNoElement;
+using VertexSet = std::set<std::uint32_t>;
+using FeatureVertices = std::array<VertexSet, 2>;
+constexpr VertexSet::value_type kShapeSide = kNoElement;
 
-struct Known {
-  Features features;
+struct KnownContact {
+  FeatureVertices features;
   std::uint32_t age = 0;
   std::uint64_t data = 0;
   std::optional<ContactKey> predecessor{};
 };
-using Answer = std::map<ContactKey, Known>;
+using KeyedContacts = std::map<ContactKey, KnownContact>;
 
 /// The contacts of all lists, written out anew.
-Answer contactsOf(const CollisionData& data) {
-  Answer all;
-  const auto add = [&](const ContactKey& key, const Features& features) {
-    EXPECT_TRUE(all.emplace(key, Known{features}).second);
+KeyedContacts keyedContacts(const CollisionData& data) {
+  KeyedContacts all;
+  const auto add = [&](const ContactKey& key, const FeatureVertices& features) {
+    EXPECT_TRUE(all.emplace(key, KnownContact{features}).second);
   };
-  const auto corners = [](const Triangle& t) { return Vertices(t.begin(), t.end()); };
+  const auto corners = [](const Triangle& t) { return VertexSet(t.begin(), t.end()); };
   for (const auto& c : data.vertexTriangle())
     add({ContactKind::VertexTriangle, {c.vertex, c.triangle, kNoElement, kNoElement}},
-        {Vertices{c.vertex}, corners(c.vertices)});
+        {VertexSet{c.vertex}, corners(c.vertices)});
   for (const auto& c : data.triangleVertex())
     add({ContactKind::TriangleVertex, {c.triangle, c.vertex, kNoElement, kNoElement}},
-        {corners(c.vertices), Vertices{c.vertex}});
+        {corners(c.vertices), VertexSet{c.vertex}});
   for (const auto& c : data.edgeEdge())
     add({ContactKind::EdgeEdge, {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}},
-        {Vertices{c.edgeA[0], c.edgeA[1]}, Vertices{c.edgeB[0], c.edgeB[1]}});
+        {VertexSet{c.edgeA[0], c.edgeA[1]}, VertexSet{c.edgeB[0], c.edgeB[1]}});
   for (const auto& c : data.shape())
     add({ContactKind::Shape,
          {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1], c.vertices[2]}},
-        {corners(c.vertices), Vertices{kShape}});
+        {corners(c.vertices), VertexSet{kShapeSide}});
   for (std::size_t i = 0; i < data.shapeShape().size(); ++i)
     add({ContactKind::ShapeShape, {kNoElement, kNoElement, kNoElement, kNoElement}},
-        {Vertices{kShape}, Vertices{kShape}});
+        {VertexSet{kShapeSide}, VertexSet{kShapeSide}});
   return all;
 }
 
-std::vector<TrackedContact> trackedOf(const CollisionData& data) {
+std::vector<TrackedContact> allTracked(const CollisionData& data) {
   std::vector<TrackedContact> all;
   for (const auto list : {data.trackedVertexTriangle(), data.trackedTriangleVertex(),
                           data.trackedEdgeEdge(), data.trackedShape(), data.trackedShapeShape()})
@@ -68,27 +68,27 @@ std::vector<TrackedContact> trackedOf(const CollisionData& data) {
   return all;
 }
 
-std::size_t common(const Vertices& a, const Vertices& b) {
+std::size_t commonVertices(const VertexSet& a, const VertexSet& b) {
   return static_cast<std::size_t>(
       std::count_if(a.begin(), a.end(), [&](std::uint32_t v) { return b.contains(v); }));
 }
 
 /// The number of vertices in common, or 0 unless both features have one.
-std::size_t common(const Features& a, const Features& b, bool self) {
+std::size_t commonVertices(const FeatureVertices& a, const FeatureVertices& b, bool self) {
   const auto inOrder = [&](int first) {
-    const std::size_t p = common(a[0], b[first]), q = common(a[1], b[1 - first]);
+    const std::size_t p = commonVertices(a[0], b[first]), q = commonVertices(a[1], b[1 - first]);
     return p > 0 && q > 0 ? p + q : 0;
   };
   return std::max(inOrder(0), self ? inOrder(1) : 0);
 }
 
-class Oracle {
+class TrackingOracle {
  public:
-  explicit Oracle(bool self) : m_self(self) {}
+  explicit TrackingOracle(bool self) : m_self(self) {}
   std::size_t slides = 0, lasting = 0, ends = 0;
 
   void detect(const CollisionData& data) {
-    Answer next = contactsOf(data);
+    KeyedContacts next = keyedContacts(data);
     m_ended = m_before;
     std::vector<ContactKey> begun;
     for (auto& [key, contact] : next) {
@@ -105,7 +105,7 @@ class Oracle {
     std::set<std::tuple<int, ContactKey, ContactKey>> candidates;
     for (const ContactKey& key : begun)
       for (const auto& [before, ended] : m_ended)
-        if (const auto shared = common(next[key].features, ended.features, m_self))
+        if (const auto shared = commonVertices(next[key].features, ended.features, m_self))
           candidates.insert({-static_cast<int>(shared), key, before});
     for (const auto& [shared, key, before] : candidates) {
       if (next[key].predecessor || !m_ended.contains(before)) continue;
@@ -131,7 +131,7 @@ class Oracle {
     if (m_before.contains(key)) m_before[key].data = data;
   }
   void expect(const CollisionData& data) const {
-    const std::vector<TrackedContact> found = trackedOf(data);
+    const std::vector<TrackedContact> found = allTracked(data);
     ASSERT_EQ(found.size(), m_now.size());
     auto expected = m_now.begin();
     for (const TrackedContact& contact : found) {
@@ -155,18 +155,18 @@ class Oracle {
 
  private:
   bool m_self, m_detected = false;
-  Answer m_before, m_now, m_ended;
+  KeyedContacts m_before, m_now, m_ended;
 };
 
 /// Two bodies; the second slides over the first. Of a body with itself, both are the same.
-struct Scene {
+struct SlidingScene {
   std::string name;
   std::function<std::array<GeometryId, 2>(OctreeBasedCD&)> add;
   std::function<void(OctreeBasedCD&, const std::array<GeometryId, 2>&, double time)> move;
   PairSettings settings;
 };
 
-std::vector<Scene> scenes() {
+std::vector<SlidingScene> slidingScenes() {
   Random random(5);
   const TestGeometry ball = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.3)),
                      floor = testGeometry(sheet(9, 0.25, 0.4)),
@@ -178,7 +178,7 @@ std::vector<Scene> scenes() {
       p += Vector3d(0.03 * t, 0.02 * t, 0.01 * std::sin(t + 9 * p.x()) + 0.02 * std::sin(3 * t));
     return now;
   };
-  std::vector<Scene> all;
+  std::vector<SlidingScene> all;
   const auto meshes = [&](std::string name, const TestGeometry& a, const TestGeometry& b,
                           PairSettings settings) {
     const bool self = &a == &b;
@@ -252,7 +252,7 @@ std::vector<Scene> scenes() {
 TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
   std::size_t slides = 0, lasting = 0, ends = 0;
   std::set<std::string> sliding;
-  for (const Scene& scene : scenes()) {
+  for (const SlidingScene& scene : slidingScenes()) {
     SCOPED_TRACE(scene.name + " by " + toString(scene.settings.method));
     std::vector<Settings> settings = octreeSettings();
     settings.insert(settings.begin(), testing::settingsOf(Engine::BruteForce));
@@ -268,7 +268,7 @@ TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
     OctreeBasedCD reference(testing::settingsOf(Engine::BruteForce));
     scene.add(reference);
     reference.addCollisionPair(ids[0], ids[1], scene.settings);
-    Oracle oracle(ids[0] == ids[1]);
+    TrackingOracle oracle(ids[0] == ids[1]);
     Random random(3);
     for (int step = 0; step < 12; ++step) {
       const int rounds = step == 5 ? 0 : 1 + step % 3;
@@ -278,7 +278,7 @@ TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
         reference.detectCollision();
         const CollisionData& truth = reference.collisionData(ids[0], ids[1]);
         oracle.detect(truth);
-        const Answer contacts = contactsOf(truth);
+        const KeyedContacts contacts = keyedContacts(truth);
         std::vector<std::pair<ContactKey, std::uint64_t>> data;
         for (const auto& [key, contact] : contacts)
           if (random() % 4 == 0) data.emplace_back(key, random());
@@ -307,7 +307,7 @@ TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
 }
 
 /// A point over a floor, in contact with it when the step ended.
-struct Reasons : ::testing::Test {
+struct ContactEnds : ::testing::Test {
   Mesh floor = sheet(6, 0, 0);
   Positions tool{{0.45, 0.4, 0.05}};
   OctreeBasedCD collisions;
@@ -342,29 +342,29 @@ struct Reasons : ::testing::Test {
   }
 };
 
-TEST_F(Reasons, Apart) {
+TEST_F(ContactEnds, Apart) {
   moveTool({0, 0, 1});
   expectEnd(ContactEnd::Apart, collisions);
 }
 
-TEST_F(Reasons, Disabled) {
+TEST_F(ContactEnds, Disabled) {
   const std::vector<std::uint32_t> only{0};
   collisions.setDisabledElements(b, only);
   expectEnd(ContactEnd::Disabled, collisions);
 }
 
-TEST_F(Reasons, Groups) {
+TEST_F(ContactEnds, Groups) {
   collisions.setCollisionFilter(b, {.groups = 2, .mask = 2});
   expectEnd(ContactEnd::Filtered, collisions);
 }
 
-TEST_F(Reasons, Predicate) {
+TEST_F(ContactEnds, Predicate) {
   collisions.setContactPredicate(a, b, [](const ContactFeatures&) { return false; });
   expectEnd(ContactEnd::Filtered, collisions);
 }
 
 /// A cut keeps contacts of triangles that stay, and ends those of triangles that go.
-TEST_F(Reasons, Cut) {
+TEST_F(ContactEnds, Cut) {
   const std::uint32_t touched = data().triangleVertex()[0].triangle;
   std::vector<Triangle> triangles = floor.triangles;
   std::vector<Triangle> without = triangles;
@@ -382,7 +382,7 @@ TEST_F(Reasons, Cut) {
 }
 
 /// A vertex slides over the edges of a mesh and keeps one contact.
-TEST_F(Reasons, SlidingLastsAsOneContact) {
+TEST_F(ContactEnds, SlidingLastsAsOneContact) {
   collisions.detectCollision();
   std::set<ContactKey> keys;
   ContactKey last = data().trackedTriangleVertex()[0].key;
@@ -402,7 +402,7 @@ TEST_F(Reasons, SlidingLastsAsOneContact) {
   EXPECT_GE(keys.size(), 3u);
 }
 
-TEST_F(Reasons, NoPairWithoutTheSetting) {
+TEST_F(ContactEnds, NoPairWithoutTheSetting) {
   collisions.setPairSettings(a, b, {.method = Method::Proximity, .thickness = 0.1});
   collisions.detectCollision();
   EXPECT_TRUE(data().trackedTriangleVertex().empty() && data().ended().empty());
@@ -411,7 +411,7 @@ TEST_F(Reasons, NoPairWithoutTheSetting) {
                 [&] { collisions.setUserData(a, b, key, 1); });
 }
 
-TEST_F(Reasons, ErrorsNameThePair) {
+TEST_F(ContactEnds, ErrorsNameThePair) {
   const ContactKey key{ContactKind::TriangleVertex, {0, 1, kNoElement, kNoElement}};
   expectRefused(ErrorCode::NotAvailable, "no contact with this key",
                 [&] { collisions.setUserData(a, b, key, 1); });

@@ -22,18 +22,18 @@ namespace {
 
 using namespace testing;
 
-using Passage = std::tuple<ContactKind, std::array<std::uint32_t, 4>, bool>;
-using Filter = std::function<bool(const ContactKey&)>;  ///< null: all
+using CrossingRow = std::tuple<ContactKind, std::array<std::uint32_t, 4>, bool>;
+using KeyFilter = std::function<bool(const ContactKey&)>;  ///< null: all
 
-struct Step {
+struct CrossingStep {
   const TestGeometry &a, &b;
   Positions nowA, nowB;
   bool self() const { return &a == &b; }
 };
 
 /// In the order of CollisionData::crossings().
-std::vector<Passage> truthOf(const Step& step, const Filter& filter) {
-  std::vector<Passage> all;
+std::vector<CrossingRow> crossingTruth(const CrossingStep& step, const KeyFilter& filter) {
+  std::vector<CrossingRow> all;
   const auto add = [&](const ContactKey& key, bool edges, const auto& first, const auto& second,
                        bool swapped) {
     if (filter && !filter(key)) return;
@@ -72,15 +72,16 @@ std::vector<Passage> truthOf(const Step& step, const Filter& filter) {
       add({ContactKind::EdgeEdge, {e[0], e[1], f[0], f[1]}}, true, e, f, false);
     }
   // Several passages of two features have ascending times: a stable order keeps them.
-  std::stable_sort(all.begin(), all.end(), [](const Passage& l, const Passage& r) {
+  std::stable_sort(all.begin(), all.end(), [](const CrossingRow& l, const CrossingRow& r) {
     return std::tie(std::get<0>(l), std::get<1>(l)) < std::tie(std::get<0>(r), std::get<1>(r));
   });
   return all;
 }
 
 /// Returns how many there are.
-std::size_t expectTruth(const Step& step, double thickness, const Filter& filter = {}) {
-  const std::vector<Passage> truth = truthOf(step, filter);
+std::size_t expectCrossings(const CrossingStep& step, double thickness,
+                            const KeyFilter& filter = {}) {
+  const std::vector<CrossingRow> truth = crossingTruth(step, filter);
   std::vector<Settings> all = octreeSettings();
   all.push_back(testing::settingsOf(Engine::BruteForce));
   std::vector<Crossing> first;
@@ -105,7 +106,7 @@ std::size_t expectTruth(const Step& step, double thickness, const Filter& filter
     if (!step.self()) collisions.setPositions(b, step.b.positions, step.nowB);
     collisions.detectCollision();
     const auto crossings = collisions.collisionData(a, b).crossings();
-    std::vector<Passage> found;
+    std::vector<CrossingRow> found;
     for (const Crossing& c : crossings) found.push_back({c.kind, c.ids, c.forward});
     EXPECT_EQ(found, truth) << nameOf(settings);
     if (first.empty()) first.assign(crossings.begin(), crossings.end());
@@ -125,13 +126,13 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
   for (const double motion : {0.05, 0.5})
     for (const double thickness : {0.0, 0.02})
       for (const auto& [a, b] : pairs) {
-        const Step step{*a, *b, moved(random, a->positions, motion),
-                        moved(random, b->positions, motion)};
-        EXPECT_GT(expectTruth(step, thickness), 0u);
+        const CrossingStep step{*a, *b, moved(random, a->positions, motion),
+                                moved(random, b->positions, motion)};
+        EXPECT_GT(expectCrossings(step, thickness), 0u);
         const auto everyThird = [](const ContactKey& key) {
           return (key.ids[0] + key.ids[1] + key.ids[2] + key.ids[3]) % 3 == 0;
         };
-        expectTruth(step, thickness, everyThird);
+        expectCrossings(step, thickness, everyThird);
       }
 }
 
@@ -150,8 +151,8 @@ TEST(Crossings, AreThoseOfRationalArithmeticOnAGrid) {
     TestGeometry a = testGeometry(soup(random, 12, 1)), b = testGeometry(soup(random, 12, 1));
     a.positions = grid(a.positions.size());
     b.positions = grid(b.positions.size());
-    passages += expectTruth({a, b, grid(a.positions.size()), grid(b.positions.size())}, 0.0);
-    passages += expectTruth({a, a, grid(a.positions.size()), {}}, 0.0);
+    passages += expectCrossings({a, b, grid(a.positions.size()), grid(b.positions.size())}, 0.0);
+    passages += expectCrossings({a, a, grid(a.positions.size()), {}}, 0.0);
   }
   EXPECT_GT(passages, 1000u);
 }

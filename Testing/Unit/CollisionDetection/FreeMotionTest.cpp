@@ -65,7 +65,7 @@ struct Scene {
   }
 };
 
-PairSettings settingsOf(const Scene& scene, Method method) {
+PairSettings sceneSettings(const Scene& scene, Method method) {
   return {.method = method,
           .thickness = scene.thickness,
           .contacts = Contacts::All,
@@ -86,7 +86,7 @@ class SceneRun {
         continue;
       const bool touches = scene.thickness > 0.0 || scene.isShape(a) || scene.isShape(b);
       if (method == Method::Proximity && !touches) continue;
-      m_collisions.addCollisionPair(m_ids[a], m_ids[b], settingsOf(scene, method));
+      m_collisions.addCollisionPair(m_ids[a], m_ids[b], sceneSettings(scene, method));
     }
   }
 

@@ -236,7 +236,7 @@ TEST_F(Capture, ErrorsNameTheFault) {
   };
   expectRefusedWith("palpate-capture 13", "solid 3", "it is not a capture");
   expectRefusedWith("palpate-capture 13", "palpate-capture 14",
-                    "its version is 13; versions up to 12");
+                    "its version is 14; versions up to 13");
   expectRefusedWith("palpate-capture 13", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
