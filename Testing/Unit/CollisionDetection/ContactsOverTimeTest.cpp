@@ -407,15 +407,15 @@ TEST_F(ContactEnds, NoPairWithoutTheSetting) {
   collisions.detectCollision();
   EXPECT_TRUE(data().trackedTriangleVertex().empty() && data().ended().empty());
   const ContactKey key{ContactKind::TriangleVertex, {0, 0, kNoElement, kNoElement}};
-  expectRefused(ErrorCode::NotAvailable, "trackContacts is not set",
-                [&] { collisions.setUserData(a, b, key, 1); });
+  testing::expectRefused(ErrorCode::NotAvailable, "trackContacts is not set",
+                         [&] { collisions.setUserData(a, b, key, 1); });
 }
 
 TEST_F(ContactEnds, ErrorsNameThePair) {
   const ContactKey key{ContactKind::TriangleVertex, {0, 1, kNoElement, kNoElement}};
-  expectRefused(ErrorCode::NotAvailable, "no contact with this key",
-                [&] { collisions.setUserData(a, b, key, 1); });
-  expectRefused(ErrorCode::UnsupportedMethod, "earliestTimeOnly reports none", [&] {
+  testing::expectRefused(ErrorCode::NotAvailable, "no contact with this key",
+                         [&] { collisions.setUserData(a, b, key, 1); });
+  testing::expectRefused(ErrorCode::UnsupportedMethod, "earliestTimeOnly reports none", [&] {
     collisions.setPairSettings(a, b,
                                {.method = Method::Continuous,
                                 .trackContacts = true,

@@ -163,7 +163,7 @@ TEST(Crossings, NeedContinuousWithContacts) {
   const GeometryId a = addMesh(collisions, cube), b = addMesh(collisions, cube),
                    ball = collisions.addAnalyticalGeometry(Sphere{{0, 0, 0}, 1});
   const auto refuse = [&](GeometryId second, const PairSettings& settings) {
-    expectRefused(
+    testing::expectRefused(
         ErrorCode::UnsupportedMethod, "pair (0, ",
         [&] { collisions.addCollisionPair(a, second, settings); }, a);
   };
