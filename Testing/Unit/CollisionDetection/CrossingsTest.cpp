@@ -40,6 +40,7 @@ std::vector<CrossingRow> crossingTruth(const CrossingStep& step, const KeyFilter
     impact::Positions p;
     std::size_t i = 0;
     const auto put = [&](const auto& vertices, bool ofB) {
+      ofB = ofB && !step.self();
       for (const std::uint32_t v : vertices) {
         p[i] = (ofB ? step.b : step.a).positions[v];
         p[4 + i++] = (ofB ? step.nowB : step.nowA)[v];
@@ -123,17 +124,19 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
                      points = particles(random, 60, 0.0);
   const Pairs pairs{{&soupA, &soupB}, {&soupA, &soupA}, {&soupA, &line},
                     {&line, &soupA},  {&line, &line},   {&points, &soupA}};
+  std::size_t passages = 0;
   for (const double motion : {0.05, 0.5})
     for (const double thickness : {0.0, 0.02})
       for (const auto& [a, b] : pairs) {
         const CrossingStep step{*a, *b, moved(random, a->positions, motion),
                                 moved(random, b->positions, motion)};
-        EXPECT_GT(expectCrossings(step, thickness), 0u);
+        passages += expectCrossings(step, thickness);
         const auto everyThird = [](const ContactKey& key) {
           return (key.ids[0] + key.ids[1] + key.ids[2] + key.ids[3]) % 3 == 0;
         };
         expectCrossings(step, thickness, everyThird);
       }
+  EXPECT_GT(passages, 500u);
 }
 
 /// All positions have small whole coordinates: features pass through borders, and planes hold
