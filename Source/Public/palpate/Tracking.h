@@ -69,8 +69,9 @@ struct Crossing {
 
 }  // namespace palpate
 
+namespace std {
 template <>
-struct std::hash<palpate::ContactKey> {
+struct hash<palpate::ContactKey> {
   std::size_t operator()(const palpate::ContactKey& key) const noexcept {
     std::uint64_t value = 0;
     const auto add = [&](std::uint64_t word) {
@@ -82,3 +83,4 @@ struct std::hash<palpate::ContactKey> {
     return static_cast<std::size_t>(value);
   }
 };
+}  // namespace std
