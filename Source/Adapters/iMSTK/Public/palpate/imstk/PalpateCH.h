@@ -1,0 +1,39 @@
+#pragma once
+
+#include <palpate/Export.h>
+#include <palpate/imstk/PalpateCD.h>
+
+#include <imstkMacros.h>
+#include <imstkPbdCollisionHandling.h>
+
+#include <memory>
+#include <vector>
+
+namespace palpate {
+
+/// Handles the contacts of a PalpateCD by one-sided constraints, which only push: each keeps the
+/// gap of PalpateSettings. iMSTK's own constraints are equalities, which pull bodies together that
+/// are within a thickness and do not touch. Vertices that a PointwiseMap maps move the particles
+/// they come from. Rigid PbdObjects move and turn. Other objects do not move.
+/// Friction of PbdObjectCollision::setFriction(): Coulomb's coefficient, on the velocities of the
+///          step. Restitution, stiffness and compliance are not used.
+class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
+ public:
+  explicit PalpateCH(std::shared_ptr<PalpateCD> detection);
+  ~PalpateCH() override;
+  IMSTK_TYPE_NAME(PalpateCH)
+
+  /// Those of this step, in the order of palpate::appendRows().
+  const std::vector<imstk::PbdConstraint*>& rows() const { return m_rows; }
+
+ protected:
+  void handle(const std::vector<imstk::CollisionElement>& elementsA,
+              const std::vector<imstk::CollisionElement>& elementsB) override;
+
+ private:
+  std::shared_ptr<PalpateCD> m_detection;
+  std::vector<std::unique_ptr<imstk::PbdConstraint>> m_owned;
+  std::vector<imstk::PbdConstraint*> m_rows;
+};
+
+}  // namespace palpate

@@ -1,0 +1,463 @@
+#include "iMSTK/SceneStep.h"
+
+#include <palpate/imstk/PalpateCD.h>
+
+#include <Eigen/Geometry>
+
+#include <imstkCapsule.h>
+#include <imstkCollidingObject.h>
+#include <imstkCollisionHandling.h>
+#include <imstkCollisionInteraction.h>
+#include <imstkCylinder.h>
+#include <imstkDataArray.h>
+#include <imstkLineMesh.h>
+#include <imstkLogger.h>
+#include <imstkOrientedBox.h>
+#include <imstkPbdModel.h>
+#include <imstkPbdObject.h>
+#include <imstkPlane.h>
+#include <imstkPointwiseMap.h>
+#include <imstkSphere.h>
+#include <imstkSurfaceMesh.h>
+#include <imstkTetrahedralMesh.h>
+#include <imstkVecDataArray.h>
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+
+namespace palpate {
+
+using DataType = imstk::Geometry::DataType;
+
+namespace {
+
+// The cells of a mesh, flat. A point set has none.
+struct Cells {
+  const int* indices = nullptr;
+  std::size_t count = 0;
+  int vertices = 1;
+};
+
+template <int N>
+Cells cellsIn(imstk::CellMesh<N>& mesh) {
+  const std::shared_ptr<imstk::VecDataArray<int, N>> cells = mesh.getCells();
+  if (cells->size() == 0) return {nullptr, 0, N};
+  return {cells->getPointer()->data(), static_cast<std::size_t>(cells->size()), N};
+}
+
+Cells cellsOf(imstk::PointSet& mesh) {
+  if (auto* tetrahedra = dynamic_cast<imstk::TetrahedralMesh*>(&mesh))
+    return cellsIn<4>(*tetrahedra);
+  if (auto* triangles = dynamic_cast<imstk::SurfaceMesh*>(&mesh)) return cellsIn<3>(*triangles);
+  if (auto* segments = dynamic_cast<imstk::LineMesh*>(&mesh)) return cellsIn<2>(*segments);
+  if (dynamic_cast<imstk::AbstractCellMesh*>(&mesh) != nullptr)
+    throw std::invalid_argument("A " + mesh.getTypeName() + " does not collide.");
+  return {};
+}
+
+BodyPose poseOf(const imstk::Quatd& rotation, const imstk::Vec3d& translation) {
+  return {rotation.normalized().toRotationMatrix(), translation};
+}
+
+// Where a shape is, before or after its geometry's transform.
+BodyPose poseOf(imstk::Geometry& shape, DataType type) {
+  if (auto* plane = dynamic_cast<imstk::Plane*>(&shape))
+    return poseOf(imstk::Quatd::FromTwoVectors(imstk::Vec3d::UnitY(), plane->getNormal(type)),
+                  plane->getPosition(type));
+  auto& analytical = dynamic_cast<imstk::AnalyticalGeometry&>(shape);
+  return poseOf(analytical.getOrientation(type), analytical.getPosition(type));
+}
+
+ShapeMeasures measuresOf(imstk::Geometry& shape) {
+  if (auto* sphere = dynamic_cast<imstk::Sphere*>(&shape))
+    return {ShapeMeasures::Kind::Sphere, sphere->getRadius()};
+  if (auto* capsule = dynamic_cast<imstk::Capsule*>(&shape))
+    return {ShapeMeasures::Kind::Capsule, capsule->getRadius(), capsule->getLength()};
+  if (auto* cylinder = dynamic_cast<imstk::Cylinder*>(&shape))
+    return {ShapeMeasures::Kind::Cylinder, cylinder->getRadius(), cylinder->getLength()};
+  if (auto* box = dynamic_cast<imstk::OrientedBox*>(&shape))
+    return {ShapeMeasures::Kind::Box, 0.0, 0.0, box->getExtents()};
+  if (dynamic_cast<imstk::Plane*>(&shape) != nullptr) return {ShapeMeasures::Kind::Plane};
+  throw std::invalid_argument("A " + shape.getTypeName() + " does not collide.");
+}
+
+BodyPose operator*(const BodyPose& outer, const BodyPose& inner) {
+  return {outer.rotation * inner.rotation, outer.rotation * inner.translation + outer.translation};
+}
+BodyPose inverseOf(const BodyPose& pose) {
+  const Eigen::Matrix3d rotation = pose.rotation.transpose();
+  return {rotation, -(rotation * pose.translation)};
+}
+bool isSame(const BodyPose& a, const BodyPose& b) {
+  return a.rotation == b.rotation && a.translation == b.translation;
+}
+
+CollisionStep::Method methodOf(const PalpateSettings& settings, int verticesOfA, int verticesOfB) {
+  switch (settings.method) {
+    case PalpateMethod::Auto:
+      return CollisionStep::Method::Auto;
+    case PalpateMethod::Intersection:
+      return CollisionStep::Method::Intersection;
+    case PalpateMethod::Proximity:
+      return CollisionStep::Method::Proximity;
+    case PalpateMethod::Continuous:
+      return CollisionStep::Method::Continuous;
+    case PalpateMethod::Default:
+      break;
+  }
+  if (settings.thickness > 0) return CollisionStep::Method::Auto;
+  if (verticesOfA == 0 || verticesOfB == 0) return CollisionStep::Method::Proximity;
+  return verticesOfA >= 3 && verticesOfB >= 3 ? CollisionStep::Method::Intersection
+                                              : CollisionStep::Method::Continuous;
+}
+
+}  // namespace
+
+struct SceneStep::Body {
+  int id;
+  std::shared_ptr<imstk::Geometry> geometry;
+  std::shared_ptr<imstk::PointSet> mesh{};     // null: a shape
+  std::shared_ptr<imstk::PbdObject> object{};  // null: nothing that a solver moves
+  BodyRole role = BodyRole::Fixed;
+  std::vector<int> cells{};
+  int verticesPerCell = 0;
+  std::vector<Eigen::Vector3d> positions{};  // as read last
+  BodyPose local{}, pose{};                  // of a shape in its rigid body; as read last
+
+  std::shared_ptr<imstk::PointwiseMap> map() const {
+    if (object->getPhysicsGeometry() == geometry) return nullptr;
+    return std::dynamic_pointer_cast<imstk::PointwiseMap>(object->getPhysicsToCollidingMap());
+  }
+  // The particle of a vertex, or -1.
+  int particleOf(const imstk::PointwiseMap* map, int vertex) const {
+    return map == nullptr ? vertex : map->getParentVertexId(vertex);
+  }
+  bool isPlaced() const { return mesh == nullptr || role == BodyRole::Rigid; }
+  MeshArrays arrays(const Cells& from) const {
+    return {positions.data(), positions.size(), from.indices, from.count, from.vertices};
+  }
+  std::vector<Eigen::Vector3d> positionsOf(DataType type) const {
+    const std::shared_ptr<imstk::VecDataArray<double, 3>> array = mesh->getVertexPositions(type);
+    return std::vector<Eigen::Vector3d>(array->getPointer(), array->getPointer() + array->size());
+  }
+};
+
+struct SceneStep::Pair {
+  int id, bodyA, bodyB;
+  PalpateSettings settings;
+  std::weak_ptr<imstk::CollisionInteraction> interaction{};
+  std::weak_ptr<PalpateCD> detection{};
+};
+
+SceneStep::SceneStep(int threads) : m_step(std::make_unique<CollisionStep>(threads)) {}
+SceneStep::~SceneStep() = default;
+
+void SceneStep::warn(const std::string& message) {
+  m_error = message;
+  if (message != m_lastWarning) LOG(WARNING) << "Palpate: " << message;
+  m_lastWarning = message;
+}
+
+// Task graphs end the process on an exception.
+template <class F>
+bool SceneStep::attempt(F&& f) {
+  try {
+    f();
+    return true;
+  } catch (const std::exception& exception) {
+    warn(exception.what());
+    return false;
+  }
+}
+
+void SceneStep::setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius) {
+  m_radii[geometry.get()] = radius;
+}
+
+void SceneStep::share(const std::shared_ptr<imstk::CollisionInteraction>& interaction,
+                      const std::shared_ptr<PalpateCD>& detection,
+                      const PalpateSettings& settings) {
+  m_newPairs.push_back({-1, -1, -1, settings, interaction, detection});
+}
+
+std::vector<std::shared_ptr<imstk::CollisionInteraction>> SceneStep::interactions() const {
+  std::vector<std::shared_ptr<imstk::CollisionInteraction>> found;
+  for (const Pair& pair : m_pairs)
+    if (const auto interaction = pair.interaction.lock()) found.push_back(interaction);
+  return found;
+}
+
+int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
+                      const std::shared_ptr<imstk::CollidingObject>& object) {
+  if (geometry == nullptr) throw std::invalid_argument("An object has no colliding geometry.");
+  for (std::size_t i = 0; i < m_bodies.size(); ++i)
+    if (m_bodies[i].geometry == geometry) return static_cast<int>(i);
+
+  Body body{-1, geometry};
+  body.mesh = std::dynamic_pointer_cast<imstk::PointSet>(geometry);
+  body.object = std::dynamic_pointer_cast<imstk::PbdObject>(object);
+  if (body.object != nullptr)
+    body.role = body.object->getPbdBody()->bodyType == imstk::PbdBody::Type::RIGID
+                    ? BodyRole::Rigid
+                    : BodyRole::Particles;
+  const std::string name = object == nullptr ? geometry->getTypeName() : object->getName();
+  const bool isRigid = body.role == BodyRole::Rigid;
+  if (isRigid) {
+    imstk::PbdBody& pbd = *body.object->getPbdBody();
+    body.pose = poseOf((*pbd.orientations)[0], (*pbd.vertices)[0]);
+  }
+  if (body.mesh != nullptr) {
+    const Cells cells = cellsOf(*body.mesh);
+    body.verticesPerCell = cells.vertices;
+    body.cells.assign(cells.indices,
+                      cells.indices + cells.count * static_cast<std::size_t>(cells.vertices));
+    body.positions = body.positionsOf(isRigid ? DataType::PreTransform : DataType::PostTransform);
+    const auto radius = m_radii.find(geometry.get());
+    body.id = m_step->addMesh(body.role, body.arrays(cells),
+                              radius == m_radii.end() ? 0.0 : radius->second, body.pose, name);
+  } else {
+    if (isRigid) {
+      body.local = poseOf(*geometry, DataType::PreTransform);
+      body.pose = body.pose * body.local;
+    } else {
+      body.role = BodyRole::Fixed;
+      body.pose = poseOf(*geometry, DataType::PostTransform);
+    }
+    body.id = m_step->addShape(body.role, measuresOf(*geometry), body.pose, name);
+  }
+  m_bodies.push_back(std::move(body));
+  return static_cast<int>(m_bodies.size()) - 1;
+}
+
+int SceneStep::addPairOfBodies(int a, int b, const PalpateSettings& settings) {
+  const Body &first = m_bodies[static_cast<std::size_t>(a)],
+             &second = m_bodies[static_cast<std::size_t>(b)];
+  return m_step->addPair(first.id, second.id,
+                         {methodOf(settings, first.verticesPerCell, second.verticesPerCell),
+                          settings.thickness, settings.restDistance, settings.guarded});
+}
+
+void SceneStep::addSharedPairs() {
+  for (Pair& pair : m_newPairs) {
+    const auto interaction = pair.interaction.lock();
+    const auto detection = pair.detection.lock();
+    if (interaction == nullptr || detection == nullptr) continue;
+    attempt([&] {
+      const auto handler = interaction->getCollisionHandlingA();
+      pair.bodyA = bodyOf(detection->getInput(0), handler->getInputObjectA());
+      pair.bodyB = bodyOf(detection->getInput(1), handler->getInputObjectB());
+      pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, pair.settings);
+      m_pairs.push_back(pair);
+      detection->setPair(static_cast<int>(m_pairs.size()) - 1);
+    });
+  }
+  m_newPairs.clear();
+  // Geometries begin at rest: iMSTK predicts before it first detects.
+  m_step->advance();
+}
+
+int SceneStep::addPair(const std::shared_ptr<imstk::Geometry>& a,
+                       const std::shared_ptr<imstk::Geometry>& b, const PalpateSettings& settings) {
+  const bool isAdded = attempt([&] {
+    Pair pair{-1, bodyOf(a, nullptr), bodyOf(b, nullptr), settings};
+    pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, settings);
+    m_pairs.push_back(pair);
+  });
+  return isAdded ? static_cast<int>(m_pairs.size()) - 1 : -1;
+}
+
+// Passes the positions now. At a step's start also `before`: where the last step ended, or for what
+// something else moved since, where iMSTK's step began.
+void SceneStep::read(Body& body, bool startsStep) {
+  const bool rests = startsStep && m_restarts;
+  if (body.isPlaced()) {
+    BodyPose before = m_step->poseBefore(body.id);
+    if (body.role == BodyRole::Rigid) {
+      const imstk::PbdBody& pbd = *body.object->getPbdBody();
+      body.pose = poseOf((*pbd.orientations)[0], (*pbd.vertices)[0]) * body.local;
+      if (startsStep && pbd.prevVertices != nullptr && pbd.prevOrientations != nullptr &&
+          (*pbd.invMasses)[0] > 0) {
+        const BodyPose began =
+            poseOf((*pbd.prevOrientations)[0], (*pbd.prevVertices)[0]) * body.local;
+        if (!began.rotation.isApprox(before.rotation, 1e-12) ||
+            began.translation != before.translation)
+          before = began;
+      }
+    } else if (startsStep) {
+      body.pose = poseOf(*body.geometry, DataType::PostTransform);
+    } else {
+      return;
+    }
+    m_step->setPose(body.id, rests ? body.pose : before, body.pose);
+    return;
+  }
+  if (body.role == BodyRole::Fixed && !startsStep) return;
+
+  std::vector<Eigen::Vector3d> positions = body.positionsOf(DataType::PostTransform);
+  const Cells cells = cellsOf(*body.mesh);
+  const std::size_t indices = cells.count * static_cast<std::size_t>(cells.vertices);
+  const bool isCut = positions.size() != body.positions.size() || indices != body.cells.size() ||
+                     !std::equal(body.cells.begin(), body.cells.end(), cells.indices);
+  std::vector<Eigen::Vector3d> before;
+  if (body.role == BodyRole::Particles) {
+    const imstk::PbdBody& pbd = *body.object->getPbdBody();
+    const std::shared_ptr<imstk::PointwiseMap> map = body.map();
+    std::vector<Eigen::Vector3d> began = positions;
+    const std::vector<Eigen::Vector3d>& last = m_step->before(body.id);
+    bool isMoved = isCut;
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const int particle = body.particleOf(map.get(), static_cast<int>(i));
+      if (particle < 0 || particle >= pbd.vertices->size()) continue;
+      positions[i] = (*pbd.vertices)[particle];
+      began[i] = positions[i];
+      if (pbd.prevVertices == nullptr || particle >= pbd.prevVertices->size() ||
+          (*pbd.invMasses)[particle] == 0)
+        continue;
+      began[i] = (*pbd.prevVertices)[particle];
+      isMoved |= i < last.size() && began[i] != last[i];
+    }
+    if (startsStep && isMoved) before = std::move(began);
+  }
+  body.positions = std::move(positions);
+  if (isCut) {
+    m_step->replaceMesh(body.id, body.arrays(cells));
+    body.cells.assign(cells.indices, cells.indices + indices);
+  }
+  if (before.empty()) before = m_step->before(body.id);
+  m_step->setPositions(body.id, rests ? body.positions.data() : before.data(),
+                       body.positions.data(), body.positions.size());
+}
+
+void SceneStep::detect() {
+  end(false);
+  m_error.clear();
+  m_isDetected = true;
+  m_hasAnswer = attempt([&] {
+    for (Body& body : m_bodies) read(body, true);
+    for (const Pair& pair : m_pairs)
+      if (const auto interaction = pair.interaction.lock())
+        m_step->setGuarded(pair.id, pair.settings.guarded && interaction->getEnabled());
+    m_step->detect();
+  });
+  m_isTrusted = m_hasAnswer && m_step->trusted();
+  m_restarts = false;
+  if (m_error.empty()) m_lastWarning.clear();
+}
+
+void SceneStep::write(Body& body) {
+  if (body.role == BodyRole::Particles) {
+    const imstk::PbdBody& pbd = *body.object->getPbdBody();
+    const std::shared_ptr<imstk::PointwiseMap> map = body.map();
+    const std::vector<Eigen::Vector3d>& held = m_step->now(body.id);
+    for (std::size_t i = 0; i < held.size(); ++i) {
+      const int particle = body.particleOf(map.get(), static_cast<int>(i));
+      if (particle >= 0 && held[i] != body.positions[i]) (*pbd.vertices)[particle] = held[i];
+    }
+  } else if (body.role == BodyRole::Rigid && !isSame(body.pose, m_step->poseNow(body.id))) {
+    imstk::PbdBody& pbd = *body.object->getPbdBody();
+    const BodyPose held = m_step->poseNow(body.id) * inverseOf(body.local);
+    (*pbd.vertices)[0] = held.translation;
+    (*pbd.orientations)[0] = imstk::Quatd(held.rotation).normalized();
+  }
+}
+
+void SceneStep::end(bool guarded) {
+  if (!m_isDetected) return;
+  m_isDetected = false;
+  m_held = 0;
+  if (guarded)
+    attempt([&] {
+      for (Body& body : m_bodies) read(body, false);
+      m_held = m_step->hold();
+      for (Body& body : m_bodies) write(body);
+    });
+  m_step->advance();
+}
+
+void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a,
+                               std::vector<imstk::CollisionElement>& b) {
+  if (!m_hasAnswer || pair < 0) return;
+  attempt([&] {
+    std::vector<StepElement> sides[2];
+    m_step->appendElements(m_pairs[static_cast<std::size_t>(pair)].id, sides[0], sides[1]);
+    const imstk::CellTypeId types[] = {imstk::IMSTK_VERTEX, imstk::IMSTK_EDGE,
+                                       imstk::IMSTK_TRIANGLE};
+    const auto convert = [&](const StepElement& from, bool otherIsPoint) {
+      if (from.idCount == 0) {
+        imstk::PointDirectionElement element;
+        element.pt = from.point;
+        element.dir = from.direction;
+        element.penetrationDepth = from.depth;
+        return imstk::CollisionElement(element);
+      }
+      if (from.idCount == 1 && otherIsPoint) {
+        imstk::PointIndexDirectionElement element;
+        element.ptIndex = from.ids[0];
+        element.dir = from.direction;
+        element.penetrationDepth = from.depth;
+        return imstk::CollisionElement(element);
+      }
+      imstk::CellIndexElement element;
+      for (int i = 0; i < from.idCount; ++i) element.ids[i] = from.ids[static_cast<std::size_t>(i)];
+      element.idCount = from.idCount;
+      element.cellType = types[from.idCount - 1];
+      return imstk::CollisionElement(element);
+    };
+    for (std::size_t i = 0; i < sides[0].size(); ++i) {
+      a.push_back(convert(sides[0][i], sides[1][i].idCount == 0));
+      b.push_back(convert(sides[1][i], sides[0][i].idCount == 0));
+    }
+  });
+}
+
+void SceneStep::appendRows(int pair, std::vector<ParticleRow>& rows) {
+  if (!m_hasAnswer || pair < 0) return;
+  attempt([&] {
+    std::vector<StepRow> stepRows;
+    m_step->appendRows(m_pairs[static_cast<std::size_t>(pair)].id, stepRows);
+    const auto bodyWithId = [&](int id) -> const Body& {
+      return *std::find_if(m_bodies.begin(), m_bodies.end(),
+                           [&](const Body& body) { return body.id == id; });
+    };
+    for (const StepRow& from : stepRows) {
+      ParticleRow row{{}, from.normal, from.offset, from.fixedDisplacement};
+      for (int i = 0; i < from.termCount; ++i) {
+        const StepRow::Term& term = from.terms[static_cast<std::size_t>(i)];
+        const Body& body = bodyWithId(term.body);
+        const int handle = body.object->getPbdBody()->bodyHandle;
+        if (term.vertex < 0) {
+          const Eigen::Vector3d inBody = body.local.rotation * term.local + body.local.translation;
+          row.terms.push_back({{handle, 0}, term.weight, true, inBody});
+          continue;
+        }
+        const int particle = body.particleOf(body.map().get(), term.vertex);
+        if (particle >= 0) {
+          row.terms.push_back({{handle, particle}, term.weight, false, Eigen::Vector3d::Zero()});
+        } else {
+          const auto vertex = static_cast<std::size_t>(term.vertex);
+          const Eigen::Vector3d &start = m_step->before(term.body)[vertex],
+                                &now = m_step->now(term.body)[vertex];
+          row.offset -= term.weight * row.normal.dot(now);
+          row.fixedDisplacement += term.weight * (now - start);
+        }
+      }
+      rows.push_back(std::move(row));
+    }
+  });
+}
+
+double SceneStep::gapOf(int pair) const {
+  const PalpateSettings& settings = m_pairs[static_cast<std::size_t>(pair)].settings;
+  return settings.gap < 0 ? 0.5 * settings.thickness : settings.gap;
+}
+
+imstk::PbdModel* SceneStep::modelOf(int pair) const {
+  const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+  for (const int body : {found.bodyA, found.bodyB})
+    if (const auto& object = m_bodies[static_cast<std::size_t>(body)].object)
+      return object->getPbdModel().get();
+  return nullptr;
+}
+
+}  // namespace palpate

@@ -1,0 +1,157 @@
+// One-sided constraints, on particles, rigid bodies and against what does not move.
+#include "Scenes.h"
+
+#include <gtest/gtest.h>
+
+namespace {
+
+palpate::PalpateSettings within(double thickness) {
+  palpate::PalpateSettings settings;
+  settings.thickness = thickness;
+  return settings;
+}
+
+TEST(PalpateCH, PushesToTheGapAndNeverPulls) {
+  for (const double start : {0.05, 0.15}) {
+    TestScene test;
+    const auto cloth = test.deformable("cloth", sheet({0, start, 0}));
+    test.collide(cloth, test.floor(sheet({0, 0, 0}, 3, 4)), within(0.2));  // the gap is 0.1
+    test.scene->initialize();
+    test.step();
+    for (size_t i = 0; i < 9; ++i)
+      EXPECT_NEAR(particle(*cloth, i).y(), std::max(start, 0.1), 1e-9) << start;
+    EXPECT_TRUE(imstk::logged().empty());
+  }
+}
+
+TEST(PalpateCH, AClothRestsOnAFloorUnderGravity) {
+  TestScene test;
+  test.model->m_gravity = {0, -9.81, 0};
+  const auto cloth = test.deformable("cloth", sheet({0, 0.3, 0}));
+  test.collide(test.floor(sheet({0, 0, 0}, 3, 4)), cloth, within(0.2));
+  test.scene->initialize();
+  test.step(100);
+  for (size_t i = 0; i < 9; ++i) {
+    EXPECT_NEAR(particle(*cloth, i).y(), 0.1, 1e-3);
+    EXPECT_NEAR(velocity(*cloth, i).y(), 0, 1e-6);
+  }
+  EXPECT_TRUE(imstk::logged().empty());
+}
+
+TEST(PalpateCH, FrictionIsCoulombs) {
+  // Deceleration is the coefficient times gravity, until the cloth stops.
+  TestScene test;
+  test.model->m_gravity = {0, -10, 0};
+  const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
+  test.collide(cloth, test.floor(sheet({0, 0, 0}, 1, 10)), within(0.2))->setFriction(0.5);
+  test.scene->initialize();
+  test.setVelocity(*cloth, {1, 0, 0});
+  test.step(10);
+  EXPECT_NEAR(velocity(*cloth).x(), 1 - 0.5 * 10 * 10 * test.model->m_dt, 1e-6);
+  test.step(30);
+  EXPECT_NEAR(velocity(*cloth).x(), 0, 1e-9);
+}
+
+TEST(PalpateCH, AToolThatSlidesDragsByFriction) {
+  TestScene test;
+  test.model->m_gravity = {0, -10, 0};
+  const auto plane = std::make_shared<imstk::Plane>();
+  const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
+  test.collide(cloth, test.tool(plane), within(0.2))->setFriction(0.5);
+  test.scene->initialize();
+  for (int i = 1; i <= 60; ++i) {
+    plane->setPosition({0.01 * i, 0, 0});  // at speed 1
+    test.step();
+  }
+  EXPECT_NEAR(velocity(*cloth).x(), 1, 1e-6);
+  EXPECT_NEAR(particle(*cloth).y(), 0.1, 1e-6);
+}
+
+TEST(PalpateCH, AMappedSurfaceMovesItsParticles) {
+  TestScene test;
+  // The physics mesh has its vertices in another order, and one that the surface does not have.
+  const auto surface = triangle({0.3, 0.05, 0.2}, 0.1);
+  auto positions = surface->getVertexPositions()->values;
+  const auto physics = std::make_shared<imstk::PointSet>();
+  physics->initialize(positionArray({{0, 5, 0}, positions[2], positions[0], positions[1]}));
+  const auto body = std::make_shared<imstk::PbdObject>("mapped");
+  body->setPhysicsGeometry(physics);
+  body->setCollidingGeometry(surface);
+  const auto map = std::make_shared<imstk::PointwiseMap>(physics, surface);
+  map->setMap({{0, 2}, {1, 3}, {2, 1}});
+  body->setPhysicsToCollidingMap(map);
+  body->setDynamicalModel(test.model);
+  test.scene->addSceneObject(body);
+  test.collide(body, test.floor(sheet({0, 0, 0}, 1, 4)), within(0.2));
+  test.scene->initialize();
+  test.step();
+  EXPECT_EQ(particle(*body, 0), Vec3d(0, 5, 0));
+  for (size_t i = 1; i < 4; ++i) EXPECT_NEAR(particle(*body, i).y(), 0.1, 1e-9);
+  EXPECT_EQ(particle(*body, 2).x(), positions[0].x());
+  // The guard, too, moves particles through the map.
+  test.setVelocity(*body, {0, -1000, 0});
+  test.step();
+  EXPECT_LT(particle(*body, 0).y(), -4);
+  for (size_t i = 1; i < 4; ++i) EXPECT_GT(particle(*body, i).y(), 0);
+  EXPECT_TRUE(imstk::logged().empty());
+}
+
+TEST(PalpateCH, ARigidBodyTurnsWhereItIsHit) {
+  for (const bool isShape : {false, true}) {
+    TestScene test;
+    test.model->m_iterations = 100;
+    std::shared_ptr<imstk::Geometry> geometry = sheet({0, 0, 0}, 1, 1);
+    if (isShape)
+      geometry = std::make_shared<imstk::Capsule>(
+          Vec3d(0, 0, 0), 0.01, 1.0,
+          imstk::Quatd::FromTwoVectors(Vec3d(0, 1, 0), Vec3d(1, 0, 0)));  // along x
+    const auto body = test.rigid("body", geometry, {0, 0, 0});
+    const auto ball = std::make_shared<imstk::PointSet>();
+    ball->initialize(positionArray({{0.4, -0.05, 0}}));
+    test.collide(body, test.floor(ball), within(0.4));  // the gap is 0.2
+    test.scene->initialize();
+    test.step();
+    const double arm = 0.4, inverse = 1 / (1 + arm * arm);  // mass and inertia are 1
+    const double push = isShape ? 0.2 - 0.04 : 0.15;
+    EXPECT_NEAR(particle(*body).y(), push * inverse, 0.1 * push) << isShape;
+    const double angle = 2 * (*body->getPbdBody()->orientations)[0].z();
+    EXPECT_NEAR(angle, push * arm * inverse, 0.1 * push) << isShape;
+    EXPECT_TRUE(imstk::logged().empty());
+  }
+}
+
+TEST(PalpateCH, TwoRigidShapesPart) {
+  TestScene test;
+  const auto a = test.rigid("a", std::make_shared<imstk::Sphere>(Vec3d(0, 0, 0), 0.5), {0, 0, 0});
+  const auto b = test.rigid("b", std::make_shared<imstk::Sphere>(Vec3d(0, 0, 0), 0.5), {0, 0.9, 0});
+  test.collide(a, b, within(0.2));
+  test.scene->initialize();
+  test.step();
+  EXPECT_NEAR(particle(*b).y() - particle(*a).y(), 1.1, 1e-6);
+  EXPECT_NEAR(particle(*b).y() + particle(*a).y(), 0.9, 1e-9);
+}
+
+TEST(PalpateCH, AClothTouchesItself) {
+  TestScene test;
+  // Two sheets in one mesh.
+  const auto low = sheet({0, 0, 0}, 1, 2), high = sheet({0.1, 0.05, 0.1}, 1, 2);
+  auto positions = low->getVertexPositions()->values;
+  auto cells = low->getCells()->values;
+  for (const Vec3d& p : high->getVertexPositions()->values) positions.push_back(p);
+  for (const Eigen::Vector3i& cell : high->getCells()->values)
+    cells.push_back(cell + Eigen::Vector3i::Constant(4));
+  const auto mesh = std::make_shared<imstk::SurfaceMesh>();
+  mesh->initialize(positionArray(positions), cellArray<3>(cells));
+  const auto cloth = test.deformable("cloth", mesh);
+  test.collide(cloth, cloth, within(0.2));
+  test.model->m_iterations = 50;
+  test.scene->initialize();
+  test.step();
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_LT(particle(*cloth, i).y(), -0.01) << i;
+    EXPECT_GT(particle(*cloth, i + 4).y(), 0.06) << i;
+  }
+  EXPECT_TRUE(imstk::logged().empty());
+}
+
+}  // namespace
