@@ -194,6 +194,19 @@ TEST(PalpateScene, ErrorsAreLoggedOnceAndEnd) {
   EXPECT_TRUE(test.palpateScene.trusted());
 }
 
+TEST(PalpateScene, AnErrorOfTheGuardIsLoggedOnce) {
+  TestScene test;
+  const auto box = std::make_shared<imstk::OrientedBox>();  // half of it is below the floor
+  test.guardOnly(test.floor(sheet({0, 0, 0})), test.tool(box));
+  test.scene->initialize();
+  for (int i = 1; i <= 3; ++i) {
+    box->setPosition({0, -0.01 * i, 0});
+    test.step();
+    EXPECT_EQ(test.palpateScene.error(), imstk::logged().at(0).substr(9));
+  }
+  EXPECT_EQ(imstk::logged().size(), 1u);
+}
+
 TEST(PalpateScene, OnlyInteractionsWithPalpateCDAreShared) {
   TestScene test;
   EXPECT_EQ(

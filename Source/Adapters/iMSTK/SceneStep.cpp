@@ -342,7 +342,6 @@ void SceneStep::detect() {
   });
   m_isTrusted = m_hasAnswer && m_step->trusted();
   m_restarts = false;
-  if (m_error.empty()) m_lastWarning.clear();
 }
 
 void SceneStep::write(Body& body) {
@@ -366,12 +365,13 @@ void SceneStep::end(bool guarded) {
   if (!m_isDetected) return;
   m_isDetected = false;
   m_held = 0;
-  if (guarded)
+  if (guarded && m_hasAnswer)
     attempt([&] {
       for (Body& body : m_bodies) read(body, false);
       m_held = m_step->hold();
       for (Body& body : m_bodies) write(body);
     });
+  if (m_error.empty()) m_lastWarning.clear();
   m_step->advance();
 }
 

@@ -52,7 +52,7 @@ struct PalpateSettings {
 ///          were held. All PbdObjects must share one PbdModel.
 /// Cuts     a geometry whose cells or number of vertices changed is replaced before the detection.
 /// Errors   are logged by iMSTK as warnings, each once in a row; error() has the last. A step whose
-///          detection failed has no contacts.
+///          detection failed has no contacts and no guard.
 class PALPATE_EXPORT PalpateScene {
  public:
   /// threads: 0: as many as iMSTK's thread pool has.
