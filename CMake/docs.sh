@@ -50,7 +50,7 @@ PALPATE_VERSION=$(sed -nE 's/^project\(Palpate VERSION ([0-9.]+).*/\1/p' CMakeLi
 export PALPATE_VERSION PALPATE_DOXYGEN_XML=$out/doxygen/xml
 {
   cat Docs/Site/Doxyfile
-  echo "INPUT = Source/Public/palpate Source/Simplify/Public/palpate Source/Adapters/MeshFiles/Public/palpate Source/Adapters/Vtk/Public/palpate Source/Adapters/Fcl/Public/palpate"
+  echo "INPUT = Source/Public/palpate Source/Simplify/Public/palpate Source/Adapters/MeshFiles/Public/palpate Source/Adapters/Vtk/Public/palpate Source/Adapters/Fcl/Public/palpate Source/Adapters/iMSTK/Public/palpate"
   echo "OUTPUT_DIRECTORY = $out/doxygen"
   echo "INPUT_FILTER = \"python3 Docs/Site/filter.py\""
 } >"$out/Doxyfile"

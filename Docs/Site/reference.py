@@ -19,6 +19,7 @@ GROUPS = {
     "Queries": "SpatialQueries Snapshot PenetrationTracker",
     "Bodies with an error bound": "DistanceField Simplify",
     "Files and display": "MeshFiles DataSets Window",
+    "iMSTK": "PalpateScene PalpateCD PalpateCH",
     "Errors, measurement and checks": "Error FrameStatistics LooseOctree Capture FclEngine Executor Export",
 }
 
