@@ -8,7 +8,7 @@ trap 'rm -rf "$tree"' EXIT
 missed=0
 
 # A tree with every module, without faults.
-for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/MeshFiles Adapters/Vtk Adapters/Fcl \
+for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/MeshFiles Adapters/Vtk Adapters/Fcl Adapters/iMSTK \
   Public/palpate Adapters/Vtk/Public/palpate/vtk; do
   mkdir -p "$tree/Source/$module"
 done
@@ -45,6 +45,7 @@ plant Includes Source/Mesh/A.h '#include "Shapes/Shape.h"\n'
 plant Includes Source/Shapes/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
 plant Includes Source/Adapters/MeshFiles/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Adapters/Vtk/A.cpp '#include "Core/Buffer.h"\n'
+plant Includes Source/Adapters/iMSTK/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Public/palpate/A.h '#include "Core/Buffer.h"\n'
 plant Places Source/Mesh/A.cpp '#include <tbb/parallel_for.h>\n'
 plant Places Source/Mesh/A.cpp '#include <thread>\n'
@@ -53,6 +54,7 @@ plant Places Source/Octree/A.cpp '#include <immintrin.h>\n'
 plant Places Source/CollisionDetection/A.cpp '#include <gmp.h>\n'
 plant Places Source/CollisionDetection/A.cpp '#include <vtkPolyData.h>\n'
 plant Places Source/Adapters/Vtk/A.cpp '#include <fcl/fcl.h>\n'
+plant Places Source/Adapters/Vtk/A.cpp '#include <imstkScene.h>\n'
 plant Places Source/Math/A.cpp '#include <Eigen/Dense>\n'
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\nstd::size_t a();\n' "$compiler" "$eigen"
 plant PublicHeaders Source/Public/palpate/A.h '#pragma once\n#include <Eigen/LU>\n' "$compiler" "$eigen"
