@@ -60,9 +60,13 @@ public struct PairSettings {
   public double Thickness, RestDistance, AllowedError, FreeMotionReach, TimeTolerance, MotionTolerance, WidestNormalCone;
   public Method Method;
   public ContactSet Contacts;
-  byte earliestTimeOnly;
+  byte earliestTimeOnly, trackContacts, reportCrossings;
   public bool EarliestTimeOnly {
     get { return earliestTimeOnly != 0; } set { earliestTimeOnly = value ? (byte)1 : (byte)0; }
+  }
+  public bool TrackContacts { get { return trackContacts != 0; } set { trackContacts = value ? (byte)1 : (byte)0; } }
+  public bool ReportCrossings {
+    get { return reportCrossings != 0; } set { reportCrossings = value ? (byte)1 : (byte)0; }
   }
   public static PairSettings Default {
     get {

@@ -6,8 +6,10 @@
 #define SIZE(type) printf("%s %u\n", #type, (unsigned)sizeof(type))
 
 int main(void) {
+  SIZE(palpate_contact_key);
   SIZE(palpate_contact_motion);
   SIZE(palpate_contacts);
+  SIZE(palpate_crossing);
   SIZE(palpate_distance);
   SIZE(palpate_edge_edge);
   SIZE(palpate_embedded_vertex);
@@ -42,6 +44,7 @@ int main(void) {
   SIZE(palpate_statistics);
   SIZE(palpate_surface_point);
   SIZE(palpate_tetrahedron_point);
+  SIZE(palpate_tracked_contact);
   SIZE(palpate_validity);
   SIZE(palpate_vertex_triangle);
   return 0;

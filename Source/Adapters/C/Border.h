@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Error.h>
 #include <palpate/Types.h>
 #include <palpate/palpate_c.h>
 
@@ -39,17 +40,25 @@ T& given(T* pointer, const char* name) {
   return *pointer;
 }
 
+/// `count` items of the type Item at `data`. Counts of more bytes than an array can have are
+/// refused, as the end of the array would not follow its start.
+template <class Item, class T>
+std::span<Item> arrayOf(T* data, std::size_t count, const char* name) {
+  if (count > 0) given(data, name);
+  if (count > PTRDIFF_MAX / sizeof(Item))
+    throw Error(ErrorCode::TooLarge, std::string(name) + " has " + std::to_string(count) +
+                                         " items; a program has no memory for them");
+  return {reinterpret_cast<Item*>(data), count};
+}
 template <class T>
 std::span<T> array(T* data, std::size_t count, const char* name) {
-  if (count > 0) given(data, name);
-  return {data, count};
+  return arrayOf<T>(data, count, name);
 }
 
 inline std::span<const Eigen::Vector3d> positions(const double* data, std::size_t count,
                                                   const char* name = "positions") {
   static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
-  if (count > 0) given(data, name);
-  return {reinterpret_cast<const Eigen::Vector3d*>(data), count};
+  return arrayOf<const Eigen::Vector3d>(data, count, name);
 }
 
 inline Eigen::Vector3d vector(const double* data, const char* name) {
@@ -61,8 +70,7 @@ template <std::size_t N>
 std::span<const std::array<std::uint32_t, N>> elements(const std::uint32_t* data, std::size_t count,
                                                        const char* name) {
   static_assert(sizeof(std::array<std::uint32_t, N>) == N * sizeof(std::uint32_t));
-  if (count > 0) given(data, name);
-  return {reinterpret_cast<const std::array<std::uint32_t, N>*>(data), count};
+  return arrayOf<const std::array<std::uint32_t, N>>(data, count, name);
 }
 
 /// Throws unless the caller's struct is that of this version. If a later version appends members,

@@ -59,6 +59,8 @@ PairSettings pairSettingsOf(const palpate_pair_settings* settings) {
           .restDistance = s.rest_distance,
           .allowedError = s.allowed_error,
           .freeMotionReach = s.free_motion_reach,
+          .trackContacts = s.track_contacts != 0,
+          .reportCrossings = s.report_crossings != 0,
           .continuous = {.timeTolerance = s.time_tolerance,
                          .earliestTimeOnly = s.earliest_time_only != 0},
           .automatic = {.motionTolerance = s.motion_tolerance},
@@ -76,7 +78,9 @@ palpate_pair_settings fromPairSettings(const PairSettings& s) {
           .widest_normal_cone = s.proxy.widestNormalCone,
           .method = static_cast<int>(s.method),
           .contacts = static_cast<int>(s.contacts),
-          .earliest_time_only = s.continuous.earliestTimeOnly};
+          .earliest_time_only = s.continuous.earliestTimeOnly,
+          .track_contacts = s.trackContacts,
+          .report_crossings = s.reportCrossings};
 }
 
 /// Sets the id of what add() adds. Nothing is added if there is no place for it.

@@ -26,6 +26,15 @@ static_assert(PALPATE_REASON_CHEAPEST == static_cast<int>(MethodReason::Cheapest
 static_assert(PALPATE_REASON_NO_ALTERNATIVE == static_cast<int>(MethodReason::NoAlternative));
 static_assert(PALPATE_REASON_ALLOWED_ERROR == static_cast<int>(MethodReason::AllowedError));
 
+static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactKind::TriangleVertex));
+static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactKind::EdgeEdge));
+static_assert(PALPATE_SHAPE_ELEMENT == static_cast<int>(ContactKind::Shape));
+static_assert(PALPATE_SHAPE_SHAPE == static_cast<int>(ContactKind::ShapeShape));
+static_assert(PALPATE_END_CUT == static_cast<int>(ContactEnd::Cut));
+static_assert(PALPATE_END_DISABLED == static_cast<int>(ContactEnd::Disabled));
+static_assert(PALPATE_END_FILTERED == static_cast<int>(ContactEnd::Filtered));
+static_assert(PALPATE_END_APART == static_cast<int>(ContactEnd::Apart));
+
 const CollisionData& dataOf(const palpate_cd* cd, palpate_id a, palpate_id b) {
   return of(cd).collisionData(GeometryId{a}, GeometryId{b});
 }
@@ -42,6 +51,40 @@ SolverVertices verticesOf(const palpate_side* side, const char* name) {
 ContactSide sideOf(const palpate_side* side, const char* name) {
   return {verticesOf(side, name), array(side->radii, side->radius_count, "radii"),
           motionOf(&side->motion, name)};
+}
+
+std::span<const TrackedContact> trackedOf(const CollisionData& data, ContactKind kind) {
+  switch (kind) {
+    case ContactKind::VertexTriangle:
+      return data.trackedVertexTriangle();
+    case ContactKind::TriangleVertex:
+      return data.trackedTriangleVertex();
+    case ContactKind::EdgeEdge:
+      return data.trackedEdgeEdge();
+    case ContactKind::Shape:
+      return data.trackedShape();
+    case ContactKind::ShapeShape:
+      break;
+  }
+  return data.trackedShapeShape();
+}
+
+/// Not a twin: TrackedContact has a std::optional.
+palpate_tracked_contact fromTracked(const TrackedContact& contact) {
+  return {.key = fromTwin<palpate_contact_key>(contact.key),
+          .predecessor = fromTwin<palpate_contact_key>(contact.predecessor.value_or(ContactKey{})),
+          .age = contact.age,
+          .has_predecessor = contact.predecessor.has_value(),
+          .end = static_cast<std::uint8_t>(contact.end),
+          .user_data = contact.userData};
+}
+
+void fill(std::span<palpate_tracked_contact> items, std::size_t& count,
+          std::span<const TrackedContact> all) {
+  const std::size_t written = std::min(items.size(), all.size());
+  std::transform(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(written), items.begin(),
+                 fromTracked);
+  count = all.size();
 }
 
 }  // namespace
@@ -111,6 +154,43 @@ palpate_status palpate_get_free_motion(const palpate_cd* cd, palpate_id id, cons
     given(motions, "motions"), given(count, "count");
     const auto all = of(cd).freeMotion(GeometryId{id});
     *motions = all.data();
+    *count = all.size();
+  });
+}
+
+palpate_status palpate_get_tracked(const palpate_cd* cd, palpate_id a, palpate_id b, int kind,
+                                   palpate_tracked_contact* tracked, size_t capacity,
+                                   size_t* count) {
+  return guarded(__func__, [&] {
+    const auto items = array(tracked, capacity, "tracked");
+    const auto list = enumerator(kind, ContactKind::ShapeShape, "kind");
+    given(count, "count");
+    fill(items, *count, trackedOf(dataOf(cd, a, b), list));
+  });
+}
+palpate_status palpate_get_ended(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                 palpate_tracked_contact* ended, size_t capacity, size_t* count) {
+  return guarded(__func__, [&] {
+    const auto items = array(ended, capacity, "ended");
+    given(count, "count");
+    fill(items, *count, dataOf(cd, a, b).ended());
+  });
+}
+palpate_status palpate_set_user_data(palpate_cd* cd, palpate_id a, palpate_id b,
+                                     const palpate_contact_key* key, uint64_t user_data) {
+  return guarded(__func__, [&] {
+    ContactKey contact;
+    contact.kind = enumerator(given(key, "key").kind, ContactKind::ShapeShape, "kind");
+    std::copy_n(key->ids, contact.ids.size(), contact.ids.begin());
+    of(cd).setUserData(GeometryId{a}, GeometryId{b}, contact, user_data);
+  });
+}
+palpate_status palpate_get_crossings(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                     const palpate_crossing** crossings, size_t* count) {
+  return guarded(__func__, [&] {
+    given(crossings, "crossings"), given(count, "count");
+    const auto all = dataOf(cd, a, b).crossings();
+    *crossings = fromTwins<palpate_crossing>(all.data());
     *count = all.size();
   });
 }

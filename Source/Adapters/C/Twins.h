@@ -82,6 +82,16 @@ PALPATE_SAME(palpate_shape_shape, normal, ShapeShapeContact, normal);
 PALPATE_SAME(palpate_shape_shape, distance, ShapeShapeContact, distance);
 PALPATE_SAME(palpate_shape_shape, time_of_impact, ShapeShapeContact, timeOfImpact);
 
+PALPATE_TWIN(palpate_contact_key, ContactKey);
+PALPATE_SAME(palpate_contact_key, kind, ContactKey, kind);
+PALPATE_SAME(palpate_contact_key, ids, ContactKey, ids);
+
+PALPATE_TWIN(palpate_crossing, Crossing);
+PALPATE_SAME(palpate_crossing, kind, Crossing, kind);
+PALPATE_SAME(palpate_crossing, ids, Crossing, ids);
+PALPATE_SAME(palpate_crossing, time, Crossing, time);
+PALPATE_SAME(palpate_crossing, forward, Crossing, forward);
+
 PALPATE_TWIN(palpate_memory, MemoryUse);
 PALPATE_SAME(palpate_memory, geometries, MemoryUse, geometries);
 PALPATE_SAME(palpate_memory, octrees, MemoryUse, octrees);
@@ -197,8 +207,7 @@ template <class C>
 auto twins(C* data, std::size_t count, const char* name) {
   using Type = std::conditional_t<std::is_const_v<C>, const TwinOf<std::remove_const_t<C>>,
                                   TwinOf<std::remove_const_t<C>>>;
-  array(data, count, name);
-  return std::span<Type>(reinterpret_cast<Type*>(data), count);
+  return arrayOf<Type>(data, count, name);
 }
 
 /// A list of the caller with its capacity, checked before it is computed.

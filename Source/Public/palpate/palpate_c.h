@@ -118,6 +118,7 @@ typedef struct palpate_pair_settings {
   int method;
   int contacts;
   uint8_t earliest_time_only;
+  uint8_t track_contacts, report_crossings;
 } palpate_pair_settings;
 PALPATE_EXPORT palpate_status palpate_init_pair_settings(palpate_pair_settings* settings,
                                                          size_t size);
@@ -276,10 +277,16 @@ PALPATE_EXPORT palpate_status palpate_get_surface(const palpate_cd* cd, palpate_
 
 /// a, b: the index of a vertex or triangle, twice; or the two vertices of an edge.
 typedef struct palpate_features {
-  int kind;  ///< PALPATE_VERTEX_TRIANGLE and following
+  int kind;  ///< up to PALPATE_EDGE_EDGE
   uint32_t a[2], b[2];
 } palpate_features;
-enum { PALPATE_VERTEX_TRIANGLE, PALPATE_TRIANGLE_VERTEX, PALPATE_EDGE_EDGE };
+enum {
+  PALPATE_VERTEX_TRIANGLE,
+  PALPATE_TRIANGLE_VERTEX,
+  PALPATE_EDGE_EDGE,
+  PALPATE_SHAPE_ELEMENT,
+  PALPATE_SHAPE_SHAPE
+};  ///< ContactKind
 
 /// 0: these features are no contact. Several threads call it at once.
 typedef int (*palpate_predicate)(void* context, const palpate_features* features);
@@ -433,6 +440,54 @@ PALPATE_EXPORT palpate_status palpate_get_hash(const palpate_cd* cd, palpate_id 
 /// One number per vertex, or one for a shape: a view.
 PALPATE_EXPORT palpate_status palpate_get_free_motion(const palpate_cd* cd, palpate_id id,
                                                       const double** motions, size_t* count);
+
+// Contacts over time. <palpate/Tracking.h>
+
+typedef struct palpate_contact_key {
+  uint8_t kind;     ///< PALPATE_VERTEX_TRIANGLE and following
+  uint32_t ids[4];  ///< those of ContactKey
+} palpate_contact_key;
+
+enum {
+  PALPATE_END_NONE,
+  PALPATE_END_CUT,
+  PALPATE_END_DISABLED,
+  PALPATE_END_FILTERED,
+  PALPATE_END_APART
+};  ///< ContactEnd
+
+typedef struct palpate_tracked_contact {
+  palpate_contact_key key;
+  palpate_contact_key predecessor;  ///< without one its ids are PALPATE_NO_ELEMENT
+  uint32_t age;
+  uint8_t has_predecessor;
+  uint8_t end;  ///< PALPATE_END_NONE and following
+  uint64_t user_data;
+} palpate_tracked_contact;
+
+typedef struct palpate_crossing {
+  uint8_t kind;     ///< up to PALPATE_EDGE_EDGE
+  uint32_t ids[4];  ///< those of palpate_contact_key
+  double time;      ///< [0, 1] of the step
+  uint8_t forward;
+} palpate_crossing;
+
+/// A list, parallel to the contacts of this kind. Empty without `track_contacts`.
+PALPATE_EXPORT palpate_status palpate_get_tracked(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                                  int kind, palpate_tracked_contact* tracked,
+                                                  size_t capacity, size_t* count);
+/// A list of the contacts that ended.
+PALPATE_EXPORT palpate_status palpate_get_ended(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                                palpate_tracked_contact* ended, size_t capacity,
+                                                size_t* count);
+PALPATE_EXPORT palpate_status palpate_set_user_data(palpate_cd* cd, palpate_id a, palpate_id b,
+                                                    const palpate_contact_key* key,
+                                                    uint64_t user_data);
+/// A view. Empty without `report_crossings`.
+PALPATE_EXPORT palpate_status palpate_get_crossings(const palpate_cd* cd, palpate_id a,
+                                                    palpate_id b,
+                                                    const palpate_crossing** crossings,
+                                                    size_t* count);
 
 /// Bytes.
 typedef struct palpate_memory {

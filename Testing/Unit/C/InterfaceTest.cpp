@@ -292,6 +292,72 @@ TEST_F(CScene, RowsAndMotionsAreThoseOfCpp) {
   EXPECT_EQ(numbersOf(second), numbersOf(tangentsOf({0.6, 0, 0.8}, t)));
 }
 
+TEST_F(CScene, ContactsOverTimeAreThoseOfCpp) {
+  OctreeBasedCD& whole = m_whole.detection;
+  std::vector<CollisionPair> tracked(whole.pairs().begin(), whole.pairs().end());
+  for (CollisionPair& pair : tracked) {
+    const palpate_id a = idOf(pair.a), b = idOf(pair.b);
+    pair.settings.trackContacts = true;
+    if (pair.b == GeometryId{floor} && pair.a == GeometryId{organ}) {
+      pair.settings.method = Method::Continuous;
+      pair.settings.reportCrossings = true;
+    }
+    whole.setPairSettings(pair.a, pair.b, pair.settings);
+    palpate_pair_settings p{};
+    p.size = sizeof p;
+    EXPECT_OK(palpate_get_pair_settings(m_cd, a, b, &p));
+    EXPECT_FALSE(p.track_contacts || p.report_crossings);
+    p.track_contacts = 1;
+    p.report_crossings = pair.settings.reportCrossings;
+    p.method = static_cast<int>(pair.settings.method);
+    EXPECT_OK(palpate_set_pair_settings(m_cd, a, b, &p));
+    EXPECT_OK(palpate_get_pair_settings(m_cd, a, b, &p));
+    EXPECT_TRUE(p.track_contacts && p.report_crossings == pair.settings.reportCrossings);
+  }
+  std::size_t lasting[5] = {}, slides = 0, ends = 0, crossings = 0, kept = 0;
+  for (int frame = 0; frame < 5; ++frame) {
+    step(0.4 * frame, -0.05 * frame);
+    for (const CollisionPair& pair : tracked) {
+      const palpate_id a = idOf(pair.a), b = idOf(pair.b);
+      SCOPED_TRACE(std::to_string(a) + ", " + std::to_string(b));
+      const CollisionData& expected = whole.collisionData(pair.a, pair.b);
+      const std::span<const TrackedContact> lists[] = {
+          expected.trackedVertexTriangle(), expected.trackedTriangleVertex(),
+          expected.trackedEdgeEdge(), expected.trackedShape(), expected.trackedShapeShape()};
+      for (int kind = 0; kind < 5; ++kind) {
+        const auto all = listFrom<palpate_tracked_contact>(
+            [&](auto... list) { return palpate_get_tracked(m_cd, a, b, kind, list...); });
+        expectSame<palpate_tracked_contact, TrackedContact>(all, lists[kind]);
+        for (const palpate_tracked_contact& contact : all) {
+          EXPECT_EQ(contact.key.kind, kind);
+          lasting[kind] += contact.age > 0;
+          slides += contact.has_predecessor;
+          kept += contact.age > 0 && contact.user_data > 0;
+        }
+        for (std::size_t i = 0; i < all.size(); i += 3) {
+          const std::uint64_t value = (std::uint64_t{1} << 63) + i;
+          EXPECT_OK(palpate_set_user_data(m_cd, a, b, &all[i].key, value));
+          whole.setUserData(pair.a, pair.b, lists[kind][i].key, value);
+        }
+      }
+      const auto ended = listFrom<palpate_tracked_contact>(
+          [&](auto... list) { return palpate_get_ended(m_cd, a, b, list...); });
+      expectSame<palpate_tracked_contact, TrackedContact>(ended, expected.ended());
+      const palpate_crossing* passed = nullptr;
+      std::size_t passedCount = 0;
+      EXPECT_OK(palpate_get_crossings(m_cd, a, b, &passed, &passedCount));
+      expectSame(std::span(passed, passedCount), expected.crossings());
+      ends += ended.size(), crossings += passedCount;
+    }
+    advance();
+  }
+  for (const std::size_t count : lasting) EXPECT_GT(count, 0u);
+  EXPECT_GT(slides, 0u);
+  EXPECT_GT(ends, 0u);
+  EXPECT_GT(crossings, 0u);
+  EXPECT_GT(kept, 0u);
+}
+
 /// Queries of the scene and of its snapshot by C, against those of C++.
 void expectSameQueries(const palpate_queries* c, const SpatialQueries& q, palpate_id organ,
                        palpate_id floor, palpate_id drops, palpate_id block, palpate_id hull,

@@ -155,6 +155,51 @@ TEST_F(CMisuse, SizesOfStructsAndValuesAreChecked) {
                  PALPATE_INVALID_ARGUMENT, "rule is 2");
 }
 
+TEST_F(CMisuse, ContactsOverTime) {
+  std::size_t count = 0;
+  palpate_contact_key key{5, {}};
+  EXPECT_REFUSED(palpate_get_ended(m_cd, m_a, m_b, nullptr, 0, &count), PALPATE_NOT_AVAILABLE, "");
+  EXPECT_REFUSED(palpate_set_user_data(m_cd, m_a, m_b, &key, 1), PALPATE_INVALID_ARGUMENT,
+                 "kind is 5");
+  key.kind = PALPATE_EDGE_EDGE;
+  EXPECT_REFUSED(palpate_set_user_data(m_cd, m_a, m_b, &key, 1), PALPATE_NOT_AVAILABLE,
+                 "trackContacts is not set");
+  ASSERT_EQ(palpate_detect(m_cd), PALPATE_OK);
+  for (const int kind : {-1, 5, 256})
+    EXPECT_REFUSED(palpate_get_tracked(m_cd, m_a, m_b, kind, nullptr, 0, &count),
+                   PALPATE_INVALID_ARGUMENT, "kind is " + std::to_string(kind));
+  palpate_pair_settings pair;
+  ASSERT_EQ(palpate_init_pair_settings(&pair, sizeof pair), PALPATE_OK);
+  pair.report_crossings = 7;  // counts as 1
+  EXPECT_REFUSED(palpate_set_pair_settings(m_cd, m_a, m_b, &pair), PALPATE_UNSUPPORTED_METHOD,
+                 "reportCrossings");
+  EXPECT_REFUSED(palpate_get_tracked(m_cd, m_b, 99, 0, nullptr, 0, &count),
+                 PALPATE_UNKNOWN_GEOMETRY, "99");
+}
+
+/// Arrays of more bytes than a program can have: their ends would lie before their starts.
+TEST_F(CMisuse, CountsThatOverflowAreRefused) {
+  constexpr int kBits = std::numeric_limits<std::size_t>::digits;
+  palpate_id id;
+  palpate_shape hull{};
+  hull.size = sizeof hull;
+  hull.kind = PALPATE_HULL;
+  hull.points = kPositions;
+  // The first, times the size of a position, is that of four positions.
+  for (const std::size_t count : {(std::size_t{1} << (kBits - 3)) + 4, SIZE_MAX}) {
+    const std::string items = std::to_string(count) + " items";
+    hull.point_count = count;
+    EXPECT_REFUSED(palpate_add_shape(m_cd, &hull, &id), PALPATE_TOO_LARGE, "points has " + items);
+    EXPECT_REFUSED(palpate_add_point_set(m_cd, kPositions, count, nullptr, 0, &id),
+                   PALPATE_TOO_LARGE, "positions has " + items);
+    EXPECT_REFUSED(palpate_set_triangles(m_cd, m_a, kPositions, 4, kTriangles, count),
+                   PALPATE_TOO_LARGE, "triangles has " + items);
+    std::uint8_t flag = 0;
+    EXPECT_REFUSED(palpate_contains(m_queries, m_a, kPositions, count, nullptr, &flag),
+                   PALPATE_TOO_LARGE, "points has " + items);
+  }
+}
+
 /// Each function with each of its pointers null in turn; those that may be null are not listed.
 TEST_F(CMisuse, NullIsRefused) {
   palpate_cd* cd = m_cd;
@@ -183,6 +228,8 @@ TEST_F(CMisuse, NullIsRefused) {
   palpate_side sideValue;
   ASSERT_EQ(palpate_init_side(&sideValue, sizeof sideValue), PALPATE_OK);
   const palpate_side* side = &sideValue;
+  const palpate_contact_key key{};
+  const palpate_crossing* crossings = nullptr;
   const std::vector<std::function<palpate_status()>> calls{
       [&] { return palpate_create(nullptr, nullptr); },
       [&] { return palpate_init_settings(nullptr, sizeof(palpate_settings)); },
@@ -277,6 +324,17 @@ TEST_F(CMisuse, NullIsRefused) {
       [&] { return palpate_get_hash(nullptr, a, b, nullptr); },
       [&] { return palpate_get_free_motion(cd, a, nullptr, count); },
       [&] { return palpate_get_free_motion(cd, a, view, nullptr); },
+      [&] { return palpate_get_tracked(nullptr, a, b, 0, nullptr, 0, count); },
+      [&] { return palpate_get_tracked(cd, a, b, 0, nullptr, 1, count); },
+      [&] { return palpate_get_tracked(cd, a, b, 0, nullptr, 0, nullptr); },
+      [&] { return palpate_get_ended(nullptr, a, b, nullptr, 0, count); },
+      [&] { return palpate_get_ended(cd, a, b, nullptr, 1, count); },
+      [&] { return palpate_get_ended(cd, a, b, nullptr, 0, nullptr); },
+      [&] { return palpate_set_user_data(nullptr, a, b, &key, 0); },
+      [&] { return palpate_set_user_data(cd, a, b, nullptr, 0); },
+      [&] { return palpate_get_crossings(nullptr, a, b, &crossings, count); },
+      [&] { return palpate_get_crossings(cd, a, b, nullptr, count); },
+      [&] { return palpate_get_crossings(cd, a, b, &crossings, nullptr); },
       [&] { return palpate_get_statistics(cd, nullptr); },
       [&] { return palpate_get_pair_statistics(cd, a, b, nullptr); },
       [&] { return palpate_get_rows(nullptr, a, b, side, side, nullptr, nullptr, 0, count); },

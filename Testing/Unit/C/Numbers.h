@@ -79,6 +79,19 @@ inline Numbers bitsOf(Tag, const palpate_shape_shape& c) {
 inline Numbers bitsOf(Tag, const ShapeShapeContact& c) {
   return listOf(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
 }
+inline Numbers bitsOf(Tag, const palpate_contact_key& k) { return listOf(k.kind, k.ids); }
+inline Numbers bitsOf(Tag, const ContactKey& k) { return listOf(k.kind, k.ids); }
+inline Numbers bitsOf(Tag, const palpate_tracked_contact& c) {
+  return listOf(c.key, c.predecessor, c.age, c.has_predecessor, c.end, c.user_data);
+}
+inline Numbers bitsOf(Tag, const TrackedContact& c) {
+  return listOf(c.key, c.predecessor.value_or(ContactKey{}), c.age, c.predecessor.has_value(),
+                c.end, c.userData);
+}
+inline Numbers bitsOf(Tag, const palpate_crossing& c) {
+  return listOf(c.kind, c.ids, c.time, c.forward);
+}
+inline Numbers bitsOf(Tag, const Crossing& c) { return listOf(c.kind, c.ids, c.time, c.forward); }
 inline Numbers bitsOf(Tag, const palpate_row& r) {
   return listOf(r.vertices, r.weights, r.normal, r.offset);
 }
