@@ -41,6 +41,22 @@ def test_contacts_slide_with_their_data():
     assert len(data.tracked_edge_edge) == len(data.tracked_triangle_vertex) == 0
 
 
+def test_user_data_of_a_field_and_of_each_second_number():
+    collisions, tips, sheet = scene(method="proximity", track_contacts=True)
+
+    def tracked():
+        collisions.detect_collision()
+        return collisions.collision_data(tips, sheet).tracked_vertex_triangle
+
+    for data in (np.array([5, 6, 7, 8], np.uint64)[::2], np.array([5, 6, 7])[::2]):
+        collisions.set_user_data(tips, sheet, tracked()["key"], data)
+        assert tracked()["user_data"].tolist() == [5, 7]
+    before = tracked()
+    collisions.set_user_data(tips, sheet, before["key"], [0, 0])
+    collisions.set_user_data(tips, sheet, before["key"], before["user_data"])
+    assert tracked()["user_data"].tolist() == [5, 7]
+
+
 def test_crossings_are_records():
     collisions, tips, sheet = scene(method="continuous", report_crossings=True)
     collisions.advance()

@@ -137,8 +137,9 @@ A copy of the answer of the last detection, in the order in which the pair was a
           [](Collisions& self, Object first, Object second, Object keys, Object data) {
             const GeometryId a = geometryId(first), b = geometryId(second);
             const std::vector<ContactKey> contacts = structsIn<ContactKey>(keys);
-            const auto values = py::array_t<std::uint64_t, py::array::forcecast>(
-                py::reinterpret_borrow<py::object>(data));
+            const auto values =
+                py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>(
+                    py::reinterpret_borrow<py::object>(data));
             const auto count = static_cast<std::size_t>(values.size());
             if (count != 1 && count != contacts.size())
               throw py::value_error("data has " + std::to_string(count) + " numbers for " +
