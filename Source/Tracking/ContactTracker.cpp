@@ -139,6 +139,7 @@ void ContactTracker::match(Contents& next) {
   m_ended.clear();
   m_begun.clear();
   Entry *before = m_before.data(), *const end = before + m_before.size();
+  const bool otherElements = hasOtherElements(next);
   forEachTracked(next, [&](ContactKind kind, const auto& contacts, auto& tracked) {
     tracked.resize(contacts.size());
     for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -147,7 +148,8 @@ void ContactTracker::match(Contents& next) {
       PALPATE_ASSERT(i == 0 || tracked[i - 1].key < key);
       while (before != end && !areSame(before->key, key) && before->key < key)
         m_ended.push_back(before++);
-      if (before != end && areSame(before->key, key) && areSame(before->corners, corners)) {
+      if (before != end && areSame(before->key, key) && areSame(before->corners, corners) &&
+          !(otherElements && kind == ContactKind::Shape)) {
         tracked[i] = {key, {}, before->age + 1, before->userData, ContactEnd::None};
         ++before;
       } else {
@@ -179,7 +181,7 @@ void ContactTracker::linkVertices(bool self) {
 
 /// Lists for each contact that began those that ended and have common vertices with it on both
 /// sides.
-void ContactTracker::findSlides(bool self) {
+void ContactTracker::findSlides(bool self, bool otherElements) {
   m_slides.clear();
   for (Begun& begun : m_begun) {
     begun.firstSlide = m_slides.size();
@@ -191,6 +193,7 @@ void ContactTracker::findSlides(bool self) {
       for (; link < m_links.size(); link = m_links[link].next) {
         if (m_links[link].vertex != vertex) continue;
         const Entry& entry = *m_ended[m_links[link].entry];
+        if (otherElements && entry.key.kind == ContactKind::Shape) continue;
         const Vertices before = verticesOf(entry.key, entry.corners);
         const auto shared = [&](int first) {
           const int a = sharedVertices(now[0], before[first]),
@@ -293,7 +296,7 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   for (Entry* entry : m_ended) entry->isPredecessor = false;
   if (!m_begun.empty() && !m_ended.empty()) {
     linkVertices(pair.self());
-    findSlides(pair.self());
+    findSlides(pair.self(), hasOtherElements(next));
     takePredecessors();
   }
   if (std::exchange(m_repeats, true)) takeUserData(last);
@@ -333,20 +336,21 @@ void ContactTracker::releaseMemory(Contents& contents) {
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {
   bool isFound = false;
-  forEachTracked(contents, [&](ContactKind kind, const auto&, auto& tracked) {
+  forEachTracked(contents, [&](ContactKind kind, const auto& contacts, auto& tracked) {
     if (kind != key.kind) return;
     const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
     if (found == tracked.end() || found->key != key) return;
     found->userData = data;
     isFound = true;
+    // Detections of this step that are repeated read it here.
+    const auto before =
+        std::lower_bound(m_before.begin(), m_before.end(), key,
+                         [](const Entry& e, const ContactKey& k) { return e.key < k; });
+    if (before != m_before.end() && before->key == key &&
+        before->corners == cornersOf(contacts[static_cast<std::size_t>(found - tracked.begin())]))
+      before->userData = data;
   });
-  if (!isFound) return false;
-  // Detections of this step that are repeated read it here.
-  const auto found =
-      std::lower_bound(m_before.begin(), m_before.end(), key,
-                       [](const Entry& e, const ContactKey& k) { return e.key < k; });
-  if (found != m_before.end() && found->key == key) found->userData = data;
-  return true;
+  return isFound;
 }
 
 }  // namespace palpate

@@ -33,6 +33,7 @@ class ContactTracker : public CountedObject {
              const Contents& last, Contents& next);
   /// An answer that needs no detection lasts into this step. Call commit() then.
   void keep() { m_keeps = true; }
+  bool keeps() const { return m_keeps; }
   void commit(Contents& kept) noexcept;
 
   void releaseMemory(Contents&);  ///< keeps what contacts have been
@@ -72,9 +73,13 @@ class ContactTracker : public CountedObject {
   template <class Contact>
   static ContactKey keyOf(ContactKind, const Contact&);
   static Vertices verticesOf(const ContactKey&, const Triangle& corners);
+  /// Whether Contents::shape has elements of the other geometry now: equal keys are other contacts.
+  bool hasOtherElements(const Contents& next) const {
+    return next.tracked.elementsOfSecond != m_beforeOfSecond;
+  }
   void match(Contents& next);
   void linkVertices(bool self);
-  void findSlides(bool self);
+  void findSlides(bool self, bool otherElements);
   void takePredecessors();
   void takeUserData(const Contents& last);
   ContactEnd endOf(const MeshPair&, bool collides, const Entry&) const;

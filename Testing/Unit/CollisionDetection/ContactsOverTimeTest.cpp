@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -379,6 +380,67 @@ TEST_F(ContactEnds, Cut) {
   collisions.setTriangles(a, floor.positions, without);
   moveTool({0, 0, 0.5});
   expectEnd(ContactEnd::Cut, collisions);
+}
+
+/// The triangles get other vertices. User data of a contact is not that of one that ended, whose
+/// triangle had the same index.
+TEST_F(ContactEnds, UserDataOfANewContactLeavesTheEndedOne) {
+  const TrackedContact old = data().trackedTriangleVertex()[0];
+  collisions.setUserData(a, b, old.key, 1);
+  const auto count = static_cast<std::uint32_t>(floor.positions.size());
+  for (std::uint32_t v = 0; v < count; ++v) floor.positions.push_back(floor.positions[v]);
+  for (Triangle& triangle : floor.triangles)
+    for (std::uint32_t& corner : triangle) corner += count;
+  collisions.setTriangles(a, floor.positions, floor.triangles);
+  for (const double time : {0.0, 0.001}) {  // two detections of one step
+    moveTool({0, 0, time});
+    collisions.detectCollision();
+    ASSERT_EQ(data().ended().size(), 1u);
+    const TrackedContact ended{old.key, {}, 0, 1, ContactEnd::Cut};
+    EXPECT_EQ(data().ended()[0], ended);
+    ASSERT_EQ(data().trackedTriangleVertex().size(), 1u);
+    const TrackedContact begun = data().trackedTriangleVertex()[0];
+    EXPECT_EQ(begun.key, old.key);
+    EXPECT_EQ(begun.age, 0u);
+    EXPECT_EQ(begun.userData, time == 0.0 ? 0u : 2u);
+    collisions.setUserData(a, b, begun.key, 2);
+  }
+}
+
+/// Vertices of one mesh touch the field of the other, then the other way round. Keys name neither
+/// mesh, but a contact of another mesh's vertex is another contact.
+TEST(ContactsOverTime, ElementsOfTheOtherMeshBeginAnew) {
+  const Mesh cube = testing::cube(0, 1);
+  const auto field = std::make_shared<const DistanceField>(DistanceField::build(
+      {cube.positions, cube.triangles}, {.errorBound = 0.01, .band = 0.3, .threads = 1}));
+  OctreeBasedCD collisions;
+  const GeometryId a = addMesh(collisions, cube), b = addMesh(collisions, cube);
+  // The faces x = 1 of both are opposite each other.
+  const Eigen::Matrix3d half = Eigen::Vector3d(-1, -1, 1).asDiagonal();
+  collisions.setTransform(b, {half, {2.02, 1, 0}});
+  const PairSettings byField{
+      .method = Method::DistanceField, .thickness = 0.1, .trackContacts = true};
+  collisions.attachDistanceField(b, field);
+  collisions.addCollisionPair(a, b, byField);
+  collisions.detectCollision();
+  const CollisionData& data = collisions.collisionData(a, b);
+  std::set<ContactKey> ofA, ofB;
+  for (const TrackedContact& contact : data.trackedShape()) ofA.insert(contact.key);
+  collisions.advance();
+  collisions.attachDistanceField(a, field);
+  collisions.setPairSettings(a, b, {.thickness = 0.1, .trackContacts = true});
+  collisions.attachDistanceField(b, nullptr);
+  collisions.setPairSettings(a, b, byField);
+  collisions.detectCollision();
+  for (const TrackedContact& contact : data.trackedShape()) {
+    ofB.insert(contact.key);
+    EXPECT_EQ(contact.age, 0u);
+    EXPECT_FALSE(contact.predecessor);
+  }
+  std::vector<ContactKey> both;
+  std::ranges::set_intersection(ofA, ofB, std::back_inserter(both));
+  EXPECT_GE(both.size(), 4u);
+  EXPECT_EQ(data.ended().size(), ofA.size());
 }
 
 /// A vertex slides over the edges of a mesh and keeps one contact.
