@@ -248,7 +248,8 @@ void OctreeBasedCD::Implementation::detect() {
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
       record->commitEmpty();
-    if (record->tracker) record->tracker->commit(CollisionData::Contents::of(record->data));
+    if (record->tracker && record->tracker->keeps())
+      record->tracker->commit(CollisionData::Contents::of(record->data));
     const CollisionData& data = record->data;
     record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
     next.contacts += record->statistics.contacts;

@@ -56,7 +56,7 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
 void PairRecord::track(std::uint64_t step) {
   using Contents = CollisionData::Contents;
   const bool changes = !dataVersion.isCurrent(state());
-  if (changes && !collides()) next = {};
+  if (changes && !collides()) Contents::of(next) = {};
   if (!pair.settings.trackContacts) {
     tracker.reset();
     if (changes && collides()) Contents::of(next).tracked = {};

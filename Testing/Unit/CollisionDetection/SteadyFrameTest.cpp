@@ -107,6 +107,24 @@ TEST(SteadyFrame, AllocatesNothingWithAuto) {
                                MethodReason::Cheapest}));
 }
 
+/// Of pairs that filters separate, too.
+TEST(SteadyFrame, AllocatesNothingForTrackedPairsThatFiltersSeparate) {
+  OctreeBasedCD detection({.threads = 1});
+  const std::vector<Eigen::Vector3d> points{{0, 0, 0}, {1, 0, 0}};
+  const GeometryId a = detection.addPointSet(points), b = detection.addPointSet(points);
+  detection.addCollisionPair(a, b, {.thickness = 0.1, .trackContacts = true});
+  detection.setCollisionFilter(b, {.groups = 2, .mask = 2});
+  std::size_t before = 0;
+  for (int frame = 0; frame < 12; ++frame) {
+    if (frame == 4) before = allocations;
+    detection.setPositions(
+        a, std::vector<Eigen::Vector3d>{{0.01 * frame, 0, 0}, {1, 0.01 * frame, 0}});
+    detection.detectCollision();
+    detection.advance();
+  }
+  EXPECT_EQ(allocations - before, 8u);  // of the positions above
+}
+
 /// Every two bodies that a row of the table of support answers, in one object. Steps of two sizes
 /// take turns.
 TEST(SteadyFrame, AllocatesNothingForAnyRowOfTheTable) {
