@@ -1,6 +1,6 @@
 #!/bin/bash
-# try.sh PACKAGE.deb...: installs the packages into a bare Debian 12, and uses each: a C++ program by pkg-config and one by
-# CMake, Python, commands and their manual pages. Needs root, mmdebstrap and the mirror of apt.
+# try.sh PACKAGE.deb...: installs the packages into a bare Debian 12, and uses each: a C++ and a C program by pkg-config, a
+# C++ program by CMake, Python, commands and their manual pages. Needs root, mmdebstrap and the mirror of apt.
 set -euo pipefail
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
@@ -10,7 +10,7 @@ for package in "$@"; do packages+=("$(realpath "$package")"); done
 mmdebstrap --variant=minbase bookworm "$root" >"$root.log" 2>&1 || { cat "$root.log"; exit 1; }
 mkdir -p "$root/packages" "$root/program"
 cp "${packages[@]}" "$root/packages"
-cp "$here"/../Consumer/Project/Contacts.cpp "$root/program"
+cp "$here"/../Consumer/Project/Contacts.cpp "$here"/../../Examples/HelloCollisionC/HelloCollision.c "$root/program"
 inside() { chroot "$root" env DEBIAN_FRONTEND=noninteractive "$@"; }
 inside apt-get -qq update
 inside bash -c 'apt-get -qq install -y --no-install-recommends /packages/libpalpate0_*.deb >/dev/null'
@@ -22,6 +22,8 @@ rm "$root"/packages/libpalpate-vtk-dev_*.deb
 inside bash -c 'apt-get -qq install -y --no-install-recommends /packages/*.deb g++ cmake make pkg-config >/dev/null'
 echo "--- a program by pkg-config"
 inside bash -c 'cd /program && g++ -std=c++20 Contacts.cpp $(pkg-config --cflags --libs palpate) -o contacts && ./contacts'
+echo "--- a C program by pkg-config"
+inside bash -c 'cd /program && gcc -std=c99 HelloCollision.c $(pkg-config --cflags --libs palpate) -lm -o c && ./c'
 echo "--- a program by CMake"
 cat >"$root/program/CMakeLists.txt" <<'EOF'
 cmake_minimum_required(VERSION 3.25)
