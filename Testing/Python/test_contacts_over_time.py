@@ -57,6 +57,27 @@ def test_user_data_of_a_field_and_of_each_second_number():
     assert tracked()["user_data"].tolist() == [5, 7]
 
 
+def test_user_data_that_are_refused_change_nothing():
+    collisions, tips, sheet = scene(method="proximity", track_contacts=True)
+    collisions.detect_collision()
+    keys = collisions.collision_data(tips, sheet).tracked_vertex_triangle["key"]
+    collisions.set_user_data(tips, sheet, keys, [5, 6])
+    for error, data in (
+        (OverflowError, [1, -1]),
+        (OverflowError, [1, 2**64]),
+        (TypeError, [1, 1.5]),
+        (TypeError, np.array([1.0, 2.0])),
+    ):
+        with pytest.raises(error):
+            collisions.set_user_data(tips, sheet, keys, data)
+    unknown = keys.copy()
+    unknown["ids"][1, 0] = 9
+    with pytest.raises(palpate.Error, match="no contact with this key"):
+        collisions.set_user_data(tips, sheet, unknown, 1)
+    data = collisions.collision_data(tips, sheet).tracked_vertex_triangle["user_data"]
+    assert data.tolist() == [5, 6]
+
+
 def test_crossings_are_records():
     collisions, tips, sheet = scene(method="continuous", report_crossings=True)
     collisions.advance()

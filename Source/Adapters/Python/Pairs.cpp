@@ -4,6 +4,9 @@
 #include "Python/Collisions.h"
 #include "Python/Records.h"
 
+#include <algorithm>
+#include <vector>
+
 namespace palpate::python {
 namespace {
 
@@ -49,6 +52,26 @@ void forEachCandidate(Collisions& self, const py::args& arguments) {
       callback.get()(toPython(pair), copyOf(batch));
     });
   });
+}
+
+/// One integer or many, each of 64 bits without a sign.
+std::vector<std::uint64_t> wordsIn(const py::object& data) {
+  std::vector<std::uint64_t> words;
+  const py::object numbers = py::module_::import("numpy").attr("array")(data, "object");
+  for (const py::handle item : numbers.attr("flat")) {
+    const auto integer = py::reinterpret_steal<py::object>(PyNumber_Index(item.ptr()));
+    if (!integer) throw py::error_already_set();
+    words.push_back(PyLong_AsUnsignedLongLong(integer.ptr()));
+    if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+  }
+  return words;
+}
+
+bool hasTracked(const CollisionData& data, const ContactKey& key) {
+  for (const auto list : {data.trackedVertexTriangle(), data.trackedTriangleVertex(),
+                          data.trackedEdgeEdge(), data.trackedShape(), data.trackedShapeShape()})
+    if (std::ranges::binary_search(list, key, {}, &TrackedContact::key)) return true;
+  return false;
 }
 
 }  // namespace
@@ -137,17 +160,18 @@ A copy of the answer of the last detection, in the order in which the pair was a
           [](Collisions& self, Object first, Object second, Object keys, Object data) {
             const GeometryId a = geometryId(first), b = geometryId(second);
             const std::vector<ContactKey> contacts = structsIn<ContactKey>(keys);
-            const auto values =
-                py::array_t<std::uint64_t, py::array::c_style | py::array::forcecast>(
-                    py::reinterpret_borrow<py::object>(data));
-            const auto count = static_cast<std::size_t>(values.size());
-            if (count != 1 && count != contacts.size())
-              throw py::value_error("data has " + std::to_string(count) + " numbers for " +
+            const std::vector<std::uint64_t> words = wordsIn(data);
+            if (words.size() != 1 && words.size() != contacts.size())
+              throw py::value_error("data has " + std::to_string(words.size()) + " numbers for " +
                                     std::to_string(contacts.size()) + " keys");
             self.change([&](OctreeBasedCD& d) {
+              // The first key without a contact throws before anything changes.
+              const auto missing = std::ranges::find_if(contacts, [&](const ContactKey& key) {
+                return !hasTracked(d.collisionData(a, b), key);
+              });
+              if (missing != contacts.end()) d.setUserData(a, b, *missing, 0);
               for (std::size_t i = 0; i < contacts.size(); ++i)
-                d.setUserData(a, b, contacts[i],
-                              values.data()[count == 1 ? 0 : static_cast<py::ssize_t>(i)]);
+                d.setUserData(a, b, contacts[i], words[words.size() == 1 ? 0 : i]);
             });
           },
           py::arg("a"), py::arg("b"), py::arg("keys"), py::arg("data"),
