@@ -14,12 +14,15 @@
 #include <mutex>
 #include <new>
 #include <optional>
-#include <pthread.h>
 #include <string>
 #include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#ifndef _WIN32
+#include <pthread.h>
+#endif
 
 #ifdef PALPATE_THREADS_TBB
 #include <tbb/global_control.h>
@@ -45,12 +48,14 @@ int threadCount(int count) {
 std::atomic<unsigned> forks{0};
 
 unsigned watchForks() {
+#ifndef _WIN32  // which has no fork()
   static const bool watching = [] {
     const auto count = +[] { forks.fetch_add(1, std::memory_order_relaxed); };
     if (pthread_atfork(nullptr, nullptr, count) != 0) throw std::bad_alloc();
     return true;
   }();
   static_cast<void>(watching);
+#endif
   return forks;
 }
 
@@ -114,9 +119,12 @@ class Workers {
     }
   }
   ~Workers() {
-    m_isStopping = true;
-    ++m_posted;
-    m_posted.notify_all();
+    {
+      const std::lock_guard guard(m_lock);
+      m_isStopping = true;
+      ++m_posted;
+    }
+    m_wake.notify_all();
     for (std::thread& thread : m_threads) thread.join();
   }
   Workers(const Workers&) = delete;
@@ -160,17 +168,18 @@ class Workers {
   };
 
   void post(Loop& loop) {
+    std::size_t sleeping;
     {
       const std::lock_guard guard(m_lock);
       loop.number = ++m_lastNumber;
       loop.older = m_newest;
       if (m_newest) m_newest->newer = &loop;
       m_newest = &loop;
+      ++m_posted;
+      sleeping = m_sleeping;
       if (m_blocked > 0) m_changed.notify_all();
     }
-    ++m_posted;
-    for (std::size_t i = 1; i < std::min(loop.size, m_threads.size() + 1); ++i)
-      m_posted.notify_one();
+    for (std::size_t i = 1; i < loop.size && i <= sleeping; ++i) m_wake.notify_one();
   }
 
   /// The newest loop with a number greater than `after` that has indices left. Call under the lock.
@@ -249,7 +258,11 @@ class Workers {
         leave(*loop);
       }
       for (Spin spin; m_posted == lastPosted && !spin.isOver();) spin.wait();
-      m_posted.wait(lastPosted);
+      if (m_posted != lastPosted) continue;
+      std::unique_lock guard(m_lock.mutex);
+      ++m_sleeping;
+      m_wake.wait(guard, [&] { return m_posted != lastPosted; });
+      --m_sleeping;
     }
   }
 
@@ -258,7 +271,10 @@ class Workers {
   std::uint64_t m_lastNumber = 0;
   std::condition_variable m_changed;  ///< a loop was posted, or the last thread left one
   std::atomic<int> m_blocked{0};      ///< threads that wait for m_changed
-  std::atomic<int> m_posted{0};       ///< counts posts: workers sleep until it changes
+  // std::atomic::wait() of libstdc++ 12 may miss a notification where the system has no futex.
+  std::condition_variable m_wake;  ///< m_posted changed
+  std::size_t m_sleeping = 0;      ///< threads that wait for m_wake; under the lock
+  std::atomic<int> m_posted{0};    ///< counts posts; changes under the lock
   std::atomic<bool> m_isStopping{false};
   std::vector<std::thread> m_threads;
 };

@@ -251,7 +251,11 @@ void OuterSurface::find(const WindingNumber& windingNumber) const {
 
 std::optional<OuterSurface::Near> OuterSurface::nearest(const Vector3d& p, int number,
                                                         const WindingNumber& windingNumber) const {
-  std::call_once(m_isFound, [&] { find(windingNumber); });
+  if (!m_isFound.load(std::memory_order_acquire)) {
+    const std::lock_guard guard(m_finding);
+    if (!m_isFound.load(std::memory_order_relaxed)) find(windingNumber);
+    m_isFound.store(true, std::memory_order_release);
+  }
   std::optional<Near> best;
   double distance = kInfinity;
   if (m_parts.outer) {

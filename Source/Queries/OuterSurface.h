@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -71,7 +72,9 @@ class OuterSurface {
 
   const Body& m_geometry;
   const bool m_bruteForce;
-  mutable std::once_flag m_isFound;
+  // std::call_once() never returns on MinGW-w64 after its function has thrown.
+  mutable std::mutex m_finding;
+  mutable std::atomic<bool> m_isFound = false;
   mutable Parts m_parts;
 };
 

@@ -219,7 +219,11 @@ TEST(Executor, ItsExceptionIsRethrownAfterStartedTasksEnd) {
   std::vector<int> runs(1000, 0);
   EXPECT_THROW(threads->forEach(runs.size(),
                                 [&](std::size_t i) {
-                                  std::this_thread::sleep_for(std::chrono::microseconds(10));
+                                  // Some systems sleep for whole milliseconds, or not at all.
+                                  using Clock = std::chrono::steady_clock;
+                                  const auto end = Clock::now() + std::chrono::microseconds(10);
+                                  while (Clock::now() < end) {
+                                  }
                                   ++runs[i];
                                 }),
                std::bad_alloc);
