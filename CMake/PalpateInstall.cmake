@@ -25,14 +25,19 @@ set(withSimplify OFF)
 if(TARGET PalpateSimplify)
   set(withSimplify ON)
 endif()
+set(besideIt $ORIGIN)
+if(APPLE)
+  set(besideIt @loader_path)
+endif()
 foreach(component IN LISTS components)
   # The libraries find each other wherever they are installed.
-  set_target_properties(${component} PROPERTIES INSTALL_RPATH "$ORIGIN")
+  set_target_properties(${component} PROPERTIES INSTALL_RPATH ${besideIt})
   set(package Library)
   if(component MATCHES "Palpate(Vtk|Fcl|Imstk)")
     set(package ${CMAKE_MATCH_1})
   endif()
   install(TARGETS ${component} EXPORT ${component}Targets
+    RUNTIME COMPONENT ${package}
     LIBRARY COMPONENT ${package} NAMELINK_COMPONENT ${package}Development
     ARCHIVE COMPONENT ${package}Development
     FILE_SET HEADERS COMPONENT ${package}Development)

@@ -2,10 +2,20 @@
 add_library(PalpateOptions INTERFACE)
 # No fused multiply-add: a contracted a*b+c rounds once instead of twice, and results would then
 # depend on the instruction set that run-time dispatch happens to choose.
-target_compile_options(PalpateOptions INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wnon-virtual-dtor)
+if(CMAKE_CXX_COMPILER_ID STREQUAL MSVC)
+  message(FATAL_ERROR "Palpate needs 128-bit integers, which MSVC does not have. Use clang-cl or MinGW-w64.")
+elseif(MSVC) # clang-cl, with which nothing was compiled yet
+  target_compile_options(PalpateOptions INTERFACE /clang:-ffp-contract=off /W4 /EHsc /bigobj)
+  target_compile_definitions(PalpateOptions INTERFACE NOMINMAX)
+else()
+  target_compile_options(PalpateOptions INTERFACE -ffp-contract=off -Wall -Wextra -Wshadow -Wnon-virtual-dtor)
+endif()
 # On 64-bit ARM Eigen would multiply and add with one rounding. Without packets at all it would add in another order.
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   target_compile_options(PalpateOptions INTERFACE -U__ARM_FEATURE_FMA)
+endif()
+if(WIN32 AND BUILD_SHARED_LIBS)
+  target_compile_definitions(PalpateOptions INTERFACE PALPATE_BUILDING_DLL)
 endif()
 if(PALPATE_SANITIZE)
   target_compile_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE} -fno-omit-frame-pointer
@@ -23,9 +33,9 @@ if(PALPATE_SANITIZE)
 endif()
 
 # palpate_export_own_symbols(TARGET [MAP...]): a shared library of ours exports what is ours, and what the further linker
-# scripts of this folder name.
+# scripts of this folder name. On Windows and macOS it exports what PALPATE_EXPORT marks.
 function(palpate_export_own_symbols target)
-  if(BUILD_SHARED_LIBS)
+  if(BUILD_SHARED_LIBS AND NOT (WIN32 OR APPLE))
     foreach(map exports.map ${ARGN})
       target_link_options(${target} PRIVATE LINKER:--version-script=${PROJECT_SOURCE_DIR}/CMake/${map})
       set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS ${PROJECT_SOURCE_DIR}/CMake/${map})

@@ -1,5 +1,5 @@
 #!/bin/bash
-# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage, package),
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage, package, windows),
 # as root or through sudo. Returns at once when all are there.
 set -euo pipefail
 
@@ -12,6 +12,7 @@ test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev 
   clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib
   mono-mcs mono-runtime"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe python3-sphinx-copybutton nodejs chromium"
+windows="g++-mingw-w64-x86-64-posix wine64 dpkg-dev libgtest-dev"
 package="lintian dpkg-dev fakeroot help2man"
 figures="python3 python3-matplotlib python3-pil pngquant"
 benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libnanoflann-dev

@@ -10,18 +10,26 @@ namespace palpate {
 
 using Integer = mpz_class;
 
+/// GMP takes a `long`, which has 32 bits on Windows.
+inline Integer integer(std::uint64_t value) {
+  if constexpr (sizeof(unsigned long) == 8) return static_cast<unsigned long>(value);
+  Integer result = static_cast<unsigned long>(value >> 32);
+  result <<= 32;
+  result += static_cast<unsigned long>(value & 0xffffffff);
+  return result;
+}
+
 /// value · 2^-exponent. With the least exponent of doubles, this is an integer for every finite
 /// double, and zero for both zeros.
 inline Integer scaledInteger(double value, int exponent = -1074) {
-  static_assert(sizeof(unsigned long) == 8);
   const auto [mantissa, own] = splitDouble(value);
-  Integer integer = mantissa;
+  Integer scaled = integer(mantissa);
   if (own >= exponent)
-    integer <<= own - exponent;
+    scaled <<= own - exponent;
   else
-    integer >>= exponent - own;
-  if (value < 0) integer = -integer;
-  return integer;
+    scaled >>= exponent - own;
+  if (value < 0) scaled = -scaled;
+  return scaled;
 }
 
 }  // namespace palpate

@@ -43,8 +43,8 @@ inline double quotient(const Integer& numerator, const Integer& denominator, int
                              : Integer(magnitude / (denominator << -shift));
   const int excess = bits(ratio) - 63;
   ratio >>= excess;
-  const double value =
-      std::ldexp(static_cast<double>(mpz_get_ui(ratio.get_mpz_t())), exponent - shift + excess);
+  const double value = std::ldexp(static_cast<double>(mpz_getlimbn(ratio.get_mpz_t(), 0)),
+                                  exponent - shift + excess);
   return sgn(numerator) < 0 ? -value : value;
 }
 
@@ -57,7 +57,7 @@ struct Rational {
 inline Rational rational(double value) {
   PALPATE_ASSERT(std::isfinite(value));
   const auto parts = splitDouble(value);
-  Rational result{parts.mantissa, 1};
+  Rational result{integer(parts.mantissa), 1};
   if (parts.exponent >= 0)
     result.numerator <<= parts.exponent;
   else

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <type_traits>
@@ -19,16 +20,16 @@ using Quadratic = std::array<Form<2>, 3>;
 
 /// The number odd · 2^exponent.
 struct Dyadic {
-  long odd = 0;
+  double odd = 0;
   int exponent = 0;
 };
 
 Dyadic dyadic(double value) {
   if (value == 0.0) return {0, std::numeric_limits<int>::max()};
   int exponent;
-  const auto mantissa = static_cast<long>(std::ldexp(std::frexp(value, &exponent), 53));
-  const int zeros = std::countr_zero(static_cast<unsigned long>(mantissa));
-  return {mantissa >> zeros, exponent - 53 + zeros};
+  const double mantissa = std::ldexp(std::frexp(value, &exponent), 53);
+  const int zeros = std::countr_zero(static_cast<std::uint64_t>(std::abs(mantissa)));
+  return {std::ldexp(mantissa, -zeros), exponent - 53 + zeros};
 }
 
 Linear operator-(const Linear& l, const Linear& r) {

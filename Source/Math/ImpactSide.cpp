@@ -19,8 +19,7 @@ namespace {
 
 /// Sign of det(A, B, C) at a multiple of 2^-53 of the step.
 int exactSideAt(const ImpactQuery& query, double time) {
-  const auto elapsed = static_cast<unsigned long>(std::ldexp(time, 53)),
-             remaining = (1ul << 53) - elapsed;
+  const Integer elapsed = std::ldexp(time, 53), remaining = 0x1p53 - elapsed;
   std::array<exact::Vector<Integer>, 3> rows;
   const auto axes = ImpactQuery::axes(query.kind);
   for (int i = 0; i < 3; ++i)

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdlib>
+#include <memory>
 #include <new>
 
 namespace palpate::testing {
@@ -13,6 +14,36 @@ namespace {
 std::atomic<bool> armed{false}, anyFailed{false}, allFail{false};
 std::atomic<std::size_t> allocations{0}, failing{0};
 std::atomic<std::ptrdiff_t> inUse{0}, peak{0};  // since arm()
+
+constexpr std::size_t kPlain = __STDCPP_DEFAULT_NEW_ALIGNMENT__;
+
+#ifdef _WIN32  // where the C library does not tell the size of aligned memory
+struct Block {
+  void* start;
+  std::size_t size;
+};
+Block& blockOf(void* memory) { return static_cast<Block*>(memory)[-1]; }
+void* take(std::size_t size, std::size_t alignment) {
+  void* const start = std::malloc(sizeof(Block) + alignment + size);
+  if (!start) return nullptr;
+  void* memory = static_cast<Block*>(start) + 1;
+  std::size_t space = alignment + size;
+  std::align(alignment, size, memory, space);
+  blockOf(memory) = {start, size};
+  return memory;
+}
+std::size_t sizeOf(void* memory) { return blockOf(memory).size; }
+void give(void* memory) {
+  if (memory) std::free(blockOf(memory).start);
+}
+#else
+void* take(std::size_t size, std::size_t alignment) {
+  if (alignment <= kPlain) return std::malloc(size);
+  return std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+}
+std::size_t sizeOf(void* memory) { return malloc_usable_size(memory); }
+void give(void* memory) { std::free(memory); }
+#endif
 
 bool fails() {
   if (!armed.load(std::memory_order_relaxed)) return false;
@@ -24,7 +55,7 @@ bool fails() {
 
 void* counted(void* memory) {
   if (!memory || !armed.load(std::memory_order_relaxed)) return memory;
-  const auto size = static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
+  const auto size = static_cast<std::ptrdiff_t>(sizeOf(memory));
   const std::ptrdiff_t now = inUse.fetch_add(size) + size;
   for (std::ptrdiff_t most = peak; now > most && !peak.compare_exchange_weak(most, now);) {
   }
@@ -33,20 +64,16 @@ void* counted(void* memory) {
 
 void release(void* memory) {
   if (memory && armed.load(std::memory_order_relaxed))
-    inUse -= static_cast<std::ptrdiff_t>(malloc_usable_size(memory));
-  std::free(memory);
+    inUse -= static_cast<std::ptrdiff_t>(sizeOf(memory));
+  give(memory);
 }
 
-void* allocate(std::size_t size) {
+void* allocate(std::size_t size, std::size_t alignment = kPlain) {
   if (fails()) return nullptr;
-  return counted(std::malloc(size > 0 ? size : 1));
+  return counted(take(size > 0 ? size : 1, alignment));
 }
-
 void* allocate(std::size_t size, std::align_val_t alignment) {
-  if (fails()) return nullptr;
-  const auto step = static_cast<std::size_t>(alignment);
-  return counted(
-      std::aligned_alloc(step, (size + step - 1) / step * step + (size == 0 ? step : 0)));
+  return allocate(size, static_cast<std::size_t>(alignment));
 }
 
 void* orThrow(void* memory) {

@@ -33,7 +33,7 @@ PLACE = re.compile(r'Source/(\S+?):(\d+):\d+: ')
 MEMORY = 8 << 30  # bytes of address space of a test
 # Fewer SIMD paths build in less time; range checks of the standard library notice more.
 FLAGS = "-std=c++20 -O1 -w -DNDEBUG -fPIE -ffp-contract=off -fvisibility=hidden -fvisibility-inlines-hidden $\n" \
-        "  -D_GLIBCXX_ASSERTIONS -DPALPATE_BUILDING -DPALPATE_THREADS_STD -DHWY_SHARED_DEFINE $\n" \
+        "  -D_GLIBCXX_ASSERTIONS -DPALPATE_THREADS_STD -DHWY_SHARED_DEFINE $\n" \
         "  '-DHWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL)'"
 BATCHES = [1.0, 5.0]  # seconds without a fault of the first batches of tests; the last batch has the rest
 

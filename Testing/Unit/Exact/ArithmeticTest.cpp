@@ -136,7 +136,8 @@ Int128 wide(Random& random) {
   return random.below(2) ? magnitude : -magnitude;
 }
 Integer integerOf(UnsignedInt128 a) {
-  Integer high = static_cast<unsigned long>(a >> 64), low = static_cast<unsigned long>(a);
+  Integer high = integer(static_cast<std::uint64_t>(a >> 64)),
+          low = integer(static_cast<std::uint64_t>(a));
   return (high << 64) + low;
 }
 Integer integerOf(Int128 a) {
@@ -214,7 +215,9 @@ TEST(WideInteger, GridsHoldDifferencesOfPositionsOrSayThatTheyDoNot) {
         const Integer relative = scaledInteger((*all[n])[i], lowest) - scaledInteger(a[i], lowest);
         fits = fits && abs(relative) < Integer(1) << 60;
         if (grid.fits) {
-          ASSERT_TRUE(relative == Integer(static_cast<long>(grid.at[n][i])));
+          const std::int64_t found = grid.at[n][i];
+          ASSERT_TRUE(abs(relative) == integer(static_cast<std::uint64_t>(std::abs(found))) &&
+                      sgn(relative) == (found > 0) - (found < 0));
         }
       }
     ASSERT_EQ(grid.fits, fits) << repeat;
@@ -226,14 +229,15 @@ TEST(WideInteger, GridsHoldDifferencesOfPositionsOrSayThatTheyDoNot) {
 
 TEST(Rational, QuotientsAreWithinAnUlpForAllSizes) {
   Random random(7);
-  const auto integer = [&] {
-    Integer value = static_cast<long>(random.unit() * 0x1p62) + 1;
+  const auto large = [&] {
+    const auto part = [&] { return integer(static_cast<std::uint64_t>(random.unit() * 0x1p62)); };
+    Integer value = part() + 1;
     value <<= random.below(300);
-    value += static_cast<long>(random.unit() * 0x1p62);
+    value += part();
     return value >>= random.below(60);
   };
   for (int repeat = 0; repeat < 20000; ++repeat) {
-    const Integer numerator = integer() * (random.below(2) ? 1 : -1), denominator = integer() + 1;
+    const Integer numerator = large() * (random.below(2) ? 1 : -1), denominator = large() + 1;
     const int exponent = random.between(-300, 300);
     const double value = exact::quotient(numerator, denominator, exponent);
     Exactly truth(numerator, denominator);

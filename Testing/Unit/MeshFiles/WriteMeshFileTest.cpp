@@ -159,6 +159,7 @@ TEST_F(WriteMeshFile, RefusesInvalidArraysAndLeavesTheOldFile) {
   EXPECT_EQ(contentOf(folder / "a.vtu"), old);
 }
 
+#ifndef _WIN32  // which has no pipes with a path
 TEST_F(WriteMeshFile, RefusesPathsThatNameNoRegularFile) {
   const auto refuse = [&](const fs::path& path) {
     testing::expectRefused(ErrorCode::File, "", [&] { writeMeshFile(path, mesh()); });
@@ -178,6 +179,7 @@ TEST_F(WriteMeshFile, RefusesPathsThatNameNoRegularFile) {
   for (const auto& entry : fs::directory_iterator(folder))
     EXPECT_NE(entry.path().extension(), ".part");
 }
+#endif
 
 /// Decimal commas and grouped digits, whatever locales the machine has.
 class Commas : public std::numpunct<char> {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 namespace palpate::test {
@@ -146,11 +147,11 @@ TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
   const double c = std::sqrt(0.5);
   const TriangleMesh bar = cuboid({-5, -0.5, -0.5}, {5, 0.5, 0.5});
   const auto diamond = [&](const Vector3d& shift) {
-    return turned(bar, Eigen::AngleAxisd(M_PI / 4, Vector3d::UnitX()), shift);
+    return turned(bar, Eigen::AngleAxisd(std::numbers::pi / 4, Vector3d::UnitX()), shift);
   };
   const TriangleMesh below = diamond({0, 0, 0});
   const TriangleMesh above =
-      turned(diamond({0, 0, 0}), Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()),
+      turned(diamond({0, 0, 0}), Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitZ()),
              {0.013, 0.017, 2 * c - 0.1});
   const ContactBuffers found = piercingContacts(above, below);
   EXPECT_TRUE(found.vertexTriangle.empty() && found.triangleVertex.empty());
