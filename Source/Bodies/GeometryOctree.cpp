@@ -66,8 +66,10 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   computeFloats(mesh.now.body(), m_frame, m_floats, threads);
   if (m_treeSwept) computeFloats(mesh.before.body(), m_frame, m_floatsBefore, threads);
   boxMilliseconds += watch.lap();
-  if (mesh.topology.elements.empty()) {
+  const std::size_t size = mesh.topology.count();
+  if (size == 0) {
     m_octree.reset(0);
+    startOrdered(0);
   } else {
     bool fits = false;
     if (canRefit && settings.update == OctreeUpdate::Auto) {
@@ -77,9 +79,10 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     }
     if (!fits) {
       if (!canRefit) {
-        m_octree.reset(mesh.topology.elements.size());
-        startOrdered(mesh.topology.elements.size());
-        std::copy(mesh.topology.elements.begin(), mesh.topology.elements.end(), m_ordered.begin());
+        m_octree.reset(size, mesh.topology.removed);
+        startOrdered(size);
+        for (std::size_t i = 0; i < size; ++i)
+          m_ordered[i] = mesh.topology.elements[m_octree.order()[i]];
       }
       rebuild(mesh, settings, threads);
       fitBoxes(mesh, settings, threads, true);
@@ -340,7 +343,7 @@ void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std:
 
 /// Computes the boxes of the triangles in m_ordered, and returns the bounds of all.
 FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
-  PALPATE_ASSERT(m_ordered.size() == mesh.topology.elements.size());
+  PALPATE_ASSERT(m_ordered.size() == mesh.topology.count());
   const std::size_t size = m_ordered.size(),
                     count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
   m_boundsGroups.resize(count + 1);
@@ -385,7 +388,7 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
 
 const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
-  PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.elements.size());
+  PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.count());
   const MemoryScope memory(MemoryStage::Octrees);
   m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
   return m_stars.triangles();

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -96,7 +97,8 @@ void checkCounts(const GeometryLabel& label, std::span<const Eigen::Vector3d> po
 
 TetrahedralTopology checkedTopology(const GeometryLabel& label,
                                     std::span<const Eigen::Vector3d> rest,
-                                    std::span<const Tetrahedron> tetrahedra) {
+                                    std::span<const Tetrahedron> tetrahedra,
+                                    std::span<const std::uint32_t> removed) {
   if (rest.size() > kMostElements || tetrahedra.size() > kMostTetrahedra)
     throw Error(ErrorCode::TooLarge,
                 nameOf(label) + ": " + std::to_string(rest.size()) + " vertices and " +
@@ -114,7 +116,7 @@ TetrahedralTopology checkedTopology(const GeometryLabel& label,
                   label.id, t);
   }
   std::optional<OverusedFace> fault;
-  TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault);
+  TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault, removed);
   if (!fault) return topology;
   const auto& [a, b, c] = fault->face;
   const auto& [s, t, u] = fault->tetrahedra;
@@ -124,6 +126,29 @@ TetrahedralTopology checkedTopology(const GeometryLabel& label,
                   " already belongs to tetrahedra " + std::to_string(s) + " and " +
                   std::to_string(t),
               label.id, u);
+}
+
+CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel& label, const std::string& element,
+                                            std::size_t count,
+                                            std::span<const std::uint32_t> removedBefore,
+                                            std::span<const std::uint32_t> removed) {
+  const auto refuse = [&](std::uint32_t id, const std::string& reason) {
+    throw Error(ErrorCode::IndexOutOfRange,
+                nameOf(label) + ": " + element + " " + std::to_string(id) + reason, label.id, id);
+  };
+  for (const std::uint32_t id : removed) {
+    if (id >= count) refuse(id, " is out of range; there are " + std::to_string(count));
+    if (std::binary_search(removedBefore.begin(), removedBefore.end(), id))
+      refuse(id, " was removed before");
+  }
+  CountedVector<std::uint32_t> sorted(removed.begin(), removed.end()), all;
+  std::sort(sorted.begin(), sorted.end());
+  if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
+    refuse(*twice, " is removed twice");
+  all.reserve(removedBefore.size() + sorted.size());
+  std::merge(removedBefore.begin(), removedBefore.end(), sorted.begin(), sorted.end(),
+             std::back_inserter(all));
+  return all;
 }
 
 void checkRadii(const GeometryLabel& label, std::span<const double> radii) {

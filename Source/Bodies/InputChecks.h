@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include <span>
+#include <string>
 
 namespace palpate {
 
@@ -26,8 +27,16 @@ Eigen::AlignedBox3d checkPositions(const GeometryLabel&, std::span<const Eigen::
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
 void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
                  GeometryType);
+/// removed: ascending; they count as absent.
 TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen::Vector3d> rest,
-                                    std::span<const Tetrahedron>);
+                                    std::span<const Tetrahedron>,
+                                    std::span<const std::uint32_t> removed = {});
+/// The ids that were removed before and those that a cut removes, of `count`, ascending. element:
+/// for the message.
+CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel&, const std::string& element,
+                                            std::size_t count,
+                                            std::span<const std::uint32_t> removedBefore,
+                                            std::span<const std::uint32_t> removed);
 void checkRadii(const GeometryLabel&, std::span<const double>);
 void checkOnePerVertex(const GeometryLabel&, std::span<const Eigen::Vector3d>,
                        std::span<const double> radii);

@@ -19,6 +19,7 @@ namespace palpate {
 /// The tetrahedra of a body that is the surface of a tetrahedral mesh.
 struct Solid : CountedObject {
   TetrahedralTopology topology;
+  CountedVector<std::uint32_t> tags;  ///< per tetrahedron; empty: all are 0
 };
 
 /// SpatialQueries::Source::state() and GeometryOctree::updates() at the end of a preparation.

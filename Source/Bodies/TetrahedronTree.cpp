@@ -26,14 +26,19 @@ void set(BoxArrays& boxes, std::size_t i, const FloatBox& box) {
 
 }  // namespace
 
-void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const FloatPoint* floats,
+void TetrahedronTree::update(const TetrahedralTopology& topology, const FloatPoint* floats,
                              double bulk, const OctreeSettings& settings, const Threads& threads) {
-  PALPATE_ASSERT(!m_isBuilt || m_ordered.size() == tetrahedra.size());
-  const std::size_t size = tetrahedra.size();
+  const CountedVector<Tetrahedron>& tetrahedra = topology.tetrahedra;
+  const std::size_t size = tetrahedra.size() - topology.removed.size();
+  PALPATE_ASSERT(!m_isBuilt || m_ordered.size() == size);
   const bool wasBuilt = std::exchange(m_isBuilt, false);
+  const auto bringInOrder = [&] {
+    for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
+  };
   if (!wasBuilt) {
-    m_octree.reset(size);
-    m_ordered.assign(tetrahedra.begin(), tetrahedra.end());
+    m_octree.reset(size, topology.removed);
+    m_ordered.resize(size);
+    bringInOrder();
   }
   if (size == 0) return;
   if (wasBuilt && settings.update == OctreeUpdate::Auto) {
@@ -50,7 +55,7 @@ void TetrahedronTree::update(std::span<const Tetrahedron> tetrahedra, const Floa
   }
   m_keys.resize(size);
   m_octree.build(bounds, bulk, settings, m_keys, threads);
-  for (std::size_t i = 0; i < size; ++i) m_ordered[i] = tetrahedra[m_octree.order()[i]];
+  bringInOrder();
   fit(floats, threads);
   m_octree.measureLooseness();
   m_isBuilt = true;

@@ -5,6 +5,7 @@
 
 #include "Octree/Octree.h"
 #include "Mesh/FloatPositions.h"
+#include "Mesh/TetrahedralTopology.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 
@@ -20,7 +21,7 @@ class TetrahedronTree {
  public:
   /// Each update must have the same tetrahedra. floats: the positions of the vertices. bulk: the
   /// extent of most of them, in the same frame.
-  void update(std::span<const Tetrahedron>, const FloatPoint* floats, double bulk,
+  void update(const TetrahedralTopology&, const FloatPoint* floats, double bulk,
               const OctreeSettings&, const Threads&);
 
   const Octree& octree() const { return m_octree; }

@@ -120,8 +120,10 @@ SolidAngleShare WindingNumbers::clusterShare(const Cluster& cluster, const Vecto
 static SolidAngleShare sumOfAll(const TriangleMesh& mesh, const Vector3d& p) {
   SolidAngleShare sum;
   const Positions& now = mesh.now;
-  for (const auto& [a, b, c] : mesh.topology.elements)
+  mesh.topology.forEachElement([&](std::uint32_t t) {
+    const auto& [a, b, c] = mesh.topology.elements[t];
     sum.add(solidAngleShare(p, now[a], now[b], now[c]));
+  });
   return sum;
 }
 

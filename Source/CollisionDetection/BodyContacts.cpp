@@ -23,9 +23,8 @@ bool mayBeBodies(const PairRecord& record) {
       record.a == record.b || record.plan.kind != PairKind::Meshes || record.anyDisabled() ||
       record.meshes().hasFilters())
     return false;
-  return !record.a->body.mesh.topology.elements.empty() &&
-         !record.b->body.mesh.topology.elements.empty() && hasClosedSurface(record.a->body) &&
-         hasClosedSurface(record.b->body);
+  return record.a->body.mesh.topology.count() > 0 && record.b->body.mesh.topology.count() > 0 &&
+         hasClosedSurface(record.a->body) && hasClosedSurface(record.b->body);
 }
 
 /// In the world; none if the body may be larger than its box.
@@ -40,14 +39,19 @@ bool mayContain(const Body& outer, const Body& inner) {
   return !box || !within || box->contains(*within);
 }
 
+std::uint32_t vertexOf(const Body& body) {
+  const MeshTopology& topology = body.mesh.topology;
+  return topology.elements[topology.lowest()][0];
+}
+
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
   const auto cornersAt = [&](std::size_t i) {
-    return cornersOf(outer.mesh.topology.elements[i], outer.mesh.before);
+    return cornersOf(outer.tree.ordered()[i], outer.mesh.before);
   };
   SignCounts counts;
-  const int number = windingNumber(outer.mesh.topology.elements.size(), cornersAt,
-                                   inner.mesh.before[inner.mesh.topology.elements[0][0]], counts);
+  const int number = windingNumber(outer.tree.ordered().size(), cornersAt,
+                                   inner.mesh.before[vertexOf(inner)], counts);
   stack.exactDecisions += counts.undecided;
   return number != 0;
 }
@@ -55,7 +59,7 @@ bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
 /// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the
 /// step.
 bool isInside(const Body& inner, const Body& outer, Engine engine, PointQueryStack& stack) {
-  const std::uint32_t vertex = inner.mesh.topology.elements[0][0];
+  const std::uint32_t vertex = vertexOf(inner);
   return mayContain(outer, inner) &&
          windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
          wasInside(inner, outer, stack);

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
+#include <tuple>
 #include <type_traits>
 
 namespace palpate {
@@ -32,6 +34,19 @@ class Hash {
   std::uint64_t m_value = 0xcbf29ce484222325u;
 };
 
+/// The tags of a contact of the list, which is in the order of the keys. Null: it has none.
+template <class Contact, class KeyOf>
+const ContactTags* tagsIn(std::span<const Contact> list, std::span<const ContactTags> tags,
+                          const Contact& contact, const KeyOf& keyOf) {
+  if (tags.empty()) return nullptr;
+  const auto place =
+      std::lower_bound(list.begin(), list.end(), contact,
+                       [&](const Contact& l, const Contact& r) { return keyOf(l) < keyOf(r); });
+  return place != list.end() && *place == contact
+             ? &tags[static_cast<std::size_t>(place - list.begin())]
+             : nullptr;
+}
+
 }  // namespace
 
 CollisionData::CollisionData() noexcept = default;
@@ -58,6 +73,7 @@ CollisionData::CollisionData(const Parts& parts) {
                          parts.earliestTimeOfImpact,
                          parts.errorBound,
                          parts.validity,
+                         {},
                          {},
                          {}};
 }
@@ -106,6 +122,42 @@ std::span<const TrackedContact> CollisionData::trackedShapeShape() const {
 }
 std::span<const TrackedContact> CollisionData::ended() const { return read().tracked.ended; }
 std::span<const Crossing> CollisionData::crossings() const { return read().crossings; }
+std::span<const ContactTags> CollisionData::tags(ContactKind kind) const {
+  return read().tags[static_cast<std::size_t>(kind)];
+}
+ContactTags CollisionData::tagsOf(const VertexTriangleContact& contact) const {
+  const auto byTriangle = [](const VertexTriangleContact& c) {
+    return std::tuple(c.triangle, c.vertex);
+  };
+  // Two contacts of both lists may be equal. Which one it is then depends on its place.
+  const std::span<const VertexTriangleContact> second = triangleVertex();
+  const std::less<> precedes;
+  const bool isInSecond =
+      !precedes(&contact, second.data()) && precedes(&contact, second.data() + second.size());
+  const ContactTags* found =
+      isInSecond ? nullptr
+                 : tagsIn(vertexTriangle(), tags(ContactKind::VertexTriangle), contact,
+                          [](const auto& c) { return std::tuple(c.vertex, c.triangle); });
+  if (!found) found = tagsIn(second, tags(ContactKind::TriangleVertex), contact, byTriangle);
+  return found ? *found : ContactTags{};
+}
+ContactTags CollisionData::tagsOf(const EdgeEdgeContact& contact) const {
+  const ContactTags* const found =
+      tagsIn(edgeEdge(), tags(ContactKind::EdgeEdge), contact,
+             [](const auto& c) { return std::tuple(c.edgeA, c.edgeB); });
+  return found ? *found : ContactTags{};
+}
+ContactTags CollisionData::tagsOf(const ShapeContact& contact) const {
+  const ContactTags* const found =
+      tagsIn(shape(), tags(ContactKind::Shape), contact,
+             [](const auto& c) { return std::tuple(c.element, c.id, c.vertices); });
+  return found ? *found : ContactTags{};
+}
+ContactTags CollisionData::tagsOf(const ShapeShapeContact& contact) const {
+  const ContactTags* const found =
+      tagsIn(shapeShape(), tags(ContactKind::ShapeShape), contact, [](const auto&) { return 0; });
+  return found ? *found : ContactTags{};
+}
 double CollisionData::errorBound() const { return read().errorBound; }
 const Validity& CollisionData::validity() const { return read().validity; }
 

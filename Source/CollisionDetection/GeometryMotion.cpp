@@ -17,7 +17,7 @@ std::array<PositionsState, 2> ends(const Positions& from, const Positions& to) {
 /// body may be turned, so the longest side of its box is doubled.
 double extentOf(const Body& body) {
   const TriangleMesh& mesh = body.mesh;
-  if (mesh.topology.elements.empty()) return 0.0;
+  if (mesh.topology.count() == 0) return 0.0;
   const Eigen::AlignedBox3d bounds = mesh.now.bounds().merged(mesh.before.bounds());
   return (body.isPlaced() ? 2.0 : 1.0) * bounds.sizes().maxCoeff();
 }

@@ -80,6 +80,35 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
   checked.memory->revision = end.bodyRevision();
 }
 
+GeometryStep::LongerBodies GeometryStep::withNewVertices(
+    const TriangleMesh& mesh, std::span<const Eigen::Vector3d> positions) const {
+  const auto longer = [&](const Positions& end) {
+    auto body = std::make_shared<CountedVector<Eigen::Vector3d>>();
+    body->reserve(end.size() + positions.size());
+    body->assign(end.body().begin(), end.body().end());
+    body->insert(body->end(), positions.begin(), positions.end());
+    return Positions::Body(std::move(body));
+  };
+  LongerBodies bodies{longer(mesh.now)};
+  bodies[1] = mesh.before.hasSameBody(mesh.now) ? bodies[0] : longer(mesh.before);
+  bodies[2] = m_detected.hasSameBody(mesh.now)      ? bodies[0]
+              : m_detected.hasSameBody(mesh.before) ? bodies[1]
+                                                    : longer(m_detected);
+  return bodies;
+}
+
+void GeometryStep::append(TriangleMesh& mesh, const LongerBodies& bodies) noexcept {
+  const std::array<Positions*, 3> ends{&mesh.now, &mesh.before, &m_detected};
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const auto same = static_cast<std::size_t>(std::find(bodies.begin(), bodies.end(), bodies[i]) -
+                                               bodies.begin());
+    if (same < i)
+      ends[i]->setBodyOf(*ends[same]);
+    else
+      ends[i]->setBody(bodies[i], m_revisions.next());
+  }
+}
+
 void GeometryStep::setSomePositions(const GeometryLabel& label, TriangleMesh& mesh,
                                     std::size_t first, std::span<const Eigen::Vector3d> now,
                                     const Threads& threads) {

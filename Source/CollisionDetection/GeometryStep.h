@@ -10,6 +10,7 @@
 #include "Mesh/TriangleMesh.h"
 #include "Core/Threads.h"
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -48,6 +49,11 @@ class GeometryStep {
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
                     const std::optional<Pose>& before, const Pose& now);
+  /// All positions with those of new vertices behind them: `now`, `before`, and detected().
+  using LongerBodies = std::array<Positions::Body, 3>;
+  LongerBodies withNewVertices(const TriangleMesh&, std::span<const Eigen::Vector3d>) const;
+  /// The new vertices are at rest in this step.
+  void append(TriangleMesh&, const LongerBodies&) noexcept;
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 

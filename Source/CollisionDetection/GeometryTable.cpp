@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace palpate {
@@ -46,6 +47,17 @@ double shortEdge(const MeshTopology& topology, std::span<const Eigen::Vector3d> 
   const auto place = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 16);
   std::nth_element(lengths.begin(), place, lengths.end());
   return *place;
+}
+
+/// Of the surface triangles of a body whose tetrahedra have these.
+CountedVector<std::uint32_t> tagsOfSurface(const Solid& solid,
+                                           std::span<const std::uint32_t> tags) {
+  CountedVector<std::uint32_t> ofSurface;
+  if (tags.empty()) return ofSurface;
+  ofSurface.reserve(solid.topology.surfaceOwner.size());
+  for (const std::uint32_t owner : solid.topology.surfaceOwner)
+    ofSurface.push_back(owner == kNoElement ? 0 : tags[owner]);
+  return ofSurface;
 }
 
 }  // namespace
@@ -133,6 +145,28 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   auto geometry = make(std::move(rest), std::move(topology));
   geometry->body.solid = std::make_unique<Solid>();
   geometry->body.solid->topology = std::move(solid);
+  return add(std::move(geometry));
+}
+
+GeometryId GeometryTable::add(const CutMesh& mesh) {
+  const GeometryId id = nextId();
+  CountedVector<Eigen::Vector3d> rest = checkedRest(id, mesh.positions);
+  checkCounts(id, mesh.positions, mesh.triangles, GeometryType::Triangles);
+  const auto removed = checkedRemoval(id, "triangle", mesh.triangles.size(), {}, mesh.removed);
+  MeshTopology topology(mesh.positions.size(), mesh.triangles, removed);
+  std::unique_ptr<Solid> solid;
+  if (!mesh.tetrahedra.empty()) {
+    solid = std::make_unique<Solid>();
+    solid->topology = checkedTopology(
+        id, rest, mesh.tetrahedra,
+        checkedRemoval(id, "tetrahedron", mesh.tetrahedra.size(), {}, mesh.removedTetrahedra));
+    if (keepSurfaceIds(topology.elements, solid->topology) != topology.removed ||
+        solid->topology.surface != topology.elements)
+      throw Error(ErrorCode::InvalidSettings,
+                  nameOf(id) + ": the triangles are not the surface of the tetrahedra", id);
+  }
+  auto geometry = make(std::move(rest), std::move(topology));
+  geometry->body.solid = std::move(solid);
   return add(std::move(geometry));
 }
 
@@ -288,11 +322,144 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.body.mesh.rest = std::move(rest);
   geometry.body.mesh.topology = std::move(topology);
   geometry.body.solid = std::move(solid);
+  geometry.body.mesh.tags.clear();
   geometry.step.start(geometry.body.mesh, std::move(body));
   geometry.smallestHeight = smallestHeight(geometry.body.mesh);
   geometry.shortEdge = shortest;
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
+  geometry.body.revisions.filter = geometry.body.revisions.counter.next();
+  geometry.freeMotion.clear();
+}
+
+/// A change of topology that keeps what belongs to other elements.
+struct GeometryTable::Cut {
+  /// Checks the new vertices.
+  Cut(Geometry& newGeometry, const NewVertices& added)
+      : geometry(newGeometry),
+        positions(newGeometry.body.mesh.topology.vertexCount),
+        rest(newGeometry.body.mesh.rest) {
+    const std::size_t first = rest.size();
+    const auto append = [&](std::span<const Eigen::Vector3d> from, const char* which, auto& out) {
+      out.resize(first + from.size());
+      checkPositions(geometry, from, out.data() + first, which, Threads(1), nullptr, nullptr,
+                     first);
+    };
+    append(added.positions, "", positions);
+    if (added.rest.empty())
+      rest.insert(rest.end(), added.positions.begin(), added.positions.end());
+    else
+      append(added.rest, " at rest", rest);
+    if (rest.size() != positions.size())
+      throw Error(ErrorCode::WrongPositionCount,
+                  nameOf(geometry) + ": " + std::to_string(added.rest.size()) +
+                      " positions at rest given for " + std::to_string(added.positions.size()) +
+                      " new vertices",
+                  geometry.body.id);
+    positions.erase(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(first));
+  }
+  Geometry& geometry;
+  CountedVector<Eigen::Vector3d> positions;  ///< of the new vertices
+  CountedVector<Eigen::Vector3d> rest;       ///< of all vertices
+  MeshTopology topology{};
+  std::unique_ptr<Solid> solid{};
+  CountedVector<std::uint32_t> tags{};  ///< TriangleMesh::tags
+};
+
+namespace {
+
+/// Those of a list, and after them the added elements.
+template <class Element>
+CountedVector<Element> joined(const CountedVector<Element>& before,
+                              std::span<const Element> added) {
+  CountedVector<Element> all;
+  all.reserve(before.size() + added.size());
+  all.assign(before.begin(), before.end());
+  all.insert(all.end(), added.begin(), added.end());
+  return all;
+}
+CountedVector<std::uint32_t> joinedTags(const CountedVector<std::uint32_t>& before,
+                                        std::size_t added) {
+  const std::vector<std::uint32_t> zeros(before.empty() ? 0 : added, 0);
+  return joined<std::uint32_t>(before, zeros);
+}
+
+std::vector<std::uint32_t> idsFrom(std::size_t first, std::size_t count) {
+  std::vector<std::uint32_t> ids(count);
+  std::iota(ids.begin(), ids.end(), static_cast<std::uint32_t>(first));
+  return ids;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> GeometryTable::replaceTriangles(GeometryId id, Ids removed,
+                                                           std::span<const Triangle> added,
+                                                           const NewVertices& vertices,
+                                                           const Preparation& prepare) {
+  Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "replaceTriangles()");
+  checkMeshType(geometry.body, false, "replaceTriangles() is for triangle meshes");
+  const TriangleMesh& mesh = geometry.body.mesh;
+  const std::size_t count = mesh.topology.elements.size();
+  Cut cut(geometry, vertices);
+  const auto allRemoved =
+      checkedRemoval(geometry, "triangle", count, mesh.topology.removed, removed);
+  const auto triangles = joined(mesh.topology.elements, added);
+  checkCounts(geometry, cut.rest, triangles, GeometryType::Triangles);
+  auto ids = idsFrom(count, added.size());
+  cut.topology = MeshTopology(cut.rest.size(), triangles, allRemoved);
+  cut.tags = joinedTags(mesh.tags, added.size());
+  apply(std::move(cut), prepare);
+  ++m_state;
+  return ids;
+}
+
+std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids removed,
+                                                            std::span<const Tetrahedron> added,
+                                                            const NewVertices& vertices,
+                                                            const Preparation& prepare) {
+  Geometry& geometry = at(id);
+  checkShapeMayChange(geometry, "replaceTetrahedra()");
+  checkMeshType(geometry.body, true, "replaceTetrahedra() is for tetrahedral meshes");
+  const Solid& solid = *geometry.body.solid;
+  const std::size_t count = solid.topology.tetrahedra.size();
+  Cut cut(geometry, vertices);
+  const auto allRemoved =
+      checkedRemoval(geometry, "tetrahedron", count, solid.topology.removed, removed);
+  auto ids = idsFrom(count, added.size());
+  cut.solid = std::make_unique<Solid>();
+  cut.solid->topology =
+      checkedTopology(geometry, cut.rest, joined(solid.topology.tetrahedra, added), allRemoved);
+  cut.solid->tags = joinedTags(solid.tags, added.size());
+  const auto without = keepSurfaceIds(geometry.body.mesh.topology.elements, cut.solid->topology);
+  cut.topology = MeshTopology(cut.rest.size(), cut.solid->topology.surface, without);
+  cut.tags = tagsOfSurface(*cut.solid, cut.solid->tags);
+  apply(std::move(cut), prepare);
+  ++m_state;
+  return ids;
+}
+
+void GeometryTable::apply(Cut cut, const Preparation& prepare) {
+  Geometry& geometry = cut.geometry;
+  Body& body = geometry.body;
+  TriangleMesh& mesh = body.mesh;
+  if (!mesh.topology.disabled.empty()) cut.topology.disable(mesh.topology.disabled);
+  GeometryStep::LongerBodies bodies;
+  if (!cut.positions.empty()) bodies = geometry.step.withNewVertices(mesh, cut.positions);
+  prepare(cut.topology, cut.rest);
+  const double shortest = shortEdge(cut.topology, cut.rest);
+  // Nothing below throws.
+  mesh.rest = std::move(cut.rest);
+  mesh.topology = std::move(cut.topology);
+  mesh.tags = std::move(cut.tags);
+  if (cut.solid) body.solid = std::move(cut.solid);
+  if (!cut.positions.empty()) geometry.step.append(mesh, bodies);
+  geometry.smallestHeight = smallestHeight(mesh);
+  geometry.shortEdge = shortest;
+  BodyRevisions& revisions = body.revisions;
+  for (Revision* revision :
+       {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
+    *revision = revisions.counter.next();
   geometry.freeMotion.clear();
 }
 
@@ -336,6 +503,31 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
   topology.disable(elements);
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
   geometry.freeMotion.clear();
+}
+
+void GeometryTable::setTags(GeometryId id, std::span<const std::uint32_t> tags) {
+  Geometry& geometry = at(id);
+  Body& body = geometry.body;
+  const MeshTopology& topology = body.mesh.topology;
+  const bool isOne = body.shape || body.isField();
+  const std::size_t count = isOne        ? 1
+                            : body.solid ? body.solid->topology.tetrahedra.size()
+                                         : topology.elements.size();
+  if (!tags.empty() && tags.size() != count)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(geometry) + ": " + std::to_string(tags.size()) + " tags given, but it has " +
+                    (isOne ? "1 element"
+                           : std::to_string(count) + (body.solid ? " tetrahedra" : " elements")),
+                id);
+  CountedVector<std::uint32_t> given(tags.begin(), tags.end());
+  if (body.solid) {
+    CountedVector<std::uint32_t> ofSurface = tagsOfSurface(*body.solid, given);
+    // Nothing below throws.
+    body.solid->tags = std::move(given);
+    given = std::move(ofSurface);
+  }
+  body.mesh.tags = std::move(given);
+  body.revisions.filter = body.revisions.counter.next();
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <palpate/Error.h>
+#include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>
 
 #include "CollisionDetection/Geometry.h"
@@ -17,6 +18,18 @@
 
 namespace palpate {
 
+/// A mesh after cuts, with the ids that they left. Of a tetrahedral mesh, `triangles` is the
+/// surface.
+struct CutMesh {
+  std::span<const Eigen::Vector3d> positions;
+  std::span<const Triangle> triangles;
+  std::span<const std::uint32_t> removed;
+  std::span<const Tetrahedron> tetrahedra;
+  std::span<const std::uint32_t> removedTetrahedra;
+
+  GeometryId addTo(OctreeBasedCD&) const;
+};
+
 /// Geometries by id. Checks the user's input.
 class GeometryTable {
  public:
@@ -27,6 +40,7 @@ class GeometryTable {
                       std::span<const double> radii);
   GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
+  GeometryId add(const CutMesh&);
   GeometryId add(const AnalyticalGeometry&);
   GeometryId add(std::shared_ptr<const DistanceField>);
   void attach(GeometryId, std::shared_ptr<const DistanceField>);  ///< null: detaches
@@ -43,9 +57,21 @@ class GeometryTable {
                     std::span<const Triangle>, const Preparation&);
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>, const Preparation&);
+  using Ids = std::span<const std::uint32_t>;
+  /// New vertices of a cut, and where they are at rest; empty: there.
+  struct NewVertices {
+    std::span<const Eigen::Vector3d> positions, rest;
+  };
+  /// Returns the ids of what was added.
+  std::vector<std::uint32_t> replaceTriangles(GeometryId, Ids removed, std::span<const Triangle>,
+                                              const NewVertices&, const Preparation&);
+  std::vector<std::uint32_t> replaceTetrahedra(GeometryId, Ids removed,
+                                               std::span<const Tetrahedron>, const NewVertices&,
+                                               const Preparation&);
   void setName(GeometryId, std::string name);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
+  void setTags(GeometryId, std::span<const std::uint32_t>);
 
   void setTransform(GeometryId, const std::optional<Pose>& before, const Pose& now);
   /// Puts the positions and the transform now back to those of earlier in this step.
@@ -72,6 +98,8 @@ class GeometryTable {
   GeometryId add(std::unique_ptr<Geometry>);
   static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
                           std::unique_ptr<Solid>, const Preparation&);
+  struct Cut;
+  static void apply(Cut, const Preparation&);
 
   CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;

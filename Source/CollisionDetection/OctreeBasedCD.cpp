@@ -70,6 +70,11 @@ GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> po
   return all->withinLimit([&] { return all->geometries.add(positions, tetrahedra); });
 }
 
+GeometryId CutMesh::addTo(OctreeBasedCD& collisions) const {
+  const OctreeBasedCD::Implementation::ChangeGuard all(collisions.m_implementation);
+  return all->withinLimit([&] { return all->geometries.add(*this); });
+}
+
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
   const Implementation::ChangeGuard all(m_implementation);
@@ -169,29 +174,43 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& before, const 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  IndexLists near;
-  all->withinLimit([&] {
-    all->countCandidates();
-    all->geometries.setTriangles(
-        geometry, positions, triangles, [&](const MeshTopology& topology, auto rest) {
-          near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
-        });
+  all->changeTopology(geometry, [&](const auto& prepare) {
+    all->geometries.setTriangles(geometry, positions, triangles, prepare);
+    return true;
   });
-  all->pairs.setNearAtRest(geometry, std::move(near));
 }
 
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  IndexLists near;
-  all->withinLimit([&] {
-    all->countCandidates();
-    all->geometries.setTetrahedra(
-        geometry, positions, tetrahedra, [&](const MeshTopology& topology, auto rest) {
-          near = all->pairs.nearAtRest(geometry, topology, rest, all->threads);
-        });
+  all->changeTopology(geometry, [&](const auto& prepare) {
+    all->geometries.setTetrahedra(geometry, positions, tetrahedra, prepare);
+    return true;
   });
-  all->pairs.setNearAtRest(geometry, std::move(near));
+}
+
+std::vector<std::uint32_t> OctreeBasedCD::replaceTriangles(
+    GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Triangle> added,
+    std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
+  const Implementation::ChangeGuard all(m_implementation);
+  return all->changeTopology(geometry, [&](const auto& prepare) {
+    return all->geometries.replaceTriangles(geometry, removed, added, {newPositions, rest},
+                                            prepare);
+  });
+}
+
+std::vector<std::uint32_t> OctreeBasedCD::replaceTetrahedra(
+    GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Tetrahedron> added,
+    std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
+  const Implementation::ChangeGuard all(m_implementation);
+  return all->changeTopology(geometry, [&](const auto& prepare) {
+    return all->geometries.replaceTetrahedra(geometry, removed, added, {newPositions, rest},
+                                             prepare);
+  });
+}
+
+std::span<const std::uint32_t> OctreeBasedCD::removedElements(GeometryId geometry) const {
+  return read().geometries.at(geometry).body.mesh.topology.removed;
 }
 
 TetrahedralSurface OctreeBasedCD::surface(GeometryId geometry) const {
@@ -228,6 +247,16 @@ void OctreeBasedCD::setDisabledElements(GeometryId geometry,
                                         std::span<const std::uint32_t> elements) {
   const Implementation::ChangeGuard all(m_implementation);
   all->withinLimit([&] { all->geometries.setDisabled(geometry, elements); });
+}
+
+void OctreeBasedCD::setTags(GeometryId geometry, std::span<const std::uint32_t> perElement) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->withinLimit([&] { all->geometries.setTags(geometry, perElement); });
+}
+
+std::span<const std::uint32_t> OctreeBasedCD::tags(GeometryId geometry) const {
+  const Body& body = read().geometries.at(geometry).body;
+  return body.solid ? body.solid->tags : body.mesh.tags;
 }
 
 void OctreeBasedCD::setContactPredicate(GeometryId a, GeometryId b, ContactPredicate predicate) {

@@ -67,7 +67,7 @@ void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
     const MeshTopology& topology = geometry->body.mesh.topology;
     (topology.hasFaces()                    ? next.triangles
      : topology.type == GeometryType::Lines ? next.segments
-                                            : next.points) += topology.elements.size();
+                                            : next.points) += topology.count();
     next.untestedVertices += topology.untestedVertices;
   }
   next.memory = budget->now();
@@ -238,6 +238,7 @@ void OctreeBasedCD::Implementation::detect() {
     const MemoryScope results(MemoryStage::Results);
     watch.lap();
     for (const auto& record : pairs.records()) record->track(geometries.stepNumber());
+    for (PairRecord* record : records) record->addTags();
     next.milliseconds.order += watch.lap();
   }
   freeMotions.commit(geometries);

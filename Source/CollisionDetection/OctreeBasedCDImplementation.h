@@ -84,6 +84,20 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
+  /// Returns call(prepare), which changes the topology of a geometry.
+  template <class F>
+  auto changeTopology(GeometryId geometry, F&& call) {
+    return withinLimit([&] {
+      countCandidates();
+      IndexLists near;
+      auto result = call([&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
+        near = pairs.nearAtRest(geometry, topology, rest, threads);
+      });
+      pairs.setNearAtRest(geometry, std::move(near));
+      return result;
+    });
+  }
+
   /// Updates the octrees. The next frame's statistics include updates for queries.
   /// records: pairs that are planned. explicitly: the user called update(). The statistics are
   /// published at once, and count as rebuilt or refitted only the trees that this call changed.

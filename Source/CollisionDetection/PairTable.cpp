@@ -74,6 +74,46 @@ void PairRecord::track(std::uint64_t step) {
   }
 }
 
+/// Of a shape or of a field that is a geometry. Bodies that a field or proxy stands for have none.
+static std::uint32_t tagOfWhole(const Body& body) {
+  return (body.shape || body.isField()) && !body.mesh.tags.empty() ? body.mesh.tags.front() : 0;
+}
+
+void PairRecord::addTags() {
+  if (dataVersion.isCurrent(state())) return;
+  const TriangleMesh &ofA = a->body.mesh, &ofB = b->body.mesh;
+  CollisionData::Contents& contents = CollisionData::Contents::of(next);
+  for (auto& list : contents.tags) list.clear();
+  if (ofA.tags.empty() && ofB.tags.empty()) return;
+  const auto add = [&](ContactKind kind, const auto& list, const auto& tagsOfContact) {
+    auto& tags = contents.tagsOf(kind);
+    tags.reserve(list.size());
+    for (const auto& contact : list) tags.push_back(tagsOfContact(contact));
+  };
+  add(ContactKind::VertexTriangle, contents.vertexTriangle, [&](const auto& c) {
+    return ContactTags{ofA.tagOfVertex(c.vertex), ofB.tag(c.triangle)};
+  });
+  add(ContactKind::TriangleVertex, contents.triangleVertex, [&](const auto& c) {
+    return ContactTags{ofA.tag(c.triangle), ofB.tagOfVertex(c.vertex)};
+  });
+  add(ContactKind::EdgeEdge, contents.edgeEdge, [&](const auto& c) {
+    return ContactTags{ofA.tagOfEdge(c.edgeA), ofB.tagOfEdge(c.edgeB)};
+  });
+  add(ContactKind::Shape, contents.shape, [&](const ShapeContact& c) {
+    const TriangleMesh& elements = mesh().body.mesh;
+    const bool ofSecond = &elements == &ofB;
+    const std::uint32_t tag = c.element == ShapeElement::Vertex ? elements.tagOfVertex(c.id)
+                              : c.element == ShapeElement::Edge
+                                  ? elements.tagOfEdge({c.vertices[0], c.vertices[1]})
+                                  : elements.tag(c.id);
+    const std::uint32_t tagOfBody = tagOfWhole((ofSecond ? *a : *b).body);
+    return ofSecond ? ContactTags{tagOfBody, tag} : ContactTags{tag, tagOfBody};
+  });
+  add(ContactKind::ShapeShape, contents.shapeShape, [&](const auto&) {
+    return ContactTags{tagOfWhole(a->body), tagOfWhole(b->body)};
+  });
+}
+
 void PairRecord::commit() noexcept {
   PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
                  sizeOf(CollisionData::Contents::of(next)));

@@ -86,6 +86,8 @@ struct PairRecord : CountedObject {
   /// Follows the contacts into `next`, or where it holds, the result into the step with this number
   /// (PairSettings::trackContacts). Empties `next` of a pair that does not collide.
   void track(std::uint64_t step);
+  /// Writes Contents::tags of `next`, if it is new.
+  void addTags();
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// Commits an empty result, for a pair that does not collide.

@@ -1,6 +1,7 @@
 #include <palpate/Capture.h>
 
 #include "Diagnostics/Audit.h"
+#include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Shapes/Shape.h"
 #include "Core/FloatingPoint.h"
@@ -25,7 +26,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 13;
+constexpr int kVersion = 14;
 
 // Enumerators are written by name. The names are in the order of the declarations.
 constexpr std::array<std::string_view, 6> kMethods{"Auto",       "Intersection",  "Proximity",
@@ -300,6 +301,8 @@ void meshLines(File& file, MeshType& mesh, int version) {
     file.count(rest, kNumberText);
   }
   if (version >= 8) sizeOf(file, mesh.tetrahedra, kTetrahedronText);
+  if (version >= 14)
+    for (auto* list : {&mesh.tags, &mesh.removed, &mesh.removedTetrahedra}) listOf(file, *list);
   file.endLine();
   if constexpr (kReads<File>) {
     mesh.id = GeometryId{id};
@@ -353,6 +356,10 @@ GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Geometry& mesh)
   if (mesh.type == GeometryType::Field) return detection.addDistanceField(mesh.field);
   if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
   const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
+  if (mesh.type == GeometryType::Triangles &&
+      !(mesh.removed.empty() && mesh.removedTetrahedra.empty()))
+    return CutMesh{rest, mesh.triangles, mesh.removed, mesh.tetrahedra, mesh.removedTetrahedra}
+        .addTo(detection);
   if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
   if (mesh.type == GeometryType::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
   const bool one = mesh.radii.size() <= 1;
@@ -376,6 +383,7 @@ void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
     detection.setName(id, mesh.name);
     detection.setCollisionFilter(id, mesh.filter);
     detection.setDisabledElements(id, mesh.disabled);
+    detection.setTags(id, mesh.tags);
     if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);
     if (mesh.proxy) detection.attachSurfaceProxy(id, mesh.proxy);
   }

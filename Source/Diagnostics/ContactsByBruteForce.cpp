@@ -310,7 +310,7 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
     for (std::uint32_t b = pair.self() ? a + 1 : 0; b < countB; ++b)
       if (pair.b.topology.isEnabled(b)) addIntersection(pair, {a, b}, out);
   const MeshTopology& ofA = pair.a.topology;
-  if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.elements.size()) return;
+  if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.count()) return;
   ContactBuffers pierced;
   ContactBuffers* const found[] = {&out};
   PiercingContacts().find(pair, found, pierced);

@@ -23,6 +23,8 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   copyTo<double>(copy.radii, mesh.radii);
   copy.filter = geometry.filter;
   copyTo<std::uint32_t>(copy.disabled, mesh.topology.disabled);
+  copyTo<std::uint32_t>(copy.removed, mesh.topology.removed);
+  copyTo<std::uint32_t>(copy.tags, geometry.body.solid ? geometry.body.solid->tags : mesh.tags);
   if (geometry.body.shape) copy.analytical = geometry.body.shape->analytical;
   copy.field = geometry.body.field;
   if (geometry.proxy) copy.proxy = geometry.proxySettings;
@@ -36,6 +38,7 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
   if (geometry.body.solid) {
     copyTo<Tetrahedron>(copy.tetrahedra, geometry.body.solid->topology.tetrahedra);
+    copyTo<std::uint32_t>(copy.removedTetrahedra, geometry.body.solid->topology.removed);
     copyTo<Eigen::Vector3d>(copy.rest, mesh.rest);
   }
   return copy;

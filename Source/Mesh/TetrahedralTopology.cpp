@@ -25,18 +25,21 @@ bool ascends(const Tetrahedron& tetrahedron, std::uint32_t side) {
 }
 
 /// For each side, the side of the tetrahedron beyond it; kNone: the outside.
-CountedVector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
+CountedVector<std::uint32_t> opposites(const TetrahedralTopology& topology,
                                        std::optional<OverusedFace>& fault) {
+  const CountedVector<Tetrahedron>& tetrahedra = topology.tetrahedra;
   CountedVector<Face> faces;
   faces.reserve(4 * tetrahedra.size());
-  for (std::uint32_t side = 0; side < 4 * tetrahedra.size(); ++side) {
-    faces.push_back({faceOf(tetrahedra[side / 4], side % 4), side});
-    std::sort(faces.back().vertices.begin(), faces.back().vertices.end());
-  }
+  topology.forEach([&](std::uint32_t t) {
+    for (std::uint32_t side = 4 * t; side < 4 * t + 4; ++side) {
+      faces.push_back({faceOf(tetrahedra[t], side % 4), side});
+      std::sort(faces.back().vertices.begin(), faces.back().vertices.end());
+    }
+  });
   std::sort(faces.begin(), faces.end(), [](const Face& l, const Face& r) {
     return l.vertices != r.vertices ? l.vertices < r.vertices : l.side < r.side;
   });
-  CountedVector<std::uint32_t> beyond(faces.size(), kNone);
+  CountedVector<std::uint32_t> beyond(4 * tetrahedra.size(), kNone);
   for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
     if (faces[i].vertices != faces[i + 1].vertices) continue;
     if (i + 2 < faces.size() && faces[i + 2].vertices == faces[i].vertices) {
@@ -52,19 +55,20 @@ CountedVector<std::uint32_t> opposites(std::span<const Tetrahedron> tetrahedra,
 
 /// For each tetrahedron, whether its corners as given are wound as if its volume were positive.
 CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
-                                     std::span<const Tetrahedron> tetrahedra,
+                                     const TetrahedralTopology& topology,
                                      std::span<const std::uint32_t> beyond) {
-  CountedVector<bool> positive(tetrahedra.size()), known(tetrahedra.size());
+  const CountedVector<Tetrahedron>& tetrahedra = topology.tetrahedra;
+  CountedVector<bool> positive(tetrahedra.size(), true), known(tetrahedra.size(), true);
   CountedVector<std::uint32_t> queue;
   SignCounts counts;
-  for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
+  topology.forEach([&](std::uint32_t t) {
     const auto& [a, b, c, d] = tetrahedra[t];
     const int sign = orient3d(rest[a], rest[b], rest[c], rest[d], counts);
     positive[t] = sign >= 0;
     known[t] = sign != 0;
     if (sign != 0) queue.push_back(t);
-  }
-  if (queue.size() == tetrahedra.size()) return positive;
+  });
+  if (queue.size() == tetrahedra.size() - topology.removed.size()) return positive;
   // Tetrahedra without volume follow from their neighbours: two sides of one face are wound in
   // opposite directions.
   const auto propagate = [&] {
@@ -92,22 +96,57 @@ CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
 
 TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
                                std::span<const Tetrahedron> tetrahedra,
-                               std::optional<OverusedFace>& fault) {
+                               std::optional<OverusedFace>& fault,
+                               std::span<const std::uint32_t> removed) {
   PALPATE_ASSERT(std::all_of(tetrahedra.begin(), tetrahedra.end(), [&](const Tetrahedron& t) {
     return *std::max_element(t.begin(), t.end()) < rest.size();
   }));
-  const CountedVector<std::uint32_t> beyond = opposites(tetrahedra, fault);
-  TetrahedralTopology topology{{tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}};
+  TetrahedralTopology topology{
+      {tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}, {removed.begin(), removed.end()}};
+  const CountedVector<std::uint32_t> beyond = opposites(topology, fault);
   if (fault) return topology;
-  topology.isPositive = findOrientations(rest, tetrahedra, beyond);
-  for (std::uint32_t side = 0; side < beyond.size(); ++side) {
-    if (beyond[side] != kNone) continue;
-    Triangle& face = topology.surface.emplace_back(faceOf(tetrahedra[side / 4], side % 4));
-    if (!topology.isPositive[side / 4]) std::swap(face[1], face[2]);
-    topology.surfaceOwner.push_back(side / 4);
-  }
-  PALPATE_ASSERT(std::is_sorted(topology.surfaceOwner.begin(), topology.surfaceOwner.end()));
+  topology.isPositive = findOrientations(rest, topology, beyond);
+  topology.forEach([&](std::uint32_t t) {
+    for (std::uint32_t side = 4 * t; side < 4 * t + 4; ++side) {
+      if (beyond[side] != kNone) continue;
+      Triangle& face = topology.surface.emplace_back(faceOf(tetrahedra[t], side % 4));
+      if (!topology.isPositive[t]) std::swap(face[1], face[2]);
+      topology.surfaceOwner.push_back(t);
+    }
+  });
   return topology;
+}
+
+CountedVector<std::uint32_t> keepSurfaceIds(std::span<const Triangle> ids,
+                                            TetrahedralTopology& topology) {
+  struct Known {
+    Triangle corners;
+    std::uint32_t id;
+  };
+  const auto precedes = [](const Known& l, const Known& r) { return l.corners < r.corners; };
+  CountedVector<Known> known;
+  for (std::uint32_t id = 0; id < ids.size(); ++id)
+    if (ids[id][0] != ids[id][1]) known.push_back({ids[id], id});
+  std::sort(known.begin(), known.end(), precedes);
+  CountedVector<Triangle> surface(ids.size(), Triangle{});
+  CountedVector<std::uint32_t> owners(ids.size(), kNone);
+  for (std::size_t i = 0; i < topology.surface.size(); ++i) {
+    const Triangle& corners = topology.surface[i];
+    const auto place = std::lower_bound(known.begin(), known.end(), Known{corners, 0}, precedes);
+    if (place != known.end() && place->corners == corners) {
+      surface[place->id] = corners;
+      owners[place->id] = topology.surfaceOwner[i];
+    } else {
+      surface.push_back(corners);
+      owners.push_back(topology.surfaceOwner[i]);
+    }
+  }
+  CountedVector<std::uint32_t> without;
+  for (std::uint32_t id = 0; id < ids.size(); ++id)
+    if (owners[id] == kNone) without.push_back(id);
+  topology.surface = std::move(surface);
+  topology.surfaceOwner = std::move(owners);
+  return without;
 }
 
 }  // namespace palpate

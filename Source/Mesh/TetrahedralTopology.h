@@ -2,6 +2,7 @@
 
 #include <palpate/Meshes.h>
 
+#include "Mesh/TriangleMesh.h"
 #include "Core/CountedVector.h"
 
 #include <Eigen/Core>
@@ -23,13 +24,19 @@ inline Triangle faceOf(const Tetrahedron& t, unsigned i) {
 
 /// Tetrahedra, and the surface triangles between them and the outside.
 struct TetrahedralTopology {
-  CountedVector<Tetrahedron> tetrahedra;  ///< as given
-  CountedVector<Triangle> surface;        ///< see TetrahedralSurface
-  CountedVector<std::uint32_t>
-      surfaceOwner;  ///< the tetrahedron of each surface triangle, ascending
+  CountedVector<Tetrahedron> tetrahedra;      ///< as given
+  CountedVector<Triangle> surface;            ///< see TetrahedralSurface
+  CountedVector<std::uint32_t> surfaceOwner;  ///< the tetrahedron of each surface triangle
   /// For each tetrahedron, whether its volume at rest is positive. One without volume has the sign
   /// that fits its neighbours.
   CountedVector<bool> isPositive;
+  CountedVector<std::uint32_t> removed{};  ///< tetrahedra that cuts removed, ascending
+
+  /// Calls f(tetrahedron) for those that were not removed, ascending.
+  template <class F>
+  void forEach(F&& f) const {
+    forEachWithout(tetrahedra.size(), removed, f);
+  }
 };
 
 /// A face that more than two tetrahedra share: its vertices, ascending, and the first three
@@ -40,9 +47,15 @@ struct OverusedFace {
 };
 
 /// Indices must be in range, and the four of a tetrahedron different. `fault` receives the first
-/// invalid face, in the order of the faces' vertices.
+/// invalid face, in the order of the faces' vertices. removed: ascending; they count as absent.
 TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
                                std::span<const Tetrahedron> tetrahedra,
-                               std::optional<OverusedFace>& fault);
+                               std::optional<OverusedFace>& fault,
+                               std::span<const std::uint32_t> removed = {});
+
+/// Gives surface triangles the ids that equal ones have in `ids`, and others the next ids in their
+/// order. An id without a triangle gets {0, 0, 0} and the owner kNoElement. Returns these ids.
+CountedVector<std::uint32_t> keepSurfaceIds(std::span<const Triangle> ids,
+                                            TetrahedralTopology& topology);
 
 }  // namespace palpate

@@ -8,28 +8,34 @@
 
 namespace palpate {
 
-MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newElements)
+MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle> newElements,
+                           std::span<const std::uint32_t> newRemoved)
     : vertexCount(newVertexCount),
       elements(newElements.begin(), newElements.end()),
       triangleEdges(newElements.size()),
-      isUsed(newVertexCount, false) {
+      isUsed(newVertexCount, false),
+      removed(newRemoved.begin(), newRemoved.end()) {
   PALPATE_ASSERT(std::all_of(newElements.begin(), newElements.end(), [&](const Triangle& t) {
     return std::max({t[0], t[1], t[2]}) < newVertexCount;
   }));
+  for (const std::uint32_t t : removed) {
+    elements[t] = {0, 0, 0};
+    triangleEdges[t] = {kNoEdge, kNoEdge, kNoEdge};
+  }
   struct Side {
     Segment edge;
     std::uint32_t triangle, side;
   };
   CountedVector<Side> sides;
-  sides.reserve(3 * elements.size());
-  for (std::uint32_t t = 0; t < elements.size(); ++t) {
+  sides.reserve(3 * count());
+  forEachElement([&](std::uint32_t t) {
     for (std::uint32_t i = 0; i < 3; ++i) {
       isUsed[elements[t][i]] = true;
       const std::uint32_t p = elements[t][i], q = elements[t][(i + 1) % 3];
       triangleEdges[t][i] = kNoEdge;
       if (p != q) sides.push_back({{std::min(p, q), std::max(p, q)}, t, i});
     }
-  }
+  });
   std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
     return std::tie(l.edge, l.triangle, l.side) < std::tie(r.edge, r.triangle, r.side);
   });
@@ -39,18 +45,21 @@ MeshTopology::MeshTopology(std::size_t newVertexCount, std::span<const Triangle>
     triangleEdges[triangle][side] = static_cast<std::uint32_t>(edges.size() - 1);
   }
   PALPATE_ASSERT(std::is_sorted(edges.begin(), edges.end()));
-  findOwners({});
+  disable({});
 }
 
 void MeshTopology::disable(std::span<const std::uint32_t> newDisabled) {
-  CountedVector<bool> newIsDisabled(newDisabled.empty() ? 0 : elements.size(), false);
+  const std::size_t size = newDisabled.empty() && removed.empty() ? 0 : elements.size();
+  CountedVector<bool> newIsDisabled(size, false);
   for (const std::uint32_t triangle : newDisabled) {
     PALPATE_ASSERT(triangle < elements.size());
     newIsDisabled[triangle] = true;
   }
+  for (const std::uint32_t triangle : removed) newIsDisabled[triangle] = false;
   CountedVector<std::uint32_t> sorted;
   for (std::uint32_t t = 0; t < newIsDisabled.size(); ++t)
     if (newIsDisabled[t]) sorted.push_back(t);
+  for (const std::uint32_t triangle : removed) newIsDisabled[triangle] = true;
   findOwners(newIsDisabled);
   // Nothing below throws.
   disabled = std::move(sorted);
@@ -109,6 +118,13 @@ void MeshTopology::findOwners(const CountedVector<bool>& newIsDisabled) {
   untestedVertices = untested;
   hasOnlyClosedStars = std::find(closedStars.begin(), closedStars.end(), 0) == closedStars.end();
   hasClosedStar = std::move(closedStars);
+}
+
+std::uint32_t MeshTopology::lowest() const {
+  PALPATE_ASSERT(count() > 0);
+  std::uint32_t lowest = 0;
+  while (lowest < removed.size() && removed[lowest] == lowest) ++lowest;
+  return lowest;
 }
 
 std::uint32_t MeshTopology::edgeOf(const Segment& edge) const {

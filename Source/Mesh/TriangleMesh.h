@@ -6,6 +6,7 @@
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -40,6 +41,17 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
   return lists;
 }
 
+/// Calls f(id) for the ids below `size`, ascending, without those of the list, which ascends.
+template <class F>
+void forEachWithout(std::size_t size, std::span<const std::uint32_t> without, F&& f) {
+  auto next = without.begin();
+  for (std::uint32_t id = 0; id < size; ++id)
+    if (next != without.end() && *next == id)
+      ++next;
+    else
+      f(id);
+}
+
 /// The connectivity of a mesh, which follows from its elements alone and is computed once.
 ///
 /// Each vertex and each edge is owned by the lowest enabled triangle that contains it. Exactly one
@@ -47,8 +59,9 @@ IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
 /// collision detection for deformable models using representative-triangles, I3D 2008.)
 struct MeshTopology {
   MeshTopology() = default;
-  /// Indices must be below vertexCount.
-  MeshTopology(std::size_t vertexCount, std::span<const Triangle> elements);
+  /// Indices must be below vertexCount. removed: ascending.
+  MeshTopology(std::size_t vertexCount, std::span<const Triangle> elements,
+               std::span<const std::uint32_t> removed = {});
 
   GeometryType type = GeometryType::Triangles;
   std::size_t vertexCount = 0;
@@ -60,13 +73,26 @@ struct MeshTopology {
   IndexLists vertexTriangles;         ///< enabled elements only: ascending ids, each once
   IndexLists edgeTriangles;           ///< the same; an empty list: the edge is disabled
   std::size_t untestedVertices = 0;   ///< number of vertices in no enabled triangle
-  CountedVector<bool> isUsed;         ///< per vertex: in a triangle, enabled or not
+  CountedVector<bool> isUsed;         ///< per vertex: in a triangle that is there, enabled or not
   /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
   CountedVector<std::uint8_t> hasClosedStar;
-  bool hasOnlyClosedStars = true;           ///< the enabled triangles are a closed surface
-  CountedVector<std::uint32_t> disabled{};  ///< disabled elements, ascending
-  CountedVector<bool> isDisabled{};         ///< per triangle; empty if none is disabled
+  bool hasOnlyClosedStars = true;  ///< the enabled triangles are a closed surface
+  /// Elements that cuts removed, ascending. They have corners 0, no edges, are in no list and no
+  /// octree, and count as disabled.
+  CountedVector<std::uint32_t> removed{};
+  CountedVector<std::uint32_t> disabled{};  ///< disabled elements that were not removed, ascending
+  CountedVector<bool> isDisabled{};  ///< per triangle, with removed ones; empty if there are none
 
+  std::size_t count() const { return elements.size() - removed.size(); }  ///< without removed ones
+  bool isRemoved(std::uint32_t element) const {
+    return std::binary_search(removed.begin(), removed.end(), element);
+  }
+  /// Calls f(element) for those that were not removed, ascending.
+  template <class F>
+  void forEachElement(F&& f) const {
+    forEachWithout(elements.size(), removed, f);
+  }
+  std::uint32_t lowest() const;  ///< the lowest element that was not removed; there is one
   /// Disables these elements and enables all others. Changes nothing if it throws.
   /// Cost     linear: about a tenth of the constructor's.
   void disable(std::span<const std::uint32_t> elements);
@@ -111,6 +137,17 @@ struct TriangleMesh {
   double largestRadius = 0.0;             ///< L
   CountedVector<Eigen::Vector3d> rest{};  ///< positions when the topology was set
   bool outerSideOnly = false;             ///< Sidedness::Outer
+  /// Per element, or one of what has no elements; empty: all are 0.
+  CountedVector<std::uint32_t> tags{};
+
+  std::uint32_t tag(std::uint32_t element) const { return tags.empty() ? 0 : tags[element]; }
+  /// That of the lowest enabled element that holds the feature.
+  std::uint32_t tagOfVertex(std::uint32_t vertex) const {
+    return tags.empty() ? 0 : tagOfLowest(topology.vertexTriangles[vertex]);
+  }
+  std::uint32_t tagOfEdge(const Segment& edge) const {
+    return tags.empty() ? 0 : tagOfLowest(topology.edgeTriangles[topology.edgeOf(edge)]);
+  }
 
   double radius(std::uint32_t vertex) const {
     PALPATE_ASSERT(radii.empty() || vertex < radii.size());
@@ -125,6 +162,11 @@ struct TriangleMesh {
     if (radii.empty()) return largestRadius;
     return weights[0] * radii[corners[0]] + weights[1] * radii[corners[1]] +
            weights[2] * radii[corners[2]];
+  }
+
+ private:
+  std::uint32_t tagOfLowest(std::span<const std::uint32_t> elements) const {
+    return elements.empty() ? 0 : tags[elements.front()];
   }
 };
 

@@ -5,6 +5,8 @@
 #include "Core/CountedVector.h"
 #include "Core/MemoryBudget.h"
 
+#include <array>
+#include <cstddef>
 #include <limits>
 #include <memory>
 
@@ -26,6 +28,11 @@ struct CollisionData::Contents : CountedObject {
     bool elementsOfSecond = false;  ///< shape() has elements of the pair's second geometry
   } tracked{};
   CountedVector<Crossing> crossings{};
+  std::array<CountedVector<ContactTags>, 5> tags{};  ///< by ContactKind, parallel to the lists
+
+  CountedVector<ContactTags>& tagsOf(ContactKind kind) {
+    return tags[static_cast<std::size_t>(kind)];
+  }
 
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {

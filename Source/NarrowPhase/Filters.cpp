@@ -113,14 +113,18 @@ bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t tri
   using Kind = ContactFeatures::Kind;
   const std::array<std::uint32_t, 2> v{vertex, vertex}, t{triangle, triangle};
   const bool triangleFirst = swapped && !pair.self();
-  return !(*pair.predicate)(triangleFirst ? ContactFeatures{Kind::TriangleVertex, t, v}
-                                          : ContactFeatures{Kind::VertexTriangle, v, t});
+  const std::uint32_t tagOfVertex = (swapped ? pair.b : pair.a).tagOfVertex(vertex),
+                      tagOfTriangle = mesh.tag(triangle);
+  return !(*pair.predicate)(
+      triangleFirst ? ContactFeatures{Kind::TriangleVertex, t, v, tagOfTriangle, tagOfVertex}
+                    : ContactFeatures{Kind::VertexTriangle, v, t, tagOfVertex, tagOfTriangle});
 }
 
 bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
   return (!pair.keepsApart && areNearAtRest(pair, p, q)) ||
-         (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q}));
+         (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q,
+                                                pair.a.tagOfEdge(p), pair.b.tagOfEdge(q)}));
 }
 
 bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction) {

@@ -27,7 +27,7 @@ double halfArea(const FloatBox& box) {
 Octree::Octree() = default;
 Octree::~Octree() = default;
 
-void Octree::reset(std::size_t size) {
+void Octree::reset(std::size_t size, std::span<const std::uint32_t> without) {
   m_stage = Stage::Empty;
   m_dops.directions = 3;
   ++m_layout;
@@ -38,7 +38,13 @@ void Octree::reset(std::size_t size) {
   m_boxes.resize(size);
   m_order.reserve(size + BoxArrays::kPadding);  // read in whole vectors
   m_order.resize(size);
-  std::iota(m_order.begin(), m_order.end(), 0u);
+  if (without.empty()) return std::iota(m_order.begin(), m_order.end(), 0u);
+  auto next = without.begin();
+  std::uint32_t id = 0;
+  for (std::uint32_t& element : m_order) {
+    for (; next != without.end() && *next == id; ++next) ++id;
+    element = id++;
+  }
 }
 
 void Octree::copy(const Octree& other) {

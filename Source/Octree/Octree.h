@@ -140,8 +140,9 @@ class Octree {
   Octree& operator=(const Octree&) = delete;
   ~Octree();
 
-  /// Forgets the tree; `order()` is then 0, 1, ..., size - 1.
-  void reset(std::size_t size);
+  /// Forgets the tree; `order()` is then 0, 1, ..., without these, which ascend, and has `size`
+  /// elements.
+  void reset(std::size_t size, std::span<const std::uint32_t> without = {});
   /// Becomes a copy of a built octree, or of one without elements, for searches only. All copies in
   /// one object must be of one octree. If that was only fitted since the last copy, its layout is
   /// not copied again.

@@ -27,15 +27,10 @@ class Validation {
       if (m_holders[i] != 1)
         fail(0, "element " + std::to_string(m_octree.order()[i]) + " is in " +
                     std::to_string(m_holders[i]) + " nodes instead of 1");
-    std::vector<bool> ids(m_octree.size(), false);
-    for (const std::uint32_t id : m_octree.order()) {
-      if (id >= ids.size() || ids[id]) {
-        fail(0, "the order is not a permutation: element " + std::to_string(id) +
-                    " is repeated or out of range");
-        break;
-      }
-      ids[id] = true;
-    }
+    std::vector<std::uint32_t> ids(m_octree.order().begin(), m_octree.order().end());
+    std::sort(ids.begin(), ids.end());
+    if (const auto twice = std::adjacent_find(ids.begin(), ids.end()); twice != ids.end())
+      fail(0, "element " + std::to_string(*twice) + " is repeated in the order");
     for (std::size_t block = 0; block < m_blockVisited.size(); ++block)
       if (!m_blockVisited[block])
         fail(nodeOf(static_cast<std::uint32_t>(block), 0), "a block in use has no parent");

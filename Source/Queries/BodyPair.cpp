@@ -30,12 +30,13 @@ void BodyVertices::assign(const Body& geometry) {
   };
   box.setEmpty();
   const auto& triangles = geometry.mesh.topology.elements;
-  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+  geometry.mesh.topology.forEachElement([&](std::uint32_t t) {
     for (const std::uint32_t v : triangles[t]) {
       if (triangleOf[v] == kNoElement) triangleOf[v] = t, box.extend(positions[v]);
       const std::uint32_t first = root(triangles[t][0]), second = root(v);
       m_links[std::max(first, second)] = std::min(first, second);
     }
+  });
   parts.clear();
   for (std::uint32_t v = 0; v < now.size(); ++v)
     if (m_links[v] == v && triangleOf[v] != kNoElement) parts.push_back(v);
@@ -104,18 +105,16 @@ void BodyPair::forEachIntersecting(
     both.elementA = elementA;
     both.a = cornersOfA(elementA, shift);
   };
+  const std::span<const std::uint32_t> orderA = m_a.tree.octree().order(),
+                                       orderB = m_b.tree.octree().order();
   if (m_engine == Engine::BruteForce) {
-    const std::size_t sizeA = m_a.mesh.topology.elements.size(),
-                      sizeB = m_b.mesh.topology.elements.size();
-    for (std::uint32_t i = 0; i < sizeA; ++i) {
+    for (const std::uint32_t i : orderA) {
       setA(i);
-      for (std::uint32_t j = 0; j < sizeB; ++j)
+      for (const std::uint32_t j : orderB)
         if (!test(j)) return;
     }
     return;
   }
-  const std::span<const std::uint32_t> orderA = m_a.tree.octree().order(),
-                                       orderB = m_b.tree.octree().order();
   if (!m_scratch.pairs) m_scratch.pairs = std::make_unique<PairScratch>();
   PairBound bound;
   bound.distance = boxErrorOf(m_a, m_b);
@@ -152,9 +151,9 @@ bool BodyPair::isInBoth(const Vector3d& p) const {
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   SignCounts counts;
   const auto cornersAt = [&](std::size_t i) {
-    return cornersOfA(static_cast<std::uint32_t>(i), shift);
+    return cornersOfA(m_a.tree.octree().order()[i], shift);
   };
-  const int number = windingNumber(m_a.mesh.topology.elements.size(), cornersAt, p, counts);
+  const int number = windingNumber(m_a.tree.octree().order().size(), cornersAt, p, counts);
   m_scratch.stack.exactDecisions += counts.undecided;
   return number != 0;
 }

@@ -339,7 +339,7 @@ Penetration penetrationOf(const Body& a, const Body& b, Engine engine, Penetrati
     return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
   };
   const Penetration apart{false, Vector3d::Zero(), 0.0, none(a), none(b), true};
-  if (a.mesh.topology.elements.empty() || b.mesh.topology.elements.empty()) return apart;
+  if (a.mesh.topology.count() == 0 || b.mesh.topology.count() == 0) return apart;
   const BodyPair pair(a, b, engine, scratch.pair, effort.moved);
   if (!overlap(pair, scratch.intersecting)) return apart;
   return Search(pair, scratch, effort).run();

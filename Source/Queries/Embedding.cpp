@@ -15,14 +15,14 @@ void updateTetrahedra(const Body& solid, const OctreeSettings& settings, const T
   if (!prepared.tetrahedra || version.state().topology != now.topology)
     prepared.tetrahedra.emplace();
   version.invalidate();
-  prepared.tetrahedra->update(solid.solid->topology.tetrahedra, solid.tree.floats(),
+  prepared.tetrahedra->update(solid.solid->topology, solid.tree.floats(),
                               solid.tree.spread() * frame.scale, settings, threads);
   version.commit(now);
 }
 
 std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
   PALPATE_ASSERT(m_solid.prepared->tetrahedraVersion.isValid());
-  const CountedVector<Tetrahedron>& tetrahedra = m_solid.solid->topology.tetrahedra;
+  const TetrahedralTopology& topology = m_solid.solid->topology;
   const Positions& now = m_solid.mesh.now;
   std::optional<TetrahedronPoint> best;
   SignCounts counts;
@@ -33,7 +33,7 @@ std::optional<TetrahedronPoint> SolidQuery::lowest(const Eigen::Vector3d& p) {
       best = {id, t, *weights};
   };
   if (m_bruteForce) {
-    for (std::uint32_t i = 0; i < tetrahedra.size(); ++i) testOne(i, tetrahedra[i]);
+    topology.forEach([&](std::uint32_t i) { testOne(i, topology.tetrahedra[i]); });
     return best;
   }
   const TetrahedronTree& tree = *m_solid.prepared->tetrahedra;

@@ -46,7 +46,7 @@ template <class Bound, class Test>
 void descend(const Body& geometry, bool bruteForce, double best, Bound&& bound, Test&& test) {
   const Octree& octree = geometry.tree.octree();
   if (bruteForce) {
-    for (std::uint32_t i = 0; i < geometry.mesh.topology.elements.size(); ++i) test(i);
+    geometry.mesh.topology.forEachElement(test);
     return;
   }
   octree.requireBuilt();

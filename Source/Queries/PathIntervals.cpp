@@ -111,7 +111,7 @@ void addInvertedFaces(const Body& solid, const PathLine& path, bool bruteForce,
     const Vector3d &p = path.point(i), &q = path.point(i + 1);
     if (p == q) continue;
     const RaySegment segment{p, q - p, 0.0, 1.0};
-    const auto addFaces = [&](std::size_t tetrahedron) {
+    const auto addFaces = [&](std::uint32_t tetrahedron) {
       const Tetrahedron& t = topology.tetrahedra[tetrahedron];
       const Vector3d corners[] = {now[t[0]], now[t[1]], now[t[2]], now[t[3]]};
       const int sign = orient3d(corners[0], corners[1], corners[2], corners[3], counts);
@@ -122,7 +122,7 @@ void addInvertedFaces(const Body& solid, const PathLine& path, bool bruteForce,
             inner.push_back({at, at, kNoElement, kNoElement, false});
     };
     if (bruteForce) {
-      for (std::size_t t = 0; t < topology.tetrahedra.size(); ++t) addFaces(t);
+      topology.forEach(addFaces);
     } else if (tree.octree().size() > 0) {
       FloatBox box = frame.boxOf(p);
       box.add(frame.boxOf(q));

@@ -106,7 +106,7 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Pose& placem
              countB = static_cast<std::uint32_t>(b.mesh.topology.elements.size());
   if (source->engine() == Engine::BruteForce)
     all.findByBruteForce(countA, countB, job);
-  else if (countA > 0 && countB > 0)
+  else if (a.mesh.topology.count() > 0 && countB > 0)
     all.findByOctree(a, b, job);
   ContactBuffers* const buffers[] = {&all.found};
   orderContacts(buffers, 0, all.order, all.sorted);

@@ -282,7 +282,7 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
         shape->corners().front() == shape->corners().back())  // a point
       return findWithin(geometry, shape->origin(), shape->radius(), bruteForce, near, out);
     if (bruteForce) {
-      for (std::uint32_t i = 0; i < mesh.topology.elements.size(); ++i) test(i);
+      mesh.topology.forEachElement(test);
       return;
     }
     findElementsNear(geometry, *shape, *shape, mesh.largestRadius, near);

@@ -159,7 +159,7 @@ Penetration shapePenetration(const Body& a, const Body& b, Engine engine,
   PALPATE_ASSERT(!(a.shape && b.shape && a.shape->now.isPlane() && b.shape->now.isPlane()));
   if (a.shape && b.shape) return ofShapes(a, b, pairScratch);
   if (a.shape) return exchanged(shapePenetration(b, a, engine, settings, scratch, pairScratch));
-  if (a.mesh.topology.elements.empty()) return apart(a.id, b.id);
+  if (a.mesh.topology.count() == 0) return apart(a.id, b.id);
   if (b.shape->now.isPlane()) return ofPlane(a, b, scratch.pair.a);
   const auto around = meshAround(b.id, b.shape->now, a.tree.frame().scale, settings);
   return around ? ofMesh(a, b, *around, engine, scratch) : apart(a.id, b.id);

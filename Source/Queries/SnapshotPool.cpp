@@ -31,6 +31,8 @@ void GeometryCopy::update(const Body& original) {
   PALPATE_ASSERT(original.id == geometry.id);
   m_version.invalidate();
   TriangleMesh& mesh = geometry.mesh;
+  const bool hasTags = m_elementsVersion.isCurrent(original.revisions.elements) &&
+                       geometry.revisions.filter == original.revisions.filter;
   if (const ElementsState& elements = original.revisions.elements;
       !m_elementsVersion.isCurrent(elements)) {
     const bool isSameMesh =
@@ -45,6 +47,12 @@ void GeometryCopy::update(const Body& original) {
     }
     geometry.revisions = original.revisions;
     m_elementsVersion.commit(elements);
+  }
+  if (!hasTags) {
+    geometry.revisions.filter = {};
+    mesh.tags = original.mesh.tags;
+    if (original.solid) geometry.solid->tags = original.solid->tags;
+    geometry.revisions.filter = original.revisions.filter;
   }
   mesh.now = original.mesh.now;
   mesh.before = original.mesh.before;
@@ -264,6 +272,11 @@ std::span<const Eigen::Vector3d> Snapshot::positions(GeometryId id) const {
 std::span<const Eigen::Vector3d> Snapshot::positionsBefore(GeometryId id) const {
   const Body& geometry = m_contents.at(id);
   return positionsOf(geometry, geometry.mesh.before);
+}
+
+std::span<const std::uint32_t> Snapshot::tags(GeometryId id) const {
+  const Body& geometry = m_contents.at(id);
+  return geometry.solid ? geometry.solid->tags : geometry.mesh.tags;
 }
 
 RigidMotion Snapshot::motion(GeometryId id) const {

@@ -1,5 +1,6 @@
 #include "Common/QueryCalls.h"
 #include "Common/History.h"
+#include "Common/Renamed.h"
 
 #include <gtest/gtest.h>
 
@@ -27,7 +28,7 @@ Settings settingsOfLife(Random& random, OctreeBounds bounds) {
 
 std::uint32_t hashOf(const ContactFeatures& features) {
   return features.a[0] * 2654435761u ^ features.b[0] * 40503u ^ features.a[1] ^ features.b[1] * 7u ^
-         static_cast<std::uint32_t>(features.kind);
+         static_cast<std::uint32_t>(features.kind) ^ features.tagA * 5u ^ features.tagB * 3u;
 }
 
 /// The results of a query as words, or the error that it threw.
@@ -56,7 +57,22 @@ std::size_t RandomHistory::Body::elements() const {
   if (shape) return 0;
   return geometry.type == GeometryType::Points  ? geometry.positions.size()
          : geometry.type == GeometryType::Lines ? geometry.segments.size()
-                                                : geometry.triangles.size();
+                                                : geometry.triangles.size() + removed.size();
+}
+
+std::vector<std::uint32_t> RandomHistory::Body::ids() const {
+  return idsWithout(elements(), removed);
+}
+
+std::vector<std::uint32_t> RandomHistory::Body::placesOf(
+    const std::vector<std::uint32_t>& elements) const {
+  const std::vector<std::uint32_t> all = ids();
+  std::vector<std::uint32_t> places;
+  for (const std::uint32_t id : elements)
+    if (const auto found = std::lower_bound(all.begin(), all.end(), id);
+        found != all.end() && *found == id)
+      places.push_back(static_cast<std::uint32_t>(found - all.begin()));
+  return places;
 }
 
 RandomHistory::RandomHistory(Random random, OctreeBounds bounds)
@@ -258,11 +274,67 @@ void RandomHistory::setTopology(GeometryId id) {
   next.isNew = true;
   next.bodyGiven = false;
   next.disabled.clear();
+  next.tags.clear();
+  next.removed.clear();
   if (!next.transformGiven) {
     next.rotationBefore = next.rotation;
     next.translationBefore = next.translation;
   }
   body = std::move(next);
+}
+
+/// Splits some triangles, opens slits, and adds and removes triangles.
+void RandomHistory::cut(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  TestGeometry& mesh = body.geometry;
+  const std::vector<std::uint32_t> ids = body.ids();
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  std::vector<std::uint32_t> removed;
+  std::vector<Triangle> added, left;
+  Positions positions, rest;
+  const auto addVertex = [&](const Vector3d& now, const Vector3d& atRest) {
+    positions.push_back(now + m_unit * randomPoint(m_random, -0.02, 0.02));
+    rest.push_back(atRest + m_unit * randomPoint(m_random, -0.02, 0.02));
+    return first + static_cast<std::uint32_t>(positions.size()) - 1;
+  };
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto [a, b, c] = mesh.triangles[i];
+    if (m_random() % 6) {
+      left.push_back(mesh.triangles[i]);
+      continue;
+    }
+    removed.push_back(ids[i]);
+    if (m_random() % 4 == 0) continue;
+    const std::uint32_t middle =
+        addVertex((body.now[a] + body.now[b] + body.now[c]) / 3,
+                  (mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3);
+    const std::uint32_t other = m_random() % 2 ? middle : addVertex(body.now[a], mesh.positions[a]);
+    added.insert(added.end(), {{a, b, middle}, {b, c, middle}, {c, a, other}});
+  }
+  if (m_random() % 4 == 0 && first > 0) {
+    const auto any = [&] { return static_cast<std::uint32_t>(m_random() % first); };
+    added.push_back({any(), any(), any()});
+  }
+  if (ids.size() + added.size() > 60) return;
+  std::shuffle(removed.begin(), removed.end(), m_random);
+  if (m_random() % 2) rest.clear();
+  const auto total = static_cast<std::uint32_t>(body.elements());
+  for (OctreeBasedCD* each : {&m_collisions, &m_committed}) {
+    const auto found = each->replaceTriangles(id, removed, added, positions, rest);
+    ASSERT_EQ(found.size(), added.size());
+    for (std::uint32_t i = 0; i < found.size(); ++i) EXPECT_EQ(found[i], total + i);
+  }
+  left.insert(left.end(), added.begin(), added.end());
+  mesh.triangles = left;
+  if (rest.empty()) rest = positions;
+  mesh.positions.insert(mesh.positions.end(), rest.begin(), rest.end());
+  body.before.insert(body.before.end(), positions.begin(), positions.end());
+  body.now.insert(body.now.end(), positions.begin(), positions.end());
+  body.removed.insert(body.removed.end(), removed.begin(), removed.end());
+  std::sort(body.removed.begin(), body.removed.end());
+  if (!body.tags.empty()) body.tags.resize(body.elements(), 0);
+  EXPECT_TRUE(std::ranges::equal(m_collisions.removedElements(id), body.removed));
+  EXPECT_TRUE(std::ranges::equal(m_collisions.tags(id), body.tags));
 }
 
 void RandomHistory::setFilter(GeometryId id) {
@@ -284,6 +356,15 @@ void RandomHistory::setDisabled(GeometryId id) {
   body.disabled = disabled;
 }
 
+void RandomHistory::setTags(GeometryId id) {
+  Body& body = m_bodies.at(id);
+  std::vector<std::uint32_t> tags;
+  if (m_random() % 4)
+    for (std::size_t i = 0; i < body.elements(); ++i)
+      tags.push_back(static_cast<std::uint32_t>(m_random() % 4));
+  if (accepts([&] { m_collisions.setTags(id, tags); })) body.tags = tags;
+}
+
 PairSettings RandomHistory::randomSettings() {
   constexpr std::array<Method, 5> kMethods{Method::Auto, Method::Auto, Method::Intersection,
                                            Method::Proximity, Method::Continuous};
@@ -301,9 +382,13 @@ PairSettings RandomHistory::randomSettings() {
   return settings;
 }
 
-ContactPredicate RandomHistory::predicateOf(int number) {
+ContactPredicate RandomHistory::predicateOf(int number, std::vector<std::uint32_t> ofA,
+                                            std::vector<std::uint32_t> ofB) {
   if (number == 0) return {};
-  return [number](const ContactFeatures& features) {
+  return [number, ofA, ofB](ContactFeatures features) {
+    using Kind = ContactFeatures::Kind;
+    if (features.kind == Kind::TriangleVertex && !ofA.empty()) features.a.fill(ofA[features.a[0]]);
+    if (features.kind == Kind::VertexTriangle && !ofB.empty()) features.b.fill(ofB[features.b[0]]);
     return hashOf(features) % 5 != static_cast<std::uint32_t>(number);
   };
 }
@@ -366,7 +451,7 @@ void RandomHistory::query() {
 }
 
 void RandomHistory::act() {
-  const auto action = m_random() % 16;
+  const auto action = m_random() % 18;
   if (m_bodies.size() < 2 || action == 0) return add();
   const GeometryId id = anyBody();
   Body& body = m_bodies.at(id);
@@ -375,6 +460,11 @@ void RandomHistory::act() {
     if (body.isMesh()) setTopology(id);
     return;
   }
+  if (action == 16) {
+    if (body.isMesh() && body.tetrahedra.empty()) cut(id);
+    return;
+  }
+  if (action == 17) return setTags(id);
   if (action == 3) return setFilter(id);
   if (action == 4) return setDisabled(id);
   if (action < 8) return addOrChangePair();
@@ -398,12 +488,18 @@ OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryI
     ids.emplace(id, own);
     setEnds(collisions, own, body);
     collisions.setCollisionFilter(own, body.filter);
-    collisions.setDisabledElements(own, body.disabled);
+    collisions.setDisabledElements(own, body.placesOf(body.disabled));
+    std::vector<std::uint32_t> tags;
+    if (!body.tags.empty() && body.tetrahedra.empty())
+      for (const std::uint32_t i : body.ids()) tags.push_back(body.tags[i]);
+    collisions.setTags(own, body.tetrahedra.empty() ? tags : body.tags);
   }
   for (const Pair& pair : m_pairs) {
     collisions.addCollisionPair(ids.at(pair.a), ids.at(pair.b), pair.settings);
     if (pair.predicate)
-      collisions.setContactPredicate(ids.at(pair.a), ids.at(pair.b), predicateOf(pair.predicate));
+      collisions.setContactPredicate(
+          ids.at(pair.a), ids.at(pair.b),
+          predicateOf(pair.predicate, m_bodies.at(pair.a).ids(), m_bodies.at(pair.b).ids()));
   }
   return collisions;
 }
@@ -417,7 +513,7 @@ bool RandomHistory::startsApart(const Pair& pair) const {
     collisions.setPositions(own, body.before, body.before);
     if (body.placed && pair.a != pair.b)
       collisions.setTransform(own, {body.rotationBefore, body.translationBefore});
-    collisions.setDisabledElements(own, body.disabled);
+    collisions.setDisabledElements(own, body.placesOf(body.disabled));
     return own;
   };
   const GeometryId a = add(pair.a), b = pair.a == pair.b ? a : add(pair.b);
@@ -432,12 +528,16 @@ void RandomHistory::compareContacts(const OctreeBasedCD& other,
   for (const Pair& pair : m_pairs) {
     const CollisionData& found = m_collisions.collisionData(pair.a, pair.b);
     const CollisionData& truth = other.collisionData(ids.at(pair.a), ids.at(pair.b));
+    const auto ofA = m_bodies.at(pair.a).ids(), ofB = m_bodies.at(pair.b).ids();
     SCOPED_TRACE(::testing::Message() << "pair (" << static_cast<unsigned>(pair.a) << ", "
                                       << static_cast<unsigned>(pair.b) << "), method "
                                       << static_cast<int>(pair.settings.method) << ", thickness "
                                       << pair.settings.thickness << ", predicate " << pair.predicate
                                       << (isBruteForce ? ", brute force" : ""));
-    EXPECT_EQ(found.hash(), truth.hash());
+    EXPECT_EQ(found.hash(), renamed(truth, ofA, ofB).hash());
+    for (int kind = 0; kind < 5; ++kind)
+      EXPECT_TRUE(std::ranges::equal(found.tags(static_cast<ContactKind>(kind)),
+                                     truth.tags(static_cast<ContactKind>(kind))));
     EXPECT_EQ(found.earliestTimeOfImpact(), truth.earliestTimeOfImpact());
     const Validity &v = found.validity(), &t = truth.validity();
     EXPECT_EQ(v.method, t.method);
@@ -468,8 +568,10 @@ void RandomHistory::compareCandidates(OctreeBasedCD& bruteForce,
                                       const std::map<GeometryId, GeometryId>& ids) {
   for (const Pair& pair : m_pairs) {
     if (m_bodies.at(pair.a).shape || m_bodies.at(pair.b).shape) continue;
-    const auto found = m_collisions.candidatePairs(pair.a, pair.b),
-               truth = bruteForce.candidatePairs(ids.at(pair.a), ids.at(pair.b));
+    const auto found = m_collisions.candidatePairs(pair.a, pair.b);
+    auto truth = bruteForce.candidatePairs(ids.at(pair.a), ids.at(pair.b));
+    const auto ofA = m_bodies.at(pair.a).ids(), ofB = m_bodies.at(pair.b).ids();
+    for (auto& [a, b] : truth) a = ofA[a], b = ofB[b];
     EXPECT_TRUE(std::includes(found.begin(), found.end(), truth.begin(), truth.end()));
     EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
   }
@@ -479,13 +581,15 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
                                    const std::map<GeometryId, GeometryId>& ids) {
   const GeometryId a = anyBody(), b = anyBody();
   const Vector3d point = m_unit * randomPoint(m_random, 0, 1);
-  const auto ask = [&](OctreeBasedCD& collisions, GeometryId vertices, GeometryId body) {
+  const auto ask = [&](OctreeBasedCD& collisions, GeometryId vertices, GeometryId body,
+                       const std::vector<std::uint32_t>& elements) {
     std::vector<std::uint64_t> all;
     for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {
       const auto words = wordsOf([&](auto& out) {
-        for (const InsideVertex& v :
-             testing::insideVertices(collisions, vertices, body, {.rule = rule}))
+        for (InsideVertex v : testing::insideVertices(collisions, vertices, body, {.rule = rule})) {
+          if (!elements.empty()) v.triangle = elements[v.triangle];
           append(out, v);
+        }
       });
       all.insert(all.end(), words.begin(), words.end());
     }
@@ -500,9 +604,23 @@ void RandomHistory::compareQueries(OctreeBasedCD& other,
       out.push_back(at ? at->tetrahedron : ~0u);
     });
     all.insert(all.end(), words.begin(), words.end());
+    const auto nearest = wordsOf([&](auto& out) {
+      const SpatialQueries queries = collisions.queries();
+      const auto elementOf = [&](std::uint32_t element) {
+        return elements.empty() || element == kNoElement ? element : elements[element];
+      };
+      const auto at = queries.closestPoint(body, point);
+      out.push_back(at ? elementOf(at->element) : ~0u);
+      const auto hit = queries.firstHit(body, {point, {1, 2, 3}});
+      out.push_back(hit ? elementOf(hit->element) : ~0u);
+      std::vector<std::uint32_t> within;
+      queries.elementsWithin(body, point, 0.3 * m_unit, within);
+      for (const std::uint32_t element : within) out.push_back(elementOf(element));
+    });
+    all.insert(all.end(), nearest.begin(), nearest.end());
     return all;
   };
-  EXPECT_EQ(ask(m_collisions, a, b), ask(other, ids.at(a), ids.at(b)));
+  EXPECT_EQ(ask(m_collisions, a, b, {}), ask(other, ids.at(a), ids.at(b), m_bodies.at(b).ids()));
 }
 
 void RandomHistory::expectSameEnds(const OctreeBasedCD& other) const {

@@ -50,9 +50,15 @@ class RandomHistory {
     Vector3d translationBefore = Vector3d::Zero(), translation = translationBefore;
     CollisionFilter filter{};
     std::vector<std::uint32_t> disabled{};
+    std::vector<std::uint32_t> tags{};
+    std::vector<std::uint32_t> removed{};  ///< by cuts, ascending; geometry.triangles lacks them
 
     bool isMesh() const { return !shape && geometry.type == GeometryType::Triangles; }
-    std::size_t elements() const;
+    std::size_t elements() const;  ///< with removed ones
+    /// The ids of the elements that are there.
+    std::vector<std::uint32_t> ids() const;
+    /// Of elements by their ids: those that are there, by their place.
+    std::vector<std::uint32_t> placesOf(const std::vector<std::uint32_t>& elements) const;
   };
   struct Pair {
     GeometryId a, b;
@@ -68,8 +74,10 @@ class RandomHistory {
   void setPositions(GeometryId);
   void setTransform(GeometryId);
   void setTopology(GeometryId);
+  void cut(GeometryId);
   void setFilter(GeometryId);
   void setDisabled(GeometryId);
+  void setTags(GeometryId);
   void addOrChangePair();
   void query();
 
@@ -80,14 +88,17 @@ class RandomHistory {
   PairSettings randomSettings();
   Positions randomMotion(const Positions&);
   Eigen::Matrix3d randomTurn();
-  static ContactPredicate predicateOf(int number);
+  /// ofA, ofB: the ids of elements that are there.
+  static ContactPredicate predicateOf(int number, std::vector<std::uint32_t> ofA = {},
+                                      std::vector<std::uint32_t> ofB = {});
   /// call() throws if it is refused. Returns whether it was accepted.
   template <class F>
   static bool accepts(F&& call);
 
   static GeometryId addTo(OctreeBasedCD&, const Body&);
   static void setEnds(OctreeBasedCD&, GeometryId, const Body&);
-  /// A new object with the last values. ids: the history's geometries in it.
+  /// A new object with the last values, whose elements are numbered anew. ids: the history's
+  /// geometries in it.
   OctreeBasedCD fresh(Engine, std::map<GeometryId, GeometryId>& ids) const;
   void compareContacts(const OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&,
                        bool isBruteForce);

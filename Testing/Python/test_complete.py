@@ -31,6 +31,7 @@ FUNCTIONS = {
 }
 METHODS = {
     "CollisionData.parts": "the properties of CollisionData",
+    "CollisionData.tagsOf": "rows of CollisionData.tags()",
     "Executor.run": "a Python executor would run all tasks under the GIL",
     "ConstraintRow.gap": "jacobian @ x - offsets",
 }

@@ -25,6 +25,10 @@ static_assert(PALPATE_SIDES_OUTER == static_cast<int>(Sidedness::Outer));
 static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactFeatures::Kind::TriangleVertex));
 static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactFeatures::Kind::EdgeEdge));
 
+std::span<const Eigen::Vector3d> positionsOrNone(const double* data, std::size_t count) {
+  return c::positions(data, data ? count : 0);
+}
+
 Settings settingsOf(const palpate_settings* settings) {
   if (!settings) return {};
   const palpate_settings& s = sized(settings, "the settings");
@@ -231,6 +235,30 @@ palpate_status palpate_set_tetrahedra(palpate_cd* cd, palpate_id id, const doubl
                          elements<4>(tetrahedra, tetrahedron_count, "tetrahedra"));
   });
 }
+palpate_status palpate_replace_triangles(palpate_cd* cd, palpate_id id, const uint32_t* removed,
+                                         size_t removed_count, const uint32_t* added,
+                                         size_t added_count, const double* new_positions,
+                                         const double* rest, size_t new_count, uint32_t* ids) {
+  return guarded(__func__, [&] {
+    const auto found = of(cd).replaceTriangles(
+        GeometryId{id}, array(removed, removed_count, "removed"),
+        elements<3>(added, added_count, "added"),
+        c::positions(new_positions, new_count, "new_positions"), positionsOrNone(rest, new_count));
+    if (ids) std::copy(found.begin(), found.end(), ids);
+  });
+}
+palpate_status palpate_replace_tetrahedra(palpate_cd* cd, palpate_id id, const uint32_t* removed,
+                                          size_t removed_count, const uint32_t* added,
+                                          size_t added_count, const double* new_positions,
+                                          const double* rest, size_t new_count, uint32_t* ids) {
+  return guarded(__func__, [&] {
+    const auto found = of(cd).replaceTetrahedra(
+        GeometryId{id}, array(removed, removed_count, "removed"),
+        elements<4>(added, added_count, "added"),
+        c::positions(new_positions, new_count, "new_positions"), positionsOrNone(rest, new_count));
+    if (ids) std::copy(found.begin(), found.end(), ids);
+  });
+}
 palpate_status palpate_set_transform(palpate_cd* cd, palpate_id id, const palpate_pose* now) {
   return guarded(__func__, [&] { of(cd).setTransform(GeometryId{id}, poseOf(now, "now")); });
 }
@@ -255,6 +283,9 @@ palpate_status palpate_set_disabled_elements(palpate_cd* cd, palpate_id id,
   return guarded(__func__, [&] {
     of(cd).setDisabledElements(GeometryId{id}, array(elements, count, "elements"));
   });
+}
+palpate_status palpate_set_tags(palpate_cd* cd, palpate_id id, const uint32_t* tags, size_t count) {
+  return guarded(__func__, [&] { of(cd).setTags(GeometryId{id}, array(tags, count, "tags")); });
 }
 
 palpate_status palpate_get_positions(const palpate_cd* cd, palpate_id id, const double** positions,
@@ -289,6 +320,24 @@ palpate_status palpate_get_surface(const palpate_cd* cd, palpate_id id, const ui
     *triangles = reinterpret_cast<const uint32_t*>(surface.triangles.data());
     *tetrahedra = surface.tetrahedra.data();
     *count = surface.triangles.size();
+  });
+}
+palpate_status palpate_get_removed_elements(const palpate_cd* cd, palpate_id id,
+                                            const uint32_t** elements, size_t* count) {
+  return guarded(__func__, [&] {
+    given(elements, "elements"), given(count, "count");
+    const auto all = of(cd).removedElements(GeometryId{id});
+    *elements = all.data();
+    *count = all.size();
+  });
+}
+palpate_status palpate_get_tags(const palpate_cd* cd, palpate_id id, const uint32_t** tags,
+                                size_t* count) {
+  return guarded(__func__, [&] {
+    given(tags, "tags"), given(count, "count");
+    const auto all = of(cd).tags(GeometryId{id});
+    *tags = all.data();
+    *count = all.size();
   });
 }
 

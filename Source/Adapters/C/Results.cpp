@@ -185,6 +185,15 @@ palpate_status palpate_set_user_data(palpate_cd* cd, palpate_id a, palpate_id b,
     of(cd).setUserData(GeometryId{a}, GeometryId{b}, contact, user_data);
   });
 }
+palpate_status palpate_get_contact_tags(const palpate_cd* cd, palpate_id a, palpate_id b, int kind,
+                                        const uint32_t** tags, size_t* count) {
+  return guarded(__func__, [&] {
+    given(tags, "tags"), given(count, "count");
+    const auto all = dataOf(cd, a, b).tags(enumerator(kind, ContactKind::ShapeShape, "kind"));
+    *tags = reinterpret_cast<const uint32_t*>(all.data());
+    *count = all.size();
+  });
+}
 palpate_status palpate_get_crossings(const palpate_cd* cd, palpate_id a, palpate_id b,
                                      const palpate_crossing** crossings, size_t* count) {
   return guarded(__func__, [&] {

@@ -59,6 +59,15 @@ palpate_status palpate_snapshot_positions(const palpate_snapshot* snapshot, palp
     *count = end.size();
   });
 }
+palpate_status palpate_snapshot_tags(const palpate_snapshot* snapshot, palpate_id id,
+                                     const uint32_t** tags, size_t* count) {
+  return guarded(__func__, [&] {
+    given(tags, "tags"), given(count, "count");
+    const auto all = of(snapshot).tags(GeometryId{id});
+    *tags = all.data();
+    *count = all.size();
+  });
+}
 palpate_status palpate_snapshot_motion(const palpate_snapshot* snapshot, palpate_id id,
                                        palpate_motion* motion) {
   return guarded(

@@ -42,6 +42,8 @@ PALPATE_TWIN(palpate_features, ContactFeatures);
 PALPATE_SAME(palpate_features, kind, ContactFeatures, kind);
 PALPATE_SAME(palpate_features, a, ContactFeatures, a);
 PALPATE_SAME(palpate_features, b, ContactFeatures, b);
+PALPATE_SAME(palpate_features, tag_a, ContactFeatures, tagA);
+PALPATE_SAME(palpate_features, tag_b, ContactFeatures, tagB);
 
 PALPATE_TWIN(palpate_vertex_triangle, VertexTriangleContact);
 PALPATE_SAME(palpate_vertex_triangle, vertex, VertexTriangleContact, vertex);

@@ -112,6 +112,12 @@ never changes, and its properties are copies.)");
   addProperty(geometry, "filter", "A CollisionFilter.", [](const Geometry& g) { return g.filter; });
   addProperty(geometry, "disabled", "Disabled elements.",
               [](const Geometry& g) { return copyOf(g.disabled); });
+  addProperty(geometry, "removed", "Elements that cuts removed, which are in `triangles`.",
+              [](const Geometry& g) { return copyOf(g.removed); });
+  addProperty(geometry, "removed_tetrahedra", "The same in `tetrahedra`.",
+              [](const Geometry& g) { return copyOf(g.removedTetrahedra); });
+  addProperty(geometry, "tags", "OctreeBasedCD.tags().",
+              [](const Geometry& g) { return copyOf(g.tags); });
   addProperty(geometry, "analytical", "The shape, or None.", [](const Geometry& g) -> py::object {
     return g.analytical ? toPython(*g.analytical) : py::none();
   });

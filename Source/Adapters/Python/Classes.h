@@ -40,6 +40,8 @@ inline constexpr const char* kClass<Sidedness> = "Sidedness";
 template <>
 inline constexpr const char* kClass<ContactFeatures::Kind> = "ContactFeaturesKind";
 template <>
+inline constexpr const char* kClass<ContactKind> = "ContactKind";
+template <>
 inline constexpr const char* kClass<ErrorCode> = "ErrorCode";
 template <>
 inline constexpr const char* kClass<AuditFailure::Fault> = "AuditFailureFault";

@@ -272,6 +272,15 @@ time     in [0, 1] of the step
 forward  whether the vertex passed to the side of the triangle's normal
 
 A pickled copy has none.)");
+  data.def(
+      "tags",
+      [](const CollisionData& self, const ContactKind kind) { return copyOf<2>(self.tags(kind)); },
+      py::arg("kind"),
+      R"(tags(kind) -> numpy.ndarray
+
+OctreeBasedCD.set_tags(): (n, 2), the tags of both geometries' features for each contact of the list
+of this ContactKind; vertices and edges have that of the lowest enabled element that holds them.
+Empty if neither geometry has tags, and in a pickled copy.)");
   data.def_property_readonly("earliest_time_of_impact", &CollisionData::earliestTimeOfImpact,
                              "The least time of impact, in [0, 1]; infinity without contacts.")
       .def_property_readonly("error_bound", &CollisionData::errorBound,

@@ -6,6 +6,11 @@
 namespace palpate::python {
 namespace {
 
+/// None stands for no positions.
+Positions optional(const py::object& positions, const char* name) {
+  return Positions(positions.is_none() ? py::object(newArray<double>(0, 3)) : positions, name);
+}
+
 GeometryId addTriangleMesh(Collisions& self, const py::object& positions,
                            const py::object& triangles) {
   const Positions p(positions, "positions");
@@ -266,6 +271,52 @@ Sets the topology of a triangle mesh, as after a cut, and its positions at both 
           R"(set_tetrahedra(geometry, positions, tetrahedra) -> None
 
 Sets the topology of a tetrahedral mesh, and its positions at both ends of the step.)")
+      .def(
+          "replace_triangles",
+          [](Collisions& self, const py::object& geometry, const py::object& removed,
+             const py::object& added, const py::object& positions, const py::object& rest) {
+            const GeometryId g = geometryId(geometry);
+            const Indices ids(removed, 1, "removed");
+            const Elements<3> t(added, "added");
+            const Positions p = optional(positions, "new_positions"), r = optional(rest, "rest");
+            return copyOf(self.work([&](OctreeBasedCD& d) {
+              return d.replaceTriangles(g, ids.all(), t.span(), p.span(), r.span());
+            }));
+          },
+          py::arg("geometry"), py::arg("removed"), py::arg("added"),
+          py::arg("new_positions") = py::none(), py::arg("rest") = py::none(),
+          R"(replace_triangles(geometry, removed, added, new_positions=None, rest=None) -> numpy.ndarray
+
+A cut: removes triangles, (n,), appends vertices, (k, 3), L, at rest in this step, and adds
+triangles, (m, 3). Returns the ids of those, (m,); no other id changes. rest: positions at rest of
+the new vertices; None: new_positions.)")
+      .def(
+          "replace_tetrahedra",
+          [](Collisions& self, const py::object& geometry, const py::object& removed,
+             const py::object& added, const py::object& positions, const py::object& rest) {
+            const GeometryId g = geometryId(geometry);
+            const Indices ids(removed, 1, "removed");
+            const Elements<4> t(added, "added");
+            const Positions p = optional(positions, "new_positions"), r = optional(rest, "rest");
+            return copyOf(self.work([&](OctreeBasedCD& d) {
+              return d.replaceTetrahedra(g, ids.all(), t.span(), p.span(), r.span());
+            }));
+          },
+          py::arg("geometry"), py::arg("removed"), py::arg("added"),
+          py::arg("new_positions") = py::none(), py::arg("rest") = py::none(),
+          R"(replace_tetrahedra(geometry, removed, added, new_positions=None, rest=None) -> numpy.ndarray
+
+The same for a tetrahedral mesh, with tetrahedra, (m, 4). Triangles of surface() that stay keep
+their ids.)")
+      .def(
+          "removed_elements",
+          [](Collisions& self, const py::object& geometry) {
+            const GeometryId g = geometryId(geometry);
+            return self.read([&](OctreeBasedCD& d) { return copyOf(d.removedElements(g)); });
+          },
+          py::arg("geometry"), R"(removed_elements(geometry) -> numpy.ndarray
+
+Ids of triangles that cuts removed, of tetrahedral meshes those of surface(), ascending.)")
       .def("surface", &surface, py::arg("geometry"),
            R"(surface(geometry) -> TetrahedralSurface
 
@@ -323,7 +374,26 @@ Sets which geometries this one collides with. Keywords are those of CollisionFil
           py::arg("geometry"), py::arg("elements"),
           R"(set_disabled_elements(geometry, elements) -> None
 
-Disables these elements, (n,), and enables all others.)");
+Disables these elements, (n,), and enables all others.)")
+      .def(
+          "set_tags",
+          [](Collisions& self, const py::object& geometry, const py::object& tags) {
+            const GeometryId g = geometryId(geometry);
+            const Indices numbers(tags, 1, "tags");
+            self.change([&](OctreeBasedCD& d) { d.setTags(g, numbers.all()); });
+          },
+          py::arg("geometry"), py::arg("tags"),
+          R"(set_tags(geometry, tags) -> None
+
+Gives each element a number, (n,): each triangle, segment or point, of a tetrahedral mesh each
+tetrahedron, or one for a shape or field.)")
+      .def(
+          "tags",
+          [](Collisions& self, const py::object& geometry) {
+            const GeometryId g = geometryId(geometry);
+            return self.read([&](OctreeBasedCD& d) { return copyOf(d.tags(g)); });
+          },
+          py::arg("geometry"), "tags(geometry) -> numpy.ndarray\n\n(n,), or none, as a copy.");
 }
 
 }  // namespace palpate::python

@@ -24,7 +24,7 @@ ContactPredicate predicateOf(const py::object& function) {
       return py::make_tuple(side[0], side[1]);
     };
     const py::object argument = lookedUp<ContactFeatures>("palpate", "ContactFeatures")(
-        features.kind, ids(features.a), ids(features.b));
+        features.kind, ids(features.a), ids(features.b), features.tagA, features.tagB);
     const int truth = PyObject_IsTrue(callback.get()(argument).ptr());
     if (truth < 0) throw py::error_already_set();
     return truth == 1;

@@ -69,6 +69,12 @@ cannot be written.)")
           },
           py::arg("geometry"), "positions_before(geometry) -> numpy.ndarray\n\nAt its start.")
       .def(
+          "tags",
+          [](const Published& self, Object geometry) {
+            return copyOf(self.snapshot->tags(geometryId(geometry)));
+          },
+          py::arg("geometry"), "tags(geometry) -> numpy.ndarray\n\nOctreeBasedCD.tags().")
+      .def(
           "motion",
           [](const Published& self, Object geometry) {
             return toPython(self.snapshot->motion(geometryId(geometry)));

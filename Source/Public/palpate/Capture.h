@@ -70,6 +70,9 @@ struct CollisionProblem {
     std::shared_ptr<const DistanceField> field{};  ///< placed by `motion`
     std::optional<SurfaceProxySettings> proxy{};   ///< of the leaves that are attached to a mesh
     std::string name{};                            ///< OctreeBasedCD::setName(); not in a file
+    std::vector<std::uint32_t> removed{};  ///< OctreeBasedCD::removedElements(), in `triangles`
+    std::vector<std::uint32_t> removedTetrahedra{};
+    std::vector<std::uint32_t> tags{};  ///< OctreeBasedCD::tags()
   };
   struct Pair {
     std::uint32_t a, b;  ///< indices in `geometries`

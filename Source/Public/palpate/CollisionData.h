@@ -95,6 +95,9 @@ struct ShapeShapeContact {
   friend bool operator==(const ShapeShapeContact&, const ShapeShapeContact&) = default;
 };
 
+/// Of the first and of the second geometry.
+using ContactTags = std::array<std::uint32_t, 2>;
+
 /// The weighted sum of the positions is the vector between the closest points.
 struct Stencil {
   std::array<std::uint32_t, 4> vertices;
@@ -178,7 +181,17 @@ class PALPATE_EXPORT CollisionData {
   /// Order    by kind, ids, time.
   std::span<const Crossing> crossings() const;
 
-  /// Of all contacts in their order, without validity() and tracking: the same bits on every
+  /// OctreeBasedCD::setTags(): the tags of the first and of the second geometry's feature. Vertices
+  /// and edges have that of the lowest enabled element that holds them. One for each contact of a
+  /// list, in the same order; empty if neither geometry has tags.
+  std::span<const ContactTags> tags(ContactKind) const;
+  /// The same of one contact of these lists, 0 for what has none. Copies are searched.
+  ContactTags tagsOf(const VertexTriangleContact&) const;
+  ContactTags tagsOf(const EdgeEdgeContact&) const;
+  ContactTags tagsOf(const ShapeContact&) const;
+  ContactTags tagsOf(const ShapeShapeContact&) const;
+
+  /// Of all contacts in their order, without validity(), tracking and tags: the same bits on every
   /// machine.
   std::uint64_t hash() const;
 

@@ -14,7 +14,7 @@ namespace palpate {
 enum class ErrorCode {
   NonFinitePosition,   ///< A position is NaN, infinite or beyond kLargestMeasure.
   WrongPositionCount,  ///< The number of positions differs from the number of vertices.
-  IndexOutOfRange,     ///< no such vertex or element, or one vertex twice in an element
+  IndexOutOfRange,     ///< no such vertex or element (any more), or one twice where it may not be
   UnknownGeometry,     ///< The geometry was never added, or was removed.
   UnknownPair,         ///< The pair was never added, was removed, or was added in the other order.
   DuplicatePair,       ///< The pair was added before, in this order or in the other.

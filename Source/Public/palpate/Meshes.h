@@ -59,8 +59,8 @@ struct InsideVertex {
 };
 
 /// The triangles with which a tetrahedral mesh collides: faces of exactly one tetrahedron.
-/// triangles[i] belongs to tetrahedra[i].
-/// Order    by tetrahedron, then by the corner that the face lacks.
+/// triangles[i] belongs to tetrahedra[i], which is kNoElement for OctreeBasedCD::removedElements().
+/// Order    by tetrahedron, then by the corner that the face lacks; after cuts by age.
 /// Winding  outward at rest, decided exactly; deformation does not change it. Tetrahedra without
 ///          volume are wound as the nearest ones with volume over faces, or as the lowest.
 struct TetrahedralSurface {

@@ -122,7 +122,27 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// The same, with the errors of addTetrahedralMesh().
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>);
-  /// The triangles that collide. Valid until setTetrahedra() or removal.
+  /// A cut: removes triangles, appends vertices at rest in this step, and adds triangles, which may
+  /// name them. Returns the ids of those. No other id changes, and what belongs to other elements
+  /// stays: positions at both ends, disabled elements, tags, tracked contacts. Removed ids are not
+  /// used again before setTriangles(): Docs/HowTo/Cuts.md.
+  /// rest: L, of the new vertices for restDistance; empty: newPositions.
+  /// Errors   UnsupportedMethod for another type or an attached field; IndexOutOfRange, too, for an
+  ///          id that is named twice or was removed; WrongPositionCount for rest; TooLarge.
+  std::vector<std::uint32_t> replaceTriangles(GeometryId, std::span<const std::uint32_t> removed,
+                                              std::span<const Triangle> added,
+                                              std::span<const Eigen::Vector3d> newPositions,
+                                              std::span<const Eigen::Vector3d> rest = {});
+  /// The same with ids of tetrahedra. Triangles of surface() that stay keep their ids.
+  /// rest also gives the winding of new tetrahedra. Throws SharedFace, too.
+  std::vector<std::uint32_t> replaceTetrahedra(GeometryId, std::span<const std::uint32_t> removed,
+                                               std::span<const Tetrahedron> added,
+                                               std::span<const Eigen::Vector3d> newPositions,
+                                               std::span<const Eigen::Vector3d> rest = {});
+  /// Ids of triangles that cuts removed, of tetrahedral meshes those of surface(), ascending.
+  std::span<const std::uint32_t> removedElements(GeometryId) const;
+  /// The triangles that collide, and removedElements(). Valid until a cut, setTetrahedra() or
+  /// removal.
   /// Errors   UnsupportedMethod for another type.
   TetrahedralSurface surface(GeometryId) const;
 
@@ -142,6 +162,12 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A pair that filters separate has no contacts and is not trusted.
   /// Errors   InvalidSettings for Sidedness::Outer of lines, points and shapes.
   void setCollisionFilter(GeometryId, const CollisionFilter&);
+  /// Gives each element a number: each triangle, segment or point, of a tetrahedral mesh each
+  /// tetrahedron, or one for a shape or field. Contacts carry it (CollisionData::tagsOf()), and
+  /// cuts keep it. None: all tags are 0, as those of new elements are.
+  /// Errors   InvalidSettings for another number of tags.
+  void setTags(GeometryId, std::span<const std::uint32_t> perElement);
+  std::span<const std::uint32_t> tags(GeometryId) const;  ///< one per element, or none
   /// Disables these elements (of tetrahedral meshes, of surface()) and enables all others, in
   /// linear time. A vertex or edge is tested while an enabled element holds it.
   void setDisabledElements(GeometryId, std::span<const std::uint32_t> elements);
@@ -244,6 +270,7 @@ class PALPATE_EXPORT OctreeBasedCD {
 
  private:
   friend class StepGuard;
+  friend struct CutMesh;
   std::shared_ptr<StepSource> stepSource();
   void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now);
   using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);

@@ -183,6 +183,7 @@ struct ContactFeatures {
   enum class Kind { VertexTriangle, TriangleVertex, EdgeEdge } kind;
   /// The index of a vertex or triangle, twice; or the two vertices of an edge, lower first.
   std::array<std::uint32_t, 2> a, b;
+  std::uint32_t tagA = 0, tagB = 0;  ///< as CollisionData::tags()
 };
 PALPATE_EXPORT const char* toString(ContactFeatures::Kind) noexcept;  ///< its name, or "unknown"
 

@@ -27,7 +27,8 @@ class PALPATE_EXPORT Snapshot {
   /// L, as OctreeBasedCD::positions(), at the end and at the start of the step.
   std::span<const Eigen::Vector3d> positions(GeometryId) const;
   std::span<const Eigen::Vector3d> positionsBefore(GeometryId) const;
-  RigidMotion motion(GeometryId) const;  ///< at both ends of the step
+  RigidMotion motion(GeometryId) const;                   ///< at both ends of the step
+  std::span<const std::uint32_t> tags(GeometryId) const;  ///< OctreeBasedCD::tags()
   /// L, in the world, on the step's line at `time`: 0 start, 1 end, others extrapolate.
   /// Errors   IndexOutOfRange; InvalidSettings for a time that is not finite.
   Eigen::Vector3d position(GeometryId, std::uint32_t vertex, double time = 1.0) const;

@@ -249,6 +249,15 @@ PALPATE_EXPORT palpate_status palpate_set_tetrahedra(palpate_cd* cd, palpate_id 
                                                      const double* positions, size_t vertex_count,
                                                      const uint32_t* tetrahedra,
                                                      size_t tetrahedron_count);
+/// A cut. rest: of the new vertices, or null. ids: null, or receives one for each added triangle.
+PALPATE_EXPORT palpate_status palpate_replace_triangles(
+    palpate_cd* cd, palpate_id id, const uint32_t* removed, size_t removed_count,
+    const uint32_t* added, size_t added_count, const double* new_positions, const double* rest,
+    size_t new_count, uint32_t* ids);
+PALPATE_EXPORT palpate_status palpate_replace_tetrahedra(
+    palpate_cd* cd, palpate_id id, const uint32_t* removed, size_t removed_count,
+    const uint32_t* added, size_t added_count, const double* new_positions, const double* rest,
+    size_t new_count, uint32_t* ids);
 PALPATE_EXPORT palpate_status palpate_set_transform(palpate_cd* cd, palpate_id id,
                                                     const palpate_pose* now);
 /// Both ends of the step.
@@ -259,6 +268,8 @@ PALPATE_EXPORT palpate_status palpate_set_filter(palpate_cd* cd, palpate_id id,
                                                  const palpate_filter* filter);
 PALPATE_EXPORT palpate_status palpate_set_disabled_elements(palpate_cd* cd, palpate_id id,
                                                             const uint32_t* elements, size_t count);
+PALPATE_EXPORT palpate_status palpate_set_tags(palpate_cd* cd, palpate_id id, const uint32_t* tags,
+                                               size_t count);
 
 PALPATE_EXPORT palpate_status palpate_get_positions(const palpate_cd* cd, palpate_id id,
                                                     const double** positions, size_t* count);
@@ -272,6 +283,13 @@ PALPATE_EXPORT palpate_status palpate_get_name(const palpate_cd* cd, palpate_id 
 PALPATE_EXPORT palpate_status palpate_get_surface(const palpate_cd* cd, palpate_id id,
                                                   const uint32_t** triangles,
                                                   const uint32_t** tetrahedra, size_t* count);
+/// A view.
+PALPATE_EXPORT palpate_status palpate_get_removed_elements(const palpate_cd* cd, palpate_id id,
+                                                           const uint32_t** elements,
+                                                           size_t* count);
+/// A view.
+PALPATE_EXPORT palpate_status palpate_get_tags(const palpate_cd* cd, palpate_id id,
+                                               const uint32_t** tags, size_t* count);
 
 // Pairs
 
@@ -279,6 +297,7 @@ PALPATE_EXPORT palpate_status palpate_get_surface(const palpate_cd* cd, palpate_
 typedef struct palpate_features {
   int kind;  ///< up to PALPATE_EDGE_EDGE
   uint32_t a[2], b[2];
+  uint32_t tag_a, tag_b;  ///< of palpate_set_tags()
 } palpate_features;
 enum {
   PALPATE_VERTEX_TRIANGLE,
@@ -483,6 +502,10 @@ PALPATE_EXPORT palpate_status palpate_get_ended(const palpate_cd* cd, palpate_id
 PALPATE_EXPORT palpate_status palpate_set_user_data(palpate_cd* cd, palpate_id a, palpate_id b,
                                                     const palpate_contact_key* key,
                                                     uint64_t user_data);
+/// Two tags for each contact of this kind, of both features: a view. Empty without tags.
+PALPATE_EXPORT palpate_status palpate_get_contact_tags(const palpate_cd* cd, palpate_id a,
+                                                       palpate_id b, int kind,
+                                                       const uint32_t** tags, size_t* count);
 /// A view. Empty without `report_crossings`.
 PALPATE_EXPORT palpate_status palpate_get_crossings(const palpate_cd* cd, palpate_id a,
                                                     palpate_id b,
@@ -761,6 +784,8 @@ PALPATE_EXPORT palpate_status palpate_snapshot_positions(const palpate_snapshot*
                                                          const double** now, size_t* count);
 PALPATE_EXPORT palpate_status palpate_snapshot_motion(const palpate_snapshot* snapshot,
                                                       palpate_id id, palpate_motion* motion);
+PALPATE_EXPORT palpate_status palpate_snapshot_tags(const palpate_snapshot* snapshot, palpate_id id,
+                                                    const uint32_t** tags, size_t* count);
 /// In the world; time 0 is the start of the step, 1 its end.
 PALPATE_EXPORT palpate_status palpate_snapshot_position(const palpate_snapshot* snapshot,
                                                         palpate_id id, uint32_t vertex, double time,

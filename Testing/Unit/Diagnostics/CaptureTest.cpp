@@ -234,10 +234,10 @@ TEST_F(Capture, ErrorsNameTheFault) {
     write(text.replace(place, from.size(), to));
     expectRefused(reason);
   };
-  expectRefusedWith("palpate-capture 13", "solid 3", "it is not a capture");
-  expectRefusedWith("palpate-capture 13", "palpate-capture 14",
-                    "its version is 14; versions up to 13");
-  expectRefusedWith("palpate-capture 13", "palpate-capture x", "line 1: \"x\" is not an integer");
+  expectRefusedWith("palpate-capture 14", "solid 3", "it is not a capture");
+  expectRefusedWith("palpate-capture 14", "palpate-capture 15",
+                    "its version is 15; versions up to 14");
+  expectRefusedWith("palpate-capture 14", "palpate-capture x", "line 1: \"x\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 3\n", "vertex index 3 is out of range");
   expectRefusedWith("0 1 2\n", "0 1 -2\n", "line 8: \"-2\" is not an integer");
   expectRefusedWith("0 1 2\n", "0 1 99999999999\n", "is not an integer in range");

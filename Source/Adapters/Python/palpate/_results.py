@@ -25,11 +25,14 @@ class ContactFeatures(NamedTuple):
 
     kind  ContactFeaturesKind
     a, b  the index of a vertex or triangle, twice; or the two vertices of an edge, lower first
+    tag_a, tag_b  of OctreeBasedCD.set_tags()
     """
 
     kind: ContactFeaturesKind
     a: tuple[int, int]
     b: tuple[int, int]
+    tag_a: int = 0
+    tag_b: int = 0
 
 
 class CollisionPair(NamedTuple):
