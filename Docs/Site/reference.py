@@ -15,7 +15,7 @@ DIRECTIVES = {"struct": "doxygenstruct", "class": "doxygenclass", "enum": "doxyg
               "variable": "doxygenvariable", "function": "doxygenfunction", "define": "doxygendefine"}
 GROUPS = {
     "Detection": "OctreeBasedCD Settings Types Meshes AnalyticalGeometry ArrayAdapter",
-    "Contacts and response": "CollisionData Tracking ConstraintRows Validity StepGuard FeaturePairs",
+    "Contacts and response": "CollisionData Tracking ConstraintRows Validity StepGuard ThreadTopology FeaturePairs",
     "Queries": "SpatialQueries Snapshot PenetrationTracker",
     "Bodies with an error bound": "DistanceField Simplify",
     "Files and display": "MeshFiles DataSets Window",

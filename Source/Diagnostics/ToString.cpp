@@ -283,6 +283,22 @@ const char* toString(ContactEnd value) noexcept {
   return kUnknown;
 }
 
+const char* toString(ThreadEvent::Cause value) noexcept {
+  switch (value) {
+    case ThreadEvent::Cause::Passed:
+      return "Passed";
+    case ThreadEvent::Cause::EndPassed:
+      return "EndPassed";
+    case ThreadEvent::Cause::Set:
+      return "Set";
+    case ThreadEvent::Cause::Cut:
+      return "Cut";
+    case ThreadEvent::Cause::Disabled:
+      return "Disabled";
+  }
+  return kUnknown;
+}
+
 const char* toString(GeometryType value) noexcept {
   switch (value) {
     case GeometryType::Triangles:

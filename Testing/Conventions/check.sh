@@ -34,7 +34,7 @@ allowedIn() {
     DistanceField) echo "DistanceField/ Queries/ Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Simplify) echo "Simplify/ Queries/ Bodies/ Octree/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
-    Tracking) echo "Tracking/ NarrowPhase/ Mesh/ Core/" ;;
+    Tracking) echo "Tracking/ NarrowPhase/ Mesh/ Math/ Exact/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;

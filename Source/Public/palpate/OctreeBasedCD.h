@@ -270,6 +270,7 @@ class PALPATE_EXPORT OctreeBasedCD {
 
  private:
   friend class StepGuard;
+  friend class ThreadTopology;
   friend struct CutMesh;
   std::shared_ptr<StepSource> stepSource();
   void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now);

@@ -19,6 +19,7 @@
 #include <palpate/Snapshot.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/StepGuard.h>
+#include <palpate/ThreadTopology.h>
 #include <palpate/Tracking.h>
 #include <palpate/Types.h>
 #include <palpate/Validity.h>
