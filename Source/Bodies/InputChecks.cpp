@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <iterator>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -76,17 +75,17 @@ CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel& label,
 }
 
 void checkCounts(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
-                 std::span<const Triangle> triangles, GeometryType type) {
+                 std::span<const Triangle> triangles, GeometryType type, std::size_t first) {
   const bool lines = type == GeometryType::Lines;
   const std::string element = lines ? "segment" : "triangle";
-  if (positions.size() > kMostElements || triangles.size() > kMostElements)
+  if (positions.size() > kMostElements || first + triangles.size() > kMostElements)
     throw Error(ErrorCode::TooLarge,
                 nameOf(label) + ": " + std::to_string(positions.size()) + " vertices and " +
-                    std::to_string(triangles.size()) + " " + element +
+                    std::to_string(first + triangles.size()) + " " + element +
                     "s; at most 2^28 of each are supported",
                 label.id);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    checkIndices(label, element, t, triangles[t], positions.size());
+    checkIndices(label, element, first + t, triangles[t], positions.size());
     if (lines && triangles[t][0] == triangles[t][1])
       throw Error(ErrorCode::IndexOutOfRange,
                   nameOf(label) + ", segment " + std::to_string(t) + " joins vertex " +
@@ -141,14 +140,11 @@ CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel& label, const st
     if (std::binary_search(removedBefore.begin(), removedBefore.end(), id))
       refuse(id, " was removed before");
   }
-  CountedVector<std::uint32_t> sorted(removed.begin(), removed.end()), all;
+  CountedVector<std::uint32_t> sorted(removed.begin(), removed.end());
   std::sort(sorted.begin(), sorted.end());
   if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
     refuse(*twice, " is removed twice");
-  all.reserve(removedBefore.size() + sorted.size());
-  std::merge(removedBefore.begin(), removedBefore.end(), sorted.begin(), sorted.end(),
-             std::back_inserter(all));
-  return all;
+  return sorted;
 }
 
 void checkRadii(const GeometryLabel& label, std::span<const double> radii) {

@@ -25,14 +25,14 @@ Eigen::AlignedBox3d checkPositions(const GeometryLabel&, std::span<const Eigen::
                                    MotionRange* moved = nullptr, std::size_t first = 0);
 /// Returns a copy of the positions of a new topology.
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
+/// first: the id of the first triangle.
 void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
-                 GeometryType);
+                 GeometryType, std::size_t first = 0);
 /// removed: ascending; they count as absent.
 TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron>,
                                     std::span<const std::uint32_t> removed = {});
-/// The ids that were removed before and those that a cut removes, of `count`, ascending. element:
-/// for the message.
+/// The ids that a cut removes, of `count`, ascending. element: for the message.
 CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel&, const std::string& element,
                                             std::size_t count,
                                             std::span<const std::uint32_t> removedBefore,

@@ -59,7 +59,7 @@ struct Geometry : CountedObject {
   CollisionFilter filter;
   GeometryStep step;          ///< writes the positions of both ends
   double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
-  double shortEdge = 0;  ///< L: one edge in 16 is shorter in the shape at rest; 0 without edges
+  double shortEdge = 0;  ///< L: one edge in 16 is shorter at rest, before cuts; 0 without edges
   GeometryMotion motion;
   PieceMotion pieces;   ///< from one detection to the next, for KeptPairs
   bool mayLag = false;  ///< the update that runs, or ran last, may be GeometryOctree::updateSome()

@@ -3,6 +3,7 @@
 #include "CollisionDetection/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
+#include "Mesh/TopologyCut.h"
 #include "Math/StableLength.h"
 #include "Core/Assert.h"
 
@@ -26,15 +27,20 @@ PlacedShape* shapeOf(Geometry& geometry) {
   return geometry.body.shape ? &*geometry.body.shape : nullptr;
 }
 
+/// L: infinity without area.
+double heightOf(const Triangle& triangle, std::span<const Eigen::Vector3d> rest) {
+  const auto& [i, j, k] = triangle;
+  const Eigen::Vector3d &a = rest[i], &b = rest[j], &c = rest[k];
+  const double area = (b - a).cross(c - a).norm();
+  const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+  return area > 0.0 ? area / longest : std::numeric_limits<double>::infinity();
+}
+
 /// Computed in the body's frame, so that it does not depend on the transform.
-double smallestHeight(const TriangleMesh& mesh) {
+double smallestHeight(std::span<const Triangle> triangles, std::span<const Eigen::Vector3d> rest) {
   double smallest = std::numeric_limits<double>::infinity();
-  for (const auto& [i, j, k] : mesh.topology.elements) {
-    const Eigen::Vector3d &a = mesh.rest[i], &b = mesh.rest[j], &c = mesh.rest[k];
-    const double area = (b - a).cross(c - a).norm();
-    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
-    if (area > 0.0) smallest = std::min(smallest, area / longest);
-  }
+  for (const Triangle& triangle : triangles)
+    smallest = std::min(smallest, heightOf(triangle, rest));
   return smallest;
 }
 
@@ -86,7 +92,7 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
   geometry->step.start(mesh, std::move(body));
-  geometry->smallestHeight = smallestHeight(mesh);
+  geometry->smallestHeight = smallestHeight(mesh.topology.elements, mesh.rest);
   geometry->shortEdge = shortEdge(mesh.topology, mesh.rest);
   BodyRevisions& revisions = geometry->body.revisions;
   for (Revision* revision :
@@ -324,7 +330,8 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.body.solid = std::move(solid);
   geometry.body.mesh.tags.clear();
   geometry.step.start(geometry.body.mesh, std::move(body));
-  geometry.smallestHeight = smallestHeight(geometry.body.mesh);
+  geometry.smallestHeight =
+      smallestHeight(geometry.body.mesh.topology.elements, geometry.body.mesh.rest);
   geometry.shortEdge = shortest;
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
@@ -357,6 +364,14 @@ struct GeometryTable::Cut {
                       " new vertices",
                   geometry.body.id);
     positions.erase(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(first));
+  }
+  /// Whether the cut removes no triangle that has it.
+  bool keepsSmallestHeight() const {
+    const TriangleMesh& mesh = geometry.body.mesh;
+    return std::none_of(topology.removed.begin(), topology.removed.end(), [&](std::uint32_t id) {
+      return id < mesh.topology.elements.size() &&
+             heightOf(mesh.topology.elements[id], mesh.rest) <= geometry.smallestHeight;
+    });
   }
   Geometry& geometry;
   CountedVector<Eigen::Vector3d> positions;  ///< of the new vertices
@@ -402,12 +417,10 @@ std::vector<std::uint32_t> GeometryTable::replaceTriangles(GeometryId id, Ids re
   const TriangleMesh& mesh = geometry.body.mesh;
   const std::size_t count = mesh.topology.elements.size();
   Cut cut(geometry, vertices);
-  const auto allRemoved =
-      checkedRemoval(geometry, "triangle", count, mesh.topology.removed, removed);
-  const auto triangles = joined(mesh.topology.elements, added);
-  checkCounts(geometry, cut.rest, triangles, GeometryType::Triangles);
+  const auto sorted = checkedRemoval(geometry, "triangle", count, mesh.topology.removed, removed);
+  checkCounts(geometry, cut.rest, added, GeometryType::Triangles, count);
   auto ids = idsFrom(count, added.size());
-  cut.topology = MeshTopology(cut.rest.size(), triangles, allRemoved);
+  cut.topology = cutTopology(mesh.topology, sorted, added, cut.rest.size());
   cut.tags = joinedTags(mesh.tags, added.size());
   apply(std::move(cut), prepare);
   ++m_state;
@@ -424,15 +437,22 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
   const Solid& solid = *geometry.body.solid;
   const std::size_t count = solid.topology.tetrahedra.size();
   Cut cut(geometry, vertices);
-  const auto allRemoved =
-      checkedRemoval(geometry, "tetrahedron", count, solid.topology.removed, removed);
+  const Ids before = solid.topology.removed;
+  const auto sorted = checkedRemoval(geometry, "tetrahedron", count, before, removed);
+  CountedVector<std::uint32_t> allRemoved(before.size() + sorted.size());
+  std::merge(before.begin(), before.end(), sorted.begin(), sorted.end(), allRemoved.begin());
   auto ids = idsFrom(count, added.size());
   cut.solid = std::make_unique<Solid>();
   cut.solid->topology =
       checkedTopology(geometry, cut.rest, joined(solid.topology.tetrahedra, added), allRemoved);
   cut.solid->tags = joinedTags(solid.tags, added.size());
-  const auto without = keepSurfaceIds(geometry.body.mesh.topology.elements, cut.solid->topology);
-  cut.topology = MeshTopology(cut.rest.size(), cut.solid->topology.surface, without);
+  const MeshTopology& surface = geometry.body.mesh.topology;
+  CountedVector<std::uint32_t> gone;
+  for (const std::uint32_t face : keepSurfaceIds(surface.elements, cut.solid->topology))
+    if (!surface.isRemoved(face)) gone.push_back(face);
+  cut.topology = cutTopology(
+      surface, gone, std::span(cut.solid->topology.surface).subspan(surface.elements.size()),
+      cut.rest.size());
   cut.tags = tagsOfSurface(*cut.solid, cut.solid->tags);
   apply(std::move(cut), prepare);
   ++m_state;
@@ -443,19 +463,21 @@ void GeometryTable::apply(Cut cut, const Preparation& prepare) {
   Geometry& geometry = cut.geometry;
   Body& body = geometry.body;
   TriangleMesh& mesh = body.mesh;
-  if (!mesh.topology.disabled.empty()) cut.topology.disable(mesh.topology.disabled);
   GeometryStep::LongerBodies bodies;
   if (!cut.positions.empty()) bodies = geometry.step.withNewVertices(mesh, cut.positions);
   prepare(cut.topology, cut.rest);
-  const double shortest = shortEdge(cut.topology, cut.rest);
+  const bool stays = cut.keepsSmallestHeight();
   // Nothing below throws.
+  const std::size_t count = mesh.topology.elements.size();
   mesh.rest = std::move(cut.rest);
   mesh.topology = std::move(cut.topology);
   mesh.tags = std::move(cut.tags);
   if (cut.solid) body.solid = std::move(cut.solid);
   if (!cut.positions.empty()) geometry.step.append(mesh, bodies);
-  geometry.smallestHeight = smallestHeight(mesh);
-  geometry.shortEdge = shortest;
+  const std::span<const Triangle> elements = mesh.topology.elements;
+  geometry.smallestHeight =
+      stays ? std::min(geometry.smallestHeight, smallestHeight(elements.subspan(count), mesh.rest))
+            : smallestHeight(elements, mesh.rest);
   BodyRevisions& revisions = body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})

@@ -45,7 +45,8 @@ class RigidSearch::Step {
   const Pose& now() const { return m_now; }
   const Matrix3d& matrix() const { return m_matrix; }
 
-  /// An upper bound of size(displacement) over all vertices: the largest value plus twice the slack
+  /// An upper bound of size(displacement) over all vertices, of a mesh those that its elements
+  /// have, which alone are in the octree, or 0 without any: the largest value plus twice the slack
   /// for rounding errors. In a box of positions, size(displacement) is at most its value at the
   /// centre plus, for each axis, growth(axis) times half the box's edge.
   template <class Size>
@@ -54,8 +55,12 @@ class RigidSearch::Step {
     const auto sizeOf = [&](std::uint32_t v) { return size(m_now(body[v]) - m_before(body[v])); };
     if (body.empty()) return 0.0;
     if (vertex >= body.size()) vertex = 0;
-    double best = sizeOf(vertex);
+    constexpr double kNone = -std::numeric_limits<double>::infinity();
+    const CountedVector<bool>& isUsed = m_geometry.body.mesh.topology.isUsed;
+    const auto counts = [&](std::uint32_t v) { return isUsed.empty() || isUsed[v]; };
+    double best = counts(vertex) ? sizeOf(vertex) : kNone;
     const auto testOne = [&](std::uint32_t v) {
+      if (!counts(v)) return;
       const double other = sizeOf(v);
       if (other > best) best = other, vertex = v;
     };
@@ -77,7 +82,7 @@ class RigidSearch::Step {
     } else {
       for (std::uint32_t v = 0; v < body.size(); ++v) testOne(v);
     }
-    return best + 2.0 * m_slack;
+    return best == kNone ? 0.0 : best + 2.0 * m_slack;
   }
 
  private:

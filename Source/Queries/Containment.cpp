@@ -201,7 +201,14 @@ bool hasClosedSurface(const Body& body) {
   PreparedData& prepared = *body.prepared;
   if (!prepared.closedVersion.isCurrent(body.revisions.elements.topology)) {
     prepared.closedVersion.invalidate();
-    prepared.isClosed = findMeshDefects(topology.elements).closed();
+    // Bodies made for queries alone have no edges, and triangles without area may have one edge.
+    bool isPlain = !topology.edges.empty() && topology.disabled.empty();
+    topology.forEachElement([&](std::uint32_t i) {
+      const auto& [a, b, c] = topology.elements[i];
+      isPlain = isPlain && a != b && b != c && c != a;
+    });
+    prepared.isClosed =
+        isPlain ? topology.hasOnlyClosedStars : findMeshDefects(topology.elements).closed();
     prepared.closedVersion.commit(body.revisions.elements.topology);
   }
   return prepared.isClosed;

@@ -578,6 +578,23 @@ TEST_F(CScene, GeometriesAreSetAndReadAsByCpp) {
                                   9));
   other.setTriangles(GeometryId{floor}, m_input.floor.positions,
                      std::span(m_input.floor.triangles).first(9));
+  const std::uint32_t gone[] = {2, 5};
+  const std::vector<Triangle> added{{0, 1, 3}};
+  const auto newVertex = static_cast<std::uint32_t>(m_input.block.positions.size());
+  const Tetrahedron& cut = m_input.block.tetrahedra[2];
+  const std::vector<Tetrahedron> addedTetrahedra{{cut[0], cut[1], cut[2], newVertex}};
+  const std::vector<Vector3d> newPositions{{9, 9, 9}}, rest{{8, 9, 9}};
+  std::uint32_t ids[1];
+  EXPECT_OK(
+      palpate_replace_triangles(m_cd, floor, gone, 2, flat(added), 1, nullptr, nullptr, 0, ids));
+  EXPECT_EQ(ids[0], other.replaceTriangles(GeometryId{floor}, gone, added, {})[0]);
+  EXPECT_OK(palpate_replace_tetrahedra(m_cd, block, gone, 2, flat(addedTetrahedra), 1,
+                                       flat(newPositions), flat(rest), 1, nullptr));
+  other.replaceTetrahedra(blockId, gone, addedTetrahedra, newPositions, rest);
+  std::vector<std::uint32_t> tags;
+  for (std::uint32_t i = 0; i < 10; ++i) tags.push_back(i % 3);
+  EXPECT_OK(palpate_set_tags(m_cd, floor, tags.data(), tags.size()));
+  other.setTags(GeometryId{floor}, tags);
   const std::uint32_t disabled[] = {0, 7, 8};
   EXPECT_OK(palpate_set_disabled_elements(m_cd, organ, disabled, 3));
   other.setDisabledElements(organId, disabled);
@@ -619,8 +636,35 @@ TEST_F(CScene, GeometriesAreSetAndReadAsByCpp) {
               surface.triangles[i]);
     EXPECT_EQ(tetrahedra[i], surface.tetrahedra[i]);
   }
+  const auto expectIndices = [&](auto call, palpate_id id, std::span<const std::uint32_t> truth) {
+    const std::uint32_t* found;
+    EXPECT_OK(call(m_cd, id, &found, &count));
+    EXPECT_FALSE(truth.empty());
+    EXPECT_TRUE(std::ranges::equal(std::span(found, count), truth));
+  };
+  expectIndices(palpate_get_removed_elements, block, other.removedElements(blockId));
+  expectIndices(palpate_get_tags, floor, tags);
+  EXPECT_OK(palpate_publish(m_cd, 0));
+  palpate_snapshot* snapshot = nullptr;
+  EXPECT_OK(palpate_latest_snapshot(m_cd, &snapshot));
+  const std::uint32_t* ofSnapshot;
+  EXPECT_OK(palpate_snapshot_tags(snapshot, floor, &ofSnapshot, &count));
+  EXPECT_TRUE(std::ranges::equal(std::span(ofSnapshot, count), tags));
+  palpate_release_snapshot(snapshot);
   EXPECT_OK(palpate_detect(m_cd));
   other.detectCollision();
+  std::size_t tagged = 0;
+  for (const CollisionPair& pair : other.pairs())
+    for (int kind = 0; kind < 5; ++kind) {
+      const std::uint32_t* found;
+      EXPECT_OK(palpate_get_contact_tags(m_cd, idOf(pair.a), idOf(pair.b), kind, &found, &count));
+      const auto truth = other.collisionData(pair.a, pair.b).tags(static_cast<ContactKind>(kind));
+      ASSERT_EQ(count, truth.size());
+      for (std::size_t i = 0; i < count; ++i)
+        EXPECT_EQ((ContactTags{found[2 * i], found[2 * i + 1]}), truth[i]);
+      tagged += count;
+    }
+  EXPECT_GT(tagged, 0u);
   std::uint64_t hash = 0, one;
   for (const CollisionPair& pair : other.pairs()) {
     EXPECT_OK(palpate_get_hash(m_cd, idOf(pair.a), idOf(pair.b), &one));

@@ -1,0 +1,111 @@
+#include "Mesh/TopologyCut.h"
+
+#include "Common/RandomMeshes.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+// A topology that is cut, beside one that is constructed anew.
+
+namespace palpate {
+namespace {
+
+using testing::Random;
+
+void expectSame(const MeshTopology& found, const MeshTopology& truth) {
+  EXPECT_EQ(found.vertexCount, truth.vertexCount);
+  EXPECT_EQ(found.elements, truth.elements);
+  EXPECT_EQ(found.edges, truth.edges);
+  EXPECT_EQ(found.triangleEdges, truth.triangleEdges);
+  EXPECT_EQ(found.owned, truth.owned);
+  EXPECT_EQ(found.vertexTriangles.offsets, truth.vertexTriangles.offsets);
+  EXPECT_EQ(found.vertexTriangles.items, truth.vertexTriangles.items);
+  EXPECT_EQ(found.edgeTriangles.offsets, truth.edgeTriangles.offsets);
+  EXPECT_EQ(found.edgeTriangles.items, truth.edgeTriangles.items);
+  EXPECT_EQ(found.untestedVertices, truth.untestedVertices);
+  EXPECT_EQ(found.isUsed, truth.isUsed);
+  EXPECT_EQ(found.hasClosedStar, truth.hasClosedStar);
+  EXPECT_EQ(found.hasOnlyClosedStars, truth.hasOnlyClosedStars);
+  EXPECT_EQ(found.removed, truth.removed);
+  EXPECT_EQ(found.disabled, truth.disabled);
+  EXPECT_EQ(found.isDisabled, truth.isDisabled);
+}
+
+/// Triangles of few vertices, so that many share edges, some are equal and some without area.
+std::vector<Triangle> randomTriangles(Random& random, std::size_t count, std::size_t vertices) {
+  std::vector<Triangle> triangles;
+  for (std::size_t i = 0; i < count; ++i) {
+    Triangle& t = triangles.emplace_back();
+    for (std::uint32_t& v : t) v = static_cast<std::uint32_t>(random() % vertices);
+    if (random() % 4 == 0 && i > 0) t = triangles[random() % i];
+  }
+  return triangles;
+}
+
+TEST(TopologyCut, EqualsATopologyThatIsConstructedAnew) {
+  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed);
+    const bool isBall = seed % 3 == 0;
+    const testing::Mesh ball = testing::sphere(3, 4, {0, 0, 0}, 1);
+    std::size_t vertices = isBall ? ball.positions.size() : 3 + random() % 20;
+    std::vector<Triangle> all =
+        isBall ? ball.triangles : randomTriangles(random, random() % 40, vertices);
+    MeshTopology topology(vertices, all);
+    std::vector<std::uint32_t> removed, disabled;
+    for (int cut = 0; cut < 12; ++cut) {
+      if (random() % 3 == 0) {
+        disabled.clear();
+        for (std::uint32_t t = 0; t < all.size(); ++t)
+          if (random() % 5 == 0) disabled.push_back(t);
+        topology.disable(disabled);
+      }
+      std::vector<std::uint32_t> gone;
+      for (std::uint32_t t = 0; t < all.size(); ++t)
+        if (!topology.isRemoved(t) && random() % 5 == 0) gone.push_back(t);
+      vertices += random() % 3;
+      std::vector<Triangle> added;
+      if (random() % 4) added = randomTriangles(random, random() % 10, vertices);
+      // A triangle that is removed and added again is another one.
+      for (const std::uint32_t t : gone)
+        if (random() % 3 == 0) added.push_back(all[t]);
+      topology = cutTopology(topology, gone, added, vertices);
+      all.insert(all.end(), added.begin(), added.end());
+      removed.insert(removed.end(), gone.begin(), gone.end());
+      std::sort(removed.begin(), removed.end());
+      MeshTopology truth(vertices, all, removed);
+      truth.disable(disabled);
+      expectSame(topology, truth);
+      if (::testing::Test::HasFailure()) FAIL() << "seed " << seed << ", cut " << cut;
+    }
+  }
+}
+
+TEST(TopologyCut, RemovedElementsAreNowhere) {
+  const testing::Mesh ball = testing::sphere(4, 6, {0, 0, 0}, 1);
+  const std::vector<std::uint32_t> removed{0, 7};
+  const MeshTopology topology(ball.positions.size(), ball.triangles, removed);
+  std::vector<Triangle> left = ball.triangles;
+  left.erase(left.begin() + 7);
+  left.erase(left.begin());
+  const MeshTopology truth(ball.positions.size(), left);
+  EXPECT_EQ(topology.count(), left.size());
+  EXPECT_EQ(topology.lowest(), 1u);
+  EXPECT_EQ(topology.edges, truth.edges);
+  EXPECT_EQ(topology.isUsed, truth.isUsed);
+  EXPECT_EQ(topology.hasClosedStar, truth.hasClosedStar);
+  std::vector<std::uint32_t> elements;
+  topology.forEachElement([&](std::uint32_t t) { elements.push_back(t); });
+  ASSERT_EQ(elements.size(), left.size());
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    EXPECT_EQ(topology.elements[elements[i]], left[i]);
+    EXPECT_EQ(topology.owned[elements[i]], truth.owned[i]);
+    EXPECT_EQ(topology.triangleEdges[elements[i]], truth.triangleEdges[i]);
+    EXPECT_TRUE(topology.isEnabled(elements[i]));
+  }
+  EXPECT_FALSE(topology.isEnabled(0));
+}
+
+}  // namespace
+}  // namespace palpate
