@@ -60,6 +60,7 @@ public struct PairSettings {
   public double Thickness, RestDistance, AllowedError, FreeMotionReach, TimeTolerance, MotionTolerance, WidestNormalCone;
   public Method Method;
   public ContactSet Contacts;
+  public int Priority;
   byte earliestTimeOnly, trackContacts, reportCrossings;
   public bool EarliestTimeOnly {
     get { return earliestTimeOnly != 0; } set { earliestTimeOnly = value ? (byte)1 : (byte)0; }
@@ -158,6 +159,7 @@ public struct Validity {
   public UIntPtr AtEnd, AtImpact;
   public double Displacement, DisplacementLimit, ArcDeviation, EffectiveThickness, ProxyDepth;
   Indices untrustedA, untrustedB, degenerateA, degenerateB, outsideBand, nearThreshold, unreliableSign;
+  public uint Age;
   public bool Trusted { get { return trusted != 0; } }
   public bool StartedApart { get { return startedApart != 0; } }
   public bool SideMayBeWrong { get { return sideMayBeWrong != 0; } }
@@ -394,6 +396,13 @@ public sealed unsafe class Detection : IDisposable {
   public void RemovePair(uint a, uint b) { Native.Check(Native.palpate_remove_pair(cd, a, b)); }
 
   public void Detect() { Native.Check(Native.palpate_detect(cd)); }
+  /// Returns whether everything was finished.
+  public bool Detect(long microseconds) {
+    byte complete;
+    Native.Check(Native.palpate_detect_within(cd, microseconds, out complete));
+    return complete != 0;
+  }
+  public void CancelDetection() { Native.Check(Native.palpate_cancel_detection(cd)); }
   public void Advance() { Native.Check(Native.palpate_advance(cd)); }
   public Contacts Contacts(uint a, uint b) {
     var views = new ContactViews { Size = Native.SizeOf<ContactViews>() };

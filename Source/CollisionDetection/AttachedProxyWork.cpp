@@ -50,15 +50,17 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 
 }  // namespace
 
-std::size_t AttachedProxyWork::place() {
+std::size_t AttachedProxyWork::place(bool divides) {
   const PairPlan& plan = m_record->plan;
   std::optional<ProxyStep> step;
   if (plan.motion > 0.0)
     step = {m_record->b->motion.range(), m_record->pair.settings.thickness, plan.motionTolerance};
-  return m_proxyJobs.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, step);
+  return m_proxyJobs.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, divides, step);
 }
 
-std::size_t AttachedProxyWork::start(const FrameStart&) { return place(); }
+std::size_t AttachedProxyWork::start(const FrameStart& frame) {
+  return place(frame.deadline != nullptr);
+}
 
 void AttachedProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
@@ -70,7 +72,7 @@ void AttachedProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
 }
 
 void AttachedProxyWork::runByBruteForce(JobScratch& scratch) {
-  place();
+  place(false);
   m_proxyJobs.findByBruteForce(scratch);
   writeHits(scratch);
   detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
@@ -91,6 +93,7 @@ void AttachedProxyWork::findOthers(JobScratch& scratch) const {
     return !m_record->b->body.mesh.topology.isEnabled(p.b);
   };
   for (const std::uint32_t point : scratch.hits.others) {
+    checkTime(scratch.deadline);
     Eigen::AlignedBox3d box(points.now[point]);
     if (swept) box.extend(points.before[point]);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());

@@ -19,7 +19,7 @@ class AttachedProxyWork {
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  std::size_t place();
+  std::size_t place(bool divides);
   void writeHits(JobScratch&) const;
   void findOthers(JobScratch&) const;
 

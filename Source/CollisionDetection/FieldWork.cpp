@@ -42,7 +42,7 @@ std::size_t FieldWork::start(const FrameStart& frame) {
   const PlacedField placed = m_record->placedField();
   m_record->fieldContacts(placed).start(m_record->mesh().body);
   const std::size_t elements = m_record->fieldScratch->elements.size();
-  const bool shared = frame.threads.count() > 1 && elements >= kSharedFieldSize;
+  const bool shared = frame.divides() && elements >= kSharedFieldSize;
   m_jobs = elements == 0 ? 0 : shared ? kFieldJobs : 1;
   return m_jobs;
 }

@@ -7,6 +7,7 @@
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <mutex>
 #include <tuple>
@@ -22,17 +23,27 @@ constexpr auto startCandidates = [](PairWork& work, const FrameStart& frame) -> 
   return meshes ? meshes->startCandidates(frame) : 0;
 };
 
+constexpr auto startWork = [](PairWork& work, const FrameStart& frame) {
+  return std::visit([&](auto& each) { return each.start(frame); }, work);
+};
+
 }  // namespace
 
-/// startOf(work, frame): starts a pair's work and returns its number of jobs.
+/// startOf(work, frame): starts a pair's work and returns its number of jobs. Returns the number of
+/// pairs that were started: all, or with a deadline as many as keep the threads busy.
 template <class Start>
-void Frame::start(std::span<PairRecord* const> records, const Threads& threads, Start&& startOf) {
+std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& threads,
+                         const Deadline* deadline, Start&& startOf) {
+  constexpr std::size_t kJobsPerThread = 4;
   const MemoryScope memory(MemoryStage::Pairs);
   m_pairs.clear();
   m_places.clear();
   m_nodePairs.clear();
-  const FrameStart frame{threads, m_nodePairs, m_stack};
+  const std::size_t enough =
+      threads.count() > 1 ? kJobsPerThread * static_cast<std::size_t>(threads.count()) : 1;
+  const FrameStart frame{threads, m_nodePairs, m_stack, deadline};
   for (PairRecord* record : records) {
+    if (deadline && (m_places.size() >= enough || deadline->isOver())) break;
     record->earliest = std::numeric_limits<double>::infinity();
     m_pairs.push_back({record, workOf(*record), m_places.size()});
     Pair& pair = m_pairs.back();
@@ -40,14 +51,16 @@ void Frame::start(std::span<PairRecord* const> records, const Threads& threads, 
     for (std::size_t i = 0; i < pair.jobCount; ++i) {
       if (m_places.size() == m_jobs.size()) m_jobs.push_back(std::make_unique<JobScratch>());
       m_jobs[m_places.size()]->clear();
+      m_jobs[m_places.size()]->deadline = deadline;
       m_places.push_back({m_pairs.size() - 1, i});
     }
   }
+  return m_pairs.size();
 }
 
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
-  start(records, threads, startCandidates);
+  start(records, threads, nullptr, startCandidates);
   std::mutex mutex;
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Pair& pair = m_pairs[m_places[i].pair];
@@ -67,11 +80,12 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
   }
 }
 
-void Frame::runRounds(const Threads& threads, Trace* trace) {
+void Frame::runRounds(const Threads& threads, const Deadline* deadline, Trace* trace) {
   for (int round = 0;; ++round) {
     bool any = false;
     for (Pair& pair : m_pairs) {
-      pair.runs = std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
+      for (const auto& job : jobsOf(pair)) pair.isOutOfTime |= job->isOutOfTime;
+      pair.runs = !pair.isOutOfTime && std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
                              pair.work);
       any |= pair.runs;
     }
@@ -79,7 +93,10 @@ void Frame::runRounds(const Threads& threads, Trace* trace) {
     PALPATE_ASSERT(round < 3);
     const TraceSpan roundSpan(trace, "round");
     const std::size_t firstEvent = trace ? trace->reserve(m_places.size()) : 0;
-    threads.forEach(m_places.size(), [&](std::size_t i) {
+    std::atomic<std::size_t> next{0};
+    threads.forEach(m_places.size(), [&](std::size_t index) {
+      // Threads take indices from both ends; with a deadline, jobs are run in the order of pairs.
+      const std::size_t i = deadline ? next.fetch_add(1, std::memory_order_relaxed) : index;
       const Pair& pair = m_pairs[m_places[i].pair];
       if (!pair.runs) return;
       Stopwatch watch;
@@ -89,8 +106,13 @@ void Frame::runRounds(const Threads& threads, Trace* trace) {
                             .a = ids.a,
                             .b = ids.b,
                             .job = static_cast<std::uint32_t>(m_places[i].job)});
-      std::visit([&](const auto& work) { work.run(round, m_places[i].job, *m_jobs[i]); },
-                 pair.work);
+      try {
+        checkTime(deadline);
+        std::visit([&](const auto& work) { work.run(round, m_places[i].job, *m_jobs[i]); },
+                   pair.work);
+      } catch (const OutOfTime&) {
+        m_jobs[i]->isOutOfTime = true;
+      }
       m_jobs[i]->milliseconds += watch.lap();
     });
   }
@@ -129,24 +151,10 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
   Stopwatch watch;
   {
     const TraceSpan span(trace, "start");
-    start(records, threads, [](PairWork& work, const FrameStart& frame) {
-      return std::visit([&](auto& each) { return each.start(frame); }, work);
-    });
+    start(records, threads, nullptr, startWork);
   }
-  runRounds(threads, trace);
-  double all = 0, narrow = 0;
-  for (const Pair& pair : m_pairs)
-    for (const auto& job : jobsOf(pair)) {
-      pair.record->statistics.milliseconds += job->milliseconds;
-      all += job->milliseconds;
-      narrow += job->narrowMilliseconds;
-    }
-  // Threads work on both stages at once. The wall-clock time is therefore divided in proportion to
-  // the work of each stage.
-  const double wall = watch.lap();
-  statistics.milliseconds.narrowPhase = all > 0 ? wall * narrow / all : 0;
-  statistics.milliseconds.pairs = wall - statistics.milliseconds.narrowPhase;
-
+  runRounds(threads, nullptr, trace);
+  addTimes(watch.lap(), statistics);
   for (Pair& pair : m_pairs) {
     PairRecord& record = *pair.record;
     const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
@@ -157,6 +165,51 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
   }
 }
 
+/// Threads work on both stages at once. The wall-clock time is therefore divided in proportion to
+/// the work of each stage.
+void Frame::addTimes(double wall, FrameStatistics& statistics) const {
+  double all = 0, narrow = 0;
+  for (const Pair& pair : m_pairs)
+    for (const auto& job : jobsOf(pair)) {
+      pair.record->statistics.milliseconds += job->milliseconds;
+      all += job->milliseconds;
+      narrow += job->narrowMilliseconds;
+    }
+  const double ofNarrowPhase = all > 0 ? wall * narrow / all : 0;
+  statistics.milliseconds.narrowPhase += ofNarrowPhase;
+  statistics.milliseconds.pairs += wall - ofNarrowPhase;
+}
+
+void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
+                        std::span<PairRecord* const> records, const Threads& threads,
+                        FrameStatistics& statistics, Trace* trace) {
+  Stopwatch watch;
+  const auto finish = [&](Pair& pair) {
+    PairRecord& record = *pair.record;
+    const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
+    if (!pair.isOutOfTime) try {
+      checkTime(&deadline);
+      join(pair, {threads, Engine::Octree, statistics, m_results, &deadline});
+      checkTime(&deadline);
+      record.track(step);
+      record.isUnfinished = false;
+    } catch (const OutOfTime&) {
+    }
+    const double spent = watch.lap();
+    record.statistics.milliseconds += spent;
+    statistics.milliseconds.order += spent;
+  };
+  for (PairRecord* record : records) record->isUnfinished = true;
+  while (!records.empty()) {
+    const std::size_t count = start(records, threads, &deadline, startWork);
+    if (count == 0) return;
+    runRounds(threads, &deadline, trace);
+    addTimes(watch.lap(), statistics);
+    for (Pair& pair : m_pairs) finish(pair);
+    records = records.subspan(count);
+  }
+}
+
 void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatistics& statistics,
                                Trace* trace) {
   const Threads oneThread(1);
@@ -164,7 +217,8 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatis
     Stopwatch watch;
     const TraceSpan span(trace, "brute force", record->pair.a, record->pair.b);
     const double before = statistics.milliseconds.total();
-    start({&record, 1}, oneThread, [](PairWork&, const FrameStart&) { return std::size_t{1}; });
+    start({&record, 1}, oneThread, nullptr,
+          [](PairWork&, const FrameStart&) { return std::size_t{1}; });
     Pair& pair = m_pairs.front();
     std::visit([&](auto& work) { work.runByBruteForce(*m_jobs.front()); }, pair.work);
     statistics.milliseconds.narrowPhase += watch.lap();

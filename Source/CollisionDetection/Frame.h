@@ -7,10 +7,12 @@
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/PairWork.h"
 #include "Octree/Traversal.h"
+#include "Core/Deadline.h"
 #include "Core/Threads.h"
 #include "Core/Trace.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -27,6 +29,10 @@ class Frame {
   /// Writes the contacts of each pair, sorted, to PairRecord::next.
   /// trace: null for none.
   void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&, Trace* trace);
+  /// The same for a few pairs at a time in the given order, and follows their contacts into the
+  /// step (PairRecord::track()), until the deadline. The rest is PairRecord::isUnfinished.
+  void detectUntil(const Deadline&, std::uint64_t step, std::span<PairRecord* const>,
+                   const Threads&, FrameStatistics&, Trace*);
   /// Writes the same results, found by testing every feature against every other.
   void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&, Trace*);
 
@@ -36,17 +42,19 @@ class Frame {
     PairWork work;
     std::size_t firstJob, jobCount = 0;
     bool runs = false;  ///< in the present round
+    bool isOutOfTime = false;
   };
   /// The pair of a job, by its index in m_pairs, and the job's number in it.
   struct Place {
     std::size_t pair, job;
   };
   template <class Start>
-  void start(std::span<PairRecord* const>, const Threads&, Start&&);
+  std::size_t start(std::span<PairRecord* const>, const Threads&, const Deadline*, Start&&);
   Jobs jobsOf(const Pair& pair) const {
     return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
   }
-  void runRounds(const Threads&, Trace*);
+  void runRounds(const Threads&, const Deadline*, Trace*);
+  void addTimes(double wall, FrameStatistics&) const;
   void join(Pair&, const FrameJoin&);
 
   std::vector<Pair> m_pairs;

@@ -1,10 +1,12 @@
 #include "CollisionDetection/FreeMotionSearch.h"
 
+#include "CollisionDetection/PairOrder.h"
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeFreeMotion.h"
 #include "Bodies/OctreeFrame.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -64,37 +66,62 @@ bool FreeMotionSearch::isKnown(const PairTable& pairs) const {
   return known == m_known.end();
 }
 
-void FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pairs, Engine engine,
-                            const Threads& threads) {
-  if (isKnown(pairs)) return;
+bool FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pairs, Engine engine,
+                            const Threads& threads, const Deadline* deadline) {
+  if (isKnown(pairs)) return true;
   m_known.clear();
   start(geometries, pairs);
+  const bool isComplete = search(engine, threads, deadline);
+  bool allFinished = true;
+  for (const auto& record : pairs.records()) {
+    if (!takesPart(*record) || (isComplete && !record->isUnfinished)) continue;
+    allFinished = false;
+    // The features of an unfinished pair may be in contacts that its answer does not have.
+    const double gap = distanceBoundOf(*record) - record->pair.settings.thickness,
+                 share = gap > 0.0 ? 0.5 * (1.0 - 0x1p-50) * gap : 0.0;
+    for (Geometry* geometry : {record->a, record->b})
+      for (double& motion : geometry->nextFreeMotion) motion = std::min(motion, share);
+  }
+  if (allFinished)
+    for (const auto& record : pairs.records())
+      if (takesPart(*record)) m_known.push_back({record->pair, record->state()});
+  m_isNew = true;
+  return isComplete;
+}
+
+bool FreeMotionSearch::search(Engine engine, const Threads& threads, const Deadline* deadline) {
+  const auto isOver = [&] { return deadline && deadline->isOver(); };
   threads.forEach(m_boxed.size(), [&](std::size_t i) {
-    boxElements(m_boxed[i]->body.mesh, m_boxed[i]->elementBoxes);
+    if (!isOver()) boxElements(m_boxed[i]->body.mesh, m_boxed[i]->elementBoxes);
   });
+  if (isOver()) return false;
   m_places.clear();
   m_nodePairs.clear();
   for (std::size_t i = 0; i < m_works.size(); ++i) {
     std::size_t jobs = 1;
     if (engine == Engine::Octree && !hasShape(*m_works[i].record)) {
-      startSearch(m_works[i], threads);
+      startSearch(m_works[i], threads.count() > 1 || deadline);
       jobs = (m_works[i].count + m_works[i].grain - 1) / m_works[i].grain;
     }
     for (std::size_t job = 0; job < jobs; ++job) m_places.push_back({i, job});
   }
   while (m_scratch.size() < m_places.size()) m_scratch.push_back(std::make_unique<Scratch>());
+  std::atomic<bool> isComplete{true};
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Work& work = m_works[m_places[i].work];
-    if (hasShape(*work.record))
-      withShape(work, engine, *m_scratch[i]);
-    else if (engine == Engine::BruteForce)
-      runByBruteForce(work, *m_scratch[i]);
-    else
-      run(work, m_places[i].job, *m_scratch[i]);
+    try {
+      checkTime(deadline);
+      if (hasShape(*work.record))
+        withShape(work, engine, *m_scratch[i]);
+      else if (engine == Engine::BruteForce)
+        runByBruteForce(work, *m_scratch[i]);
+      else
+        run(work, m_places[i].job, *m_scratch[i], deadline);
+    } catch (const OutOfTime&) {
+      isComplete = false;
+    }
   });
-  for (const auto& record : pairs.records())
-    if (takesPart(*record)) m_known.push_back({record->pair, record->state()});
-  m_isNew = true;
+  return isComplete;
 }
 
 void FreeMotionSearch::commit(const GeometryTable& geometries) noexcept {
@@ -129,28 +156,31 @@ void FreeMotionSearch::start(const GeometryTable& geometries, const PairTable& p
     geometry->elementBoxes.resize(geometry->body.mesh.topology.elements.size());
 }
 
-void FreeMotionSearch::startSearch(Work& work, const Threads& threads) {
+void FreeMotionSearch::startSearch(Work& work, bool divides) {
   const Body &a = work.record->a->body, &b = work.record->b->body;
   const std::size_t elements = a.tree.octree().size() + b.tree.octree().size();
   work.trees = treesOf(a, b, work.searchDistance, false);
-  startPairs(work.trees,
-             threads.count() > 1 && elements >= kSharedSearchSize ? kSearchNodePairs : 1, m_stack);
+  startPairs(work.trees, divides && elements >= kSharedSearchSize ? kSearchNodePairs : 1, m_stack);
   work.first = m_nodePairs.size(), work.count = m_stack.pairs.size();
   m_nodePairs.insert(m_nodePairs.end(), m_stack.pairs.begin(), m_stack.pairs.end());
   work.grain = std::max<std::size_t>(1, (work.count + kSearchJobs - 1) / kSearchJobs);
 }
 
-void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch) const {
+void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
+                           const Deadline* deadline) const {
   const std::size_t begin = job * work.grain, size = std::min(work.count - begin, work.grain);
   struct Context {
     const MeshPair pair;
     const double searchDistance;
     const FreeMotions motions;
-  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record)};
+    const Deadline* const deadline;
+  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record), deadline};
   scratch.sink.start(
       [](void* opaque, std::span<const ElementPair> pairs) {
         const Context& c = *static_cast<const Context*>(opaque);
-        findFreeMotion(c.pair, c.searchDistance, pairs, c.motions);
+        forEachPart(c.deadline, pairs, [&](const auto& part) {
+          findFreeMotion(c.pair, c.searchDistance, part, c.motions);
+        });
       },
       &context);
   traverse(work.trees, std::span(m_nodePairs).subspan(work.first + begin, size), scratch.stack,

@@ -8,6 +8,7 @@
 #include "Shapes/Shape.h"
 #include "Octree/Traversal.h"
 #include "Core/Buffer.h"
+#include "Core/Deadline.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
 
@@ -24,8 +25,10 @@ namespace palpate {
 class FreeMotionSearch {
  public:
   /// Writes Geometry::nextFreeMotion, unless nothing changed since the last commit(). The octrees
-  /// must be up to date.
-  void find(const GeometryTable&, const PairTable&, Engine, const Threads&);
+  /// must be up to date. Returns whether the search was completed. If its time is over, free motions
+  /// follow from PairRecord::distanceBound, also those of geometries with an unfinished pair.
+  bool find(const GeometryTable&, const PairTable&, Engine, const Threads&,
+            const Deadline* = nullptr);
   /// Makes what find() wrote the result.
   void commit(const GeometryTable&) noexcept;
 
@@ -53,9 +56,10 @@ class FreeMotionSearch {
   };
 
   bool isKnown(const PairTable&) const;
+  bool search(Engine, const Threads&, const Deadline*);
   void start(const GeometryTable&, const PairTable&);
-  void startSearch(Work&, const Threads&);
-  void run(const Work&, std::size_t job, Scratch&) const;
+  void startSearch(Work&, bool divides);
+  void run(const Work&, std::size_t job, Scratch&, const Deadline*) const;
   static void runByBruteForce(const Work&, Scratch&);
   static void withShape(const Work&, Engine, Scratch&);
 

@@ -7,6 +7,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Octree/Traversal.h"
 #include "Core/Buffer.h"
+#include "Core/Deadline.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
 
@@ -25,6 +26,8 @@ struct JobScratch : CountedObject {
   bool intersectionsMissed = false;  ///< they were not looked for in every batch
   std::size_t candidateCount = 0;
   ProxyHits hits;
+  const Deadline* deadline = nullptr;  ///< of a detection with a budget
+  bool isOutOfTime = false;            ///< the job did not end
   double milliseconds = 0, narrowMilliseconds = 0;
 
   TraversalStack stack;
@@ -42,6 +45,7 @@ struct JobScratch : CountedObject {
     nearby = intersectionsMissed = false;
     candidateCount = 0;
     hits.count = 0;
+    isOutOfTime = false;
     milliseconds = narrowMilliseconds = 0;
   }
 };
@@ -54,6 +58,9 @@ struct FrameStart {
   const Threads& threads;
   Buffer<NodePair>& nodePairs;  ///< of the traversals of all pairs
   TraversalStack& stack;
+  const Deadline* deadline = nullptr;
+  /// Whether a pair has many jobs if it is large enough. Results do not depend on it.
+  bool divides() const { return threads.count() > 1 || deadline; }
 };
 
 /// The same of join().
@@ -62,6 +69,7 @@ struct FrameJoin {
   Engine engine;
   FrameStatistics& statistics;
   class PairResults& results;
+  const Deadline* deadline = nullptr;
 };
 
 }  // namespace palpate

@@ -290,7 +290,10 @@ std::size_t KeptPairs::divide(std::size_t mostJobs, Weight&& weight) {
 void KeptPairs::gather(std::size_t job, const MeshPair& meshes, JobScratch& scratch) {
   PALPATE_ASSERT(job + 1 < m_jobs.size());
   for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
-    if (!m_units[i].isMade) make(m_units[i], meshes, scratch);
+    if (!m_units[i].isMade) {
+      checkTime(scratch.deadline);
+      make(m_units[i], meshes, scratch);
+    }
 }
 
 void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch,
@@ -298,6 +301,7 @@ void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch
   PALPATE_ASSERT(job + 1 < m_jobs.size());
   for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i) {
     Unit& unit = m_units[i];
+    checkTime(scratch.deadline);
     if (!unit.isMade) make(unit, meshes, scratch);
     if (!unit.isSorted) {
       scratch.kept.assign(unit.near.begin(), unit.near.end());

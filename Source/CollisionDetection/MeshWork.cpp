@@ -71,7 +71,7 @@ std::size_t MeshWork::startKept(const FrameStart& frame) {
   const Body &a = record.a->body, &b = record.b->body;
   if (!hasElements(record)) return 0;
   const std::size_t jobs =
-      record.kept.start(a, b, reachOfKept(record), frame.threads.count() > 1 ? kJobsPerPair : 1);
+      record.kept.start(a, b, reachOfKept(record), frame.divides() ? kJobsPerPair : 1);
   m_thickness = record.meshes().maxFeatureDistance();
   m_floats = record.kept.floats();
   return jobs;
@@ -83,7 +83,7 @@ std::size_t MeshWork::startGathering(const FrameStart& frame) {
   const KeptPairs::Reach reach = reachOfKept(record);
   return record.kept.startGathering(record.a->body, record.b->body, reach,
                                     detectionsToGather(record, reach),
-                                    frame.threads.count() > 1 ? kJobsPerPair : 1);
+                                    frame.divides() ? kJobsPerPair : 1);
 }
 
 void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
@@ -103,13 +103,15 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   // Those that meet at the step's start have boxes within the motion at its end, and are listed.
   if (meshes.step.checksStart)
     m_record->kept.forEachList(job, [&](std::span<const ElementPair> pairs) {
-      checkStart(meshes, anyDisabled ? enabled(pairs, scratch.kept) : pairs, scratch);
+      forEachPart(scratch.deadline, anyDisabled ? enabled(pairs, scratch.kept) : pairs,
+                  [&](const auto& part) { checkStart(meshes, part, scratch); });
     });
   if (anyDisabled) {
     enabled(scratch.near, scratch.kept);
     scratch.near.swap(scratch.kept);
   }
-  findContacts(meshes, scratch.near, scratch.contacts);
+  forEachPart(scratch.deadline, std::span<const ElementPair>(scratch.near),
+              [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
   scratch.narrowMilliseconds += watch.lap();
 }
 
@@ -141,7 +143,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
              inWorld = searches || !record.a->body.isPlaced() || !record.b->body.isPlaced();
   m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
                     searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
-  const bool shared = frame.threads.count() > 1 && elements >= kSharedSize;
+  const bool shared = frame.divides() && elements >= kSharedSize;
   startPairs(m_trees, shared ? kNodePairsWanted : 1, frame.stack);
   m_nodePairs = &frame.nodePairs;
   m_first = frame.nodePairs.size(), m_count = frame.stack.pairs.size();
@@ -223,12 +225,16 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
   } else if (job >= m_searchJobs) {
     if (round == 0) m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
   } else if (round == 0) {
-    forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) { detect(pairs, scratch); });
+    forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
+      forEachPart(scratch.deadline, pairs, [&](const auto& part) { detect(part, scratch); });
+    });
     scratch.candidateCount = scratch.sink.total();
   } else if (repeats(scratch)) {
     Stopwatch watch;
-    forEachBatch(job, scratch,
-                 [&](std::span<const ElementPair> pairs) { detectIntersections(pairs, scratch); });
+    forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
+      forEachPart(scratch.deadline, pairs,
+                  [&](const auto& part) { detectIntersections(part, scratch); });
+    });
     scratch.narrowMilliseconds += watch.lap();
   }
 }
@@ -304,6 +310,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   for (const auto* buffers : {&found, &intersections})
     for (const ContactBuffers* each : *buffers) facts.add(each->facts);
   results.sortFacts(record);
+  checkTime(join.deadline);
   if (record.plan.step.reportsImpacts && facts.clearance == 0.0) {
     for (ContactBuffers* each : found)
       replaceByImpacts(record.meshes(), facts, *each, results.impacts);
@@ -320,6 +327,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
     preferred = intersections.size();
     found.insert(found.begin(), intersections.begin(), intersections.end());
   }
+  checkTime(join.deadline);
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   const std::size_t intersectionCount = results.order(record, preferBodies(join, preferred));
@@ -328,7 +336,9 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   describeExact(contents);
   const bool nearby =
       std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });
+  checkTime(join.deadline);
   results.assess(record, nearby, join.statistics);
+  checkTime(join.deadline);
   // After assess(), which tests the triangles around every impact.
   const bool mixes = record.plan.step.reportsImpacts,
              continuous = record.plan.method == Method::Continuous;

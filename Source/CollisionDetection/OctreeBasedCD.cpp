@@ -321,7 +321,22 @@ void OctreeBasedCD::update() {
 
 void OctreeBasedCD::detectCollision() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->withinLimit([&] { all->detect(); });
+  all->withinLimit([&] { all->detect(nullptr); });
+}
+
+bool OctreeBasedCD::detectCollision(std::chrono::microseconds budget) {
+  if (!m_implementation) throwMovedFrom();
+  const Deadline::Clock& clock = m_implementation->clock;
+  const Deadline::Time start = Deadline::now(clock);
+  const Implementation::ChangeGuard all(m_implementation);
+  all->isCancelled = false;
+  const Deadline deadline(Deadline::after(start, budget), all->isCancelled, clock);
+  return all->withinLimit([&] { return all->detect(&deadline); });
+}
+
+void OctreeBasedCD::cancelDetection() const {
+  if (!m_implementation) throwMovedFrom();
+  m_implementation->isCancelled.store(true, std::memory_order_relaxed);
 }
 
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,

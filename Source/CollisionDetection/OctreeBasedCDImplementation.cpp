@@ -1,5 +1,6 @@
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 
+#include "CollisionDetection/PairOrder.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Core/Assert.h"
 #include "Core/Stopwatch.h"
@@ -72,7 +73,7 @@ void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
   }
   next.memory = budget->now();
   next.peakMemory = budget->peak();
-  statistics = next;
+  statistics = std::move(next);
 }
 
 void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairRecord>> records,
@@ -205,44 +206,102 @@ void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
   for (PairRecord* record : selectedPairs) record->commit();
 }
 
-void OctreeBasedCD::Implementation::detect() {
+void OctreeBasedCD::Implementation::prepare(std::span<PairRecord* const> records,
+                                            const Deadline* deadline, Trace* traced) {
+  bool mustUpdate = false;
+  for (PairRecord* record : records) {
+    record->isUnfinished = deadline && deadline->isOver();
+    if (record->isUnfinished) continue;
+    planByFieldIfProven(*record, settings.engine);
+    record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
+                        record->plan);
+    mustUpdate |= reviewKeptPairs(*record);
+  }
+  if (!mustUpdate) return;
+  geometries.updateOctrees(settings.octree, threads, traced);
+  updateOctreeView();
+  if (!anyOctreeLags()) octreesState = geometries.state();
+}
+
+void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> records,
+                                                 const Deadline* deadline, FrameStatistics& next,
+                                                 Trace* traced) {
+  if (!deadline)
+    return settings.engine == Engine::Octree
+               ? frame.detect(records, threads, next, traced)
+               : frame.detectByBruteForce(records, next, traced);
+  const auto end = std::find_if(records.begin(), records.end(),
+                                [](const PairRecord* record) { return record->isUnfinished; });
+  const auto prepared = records.first(static_cast<std::size_t>(end - records.begin()));
+  const std::uint64_t step = geometries.stepNumber();
+  if (settings.engine == Engine::Octree)
+    return frame.detectUntil(*deadline, step, prepared, threads, next, traced);
+  for (PairRecord* record : prepared) {
+    record->isUnfinished = deadline->isOver();
+    if (record->isUnfinished) continue;
+    frame.detectByBruteForce({&record, 1}, next, traced);
+    record->track(step);
+  }
+}
+
+void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> records,
+                                                   FrameStatistics& next) {
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    PairRecord& record = *records[i];
+    record.yields = i == 0 && record.isUnfinished;
+    if (!record.isUnfinished) continue;
+    record.trust = trustBefore[i];
+    record.keepLastAnswer(geometries.stepNumber());
+  }
+  next.unfinishedPairs.swap(statistics.unfinishedPairs);  // for its memory
+  next.unfinishedPairs.clear();
+  for (const auto& record : pairs.records())
+    if (record->isUnfinished)
+      next.unfinishedPairs.push_back({record->pair.a, record->pair.b, record->distanceBound,
+                                      record->data.validity().age});
+}
+
+bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
   const MemoryScope memory(MemoryStage::Pairs);
   Trace* const traced = trace ? &*trace : nullptr;
   if (traced) traced->startFrame();
   const TraceSpan span(traced, "detectCollision");
-  for (const auto& record : pairs.records()) record->countIsPending = false;
+  for (const auto& record : pairs.records()) record->countIsPending = record->isUnfinished = false;
   update(false, true, traced);
-  for (const auto& record : pairs.records()) planByFieldIfProven(*record, settings.engine);
   FrameStatistics next = updates;
   const auto records = outdatedPairs();
-  for (const auto& record : pairs.records()) record->statistics = {};
-  for (PairRecord* record : records)
-    record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
-                        record->plan);
-  bool mustUpdate = false;
-  for (PairRecord* record : records) mustUpdate |= reviewKeptPairs(*record);
-  if (mustUpdate) {
-    geometries.updateOctrees(settings.octree, threads, traced);
-    updateOctreeView();
-    if (!anyOctreeLags()) octreesState = geometries.state();
+  for (const auto& record : pairs.records()) {
+    record->statistics = {};
+    if (record->dataVersion.isCurrent(record->state()))
+      planByFieldIfProven(*record, settings.engine);
   }
+  if (deadline) {
+    orderByUrgency(selectedPairs);
+    trustBefore.clear();
+    for (const PairRecord* record : records) trustBefore.push_back(record->trust);
+  }
+  prepare(records, deadline, traced);
   Stopwatch watch;
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
-  if (settings.engine == Engine::Octree)
-    frame.detect(records, threads, next, traced);
-  else
-    frame.detectByBruteForce(records, next, traced);
-  freeMotions.find(geometries, pairs, settings.engine, threads);
+  findContacts(records, deadline, next, traced);
+  next.freeMotionUnfinished =
+      !freeMotions.find(geometries, pairs, settings.engine, threads, deadline);
   {
     const MemoryScope results(MemoryStage::Results);
     watch.lap();
-    for (const auto& record : pairs.records()) record->track(geometries.stepNumber());
-    for (PairRecord* record : records) record->addTags();
+    // With a deadline, pairs of other answers were tracked one by one.
+    for (const auto& record : pairs.records())
+      if (!deadline || !record->collides() || record->dataVersion.isCurrent(record->state()))
+        record->track(geometries.stepNumber());
+    if (deadline) keepUnfinished(records, next);
+    for (PairRecord* record : records)
+      if (!record->isUnfinished) record->addTags();
     next.milliseconds.order += watch.lap();
   }
   freeMotions.commit(geometries);
   for (PairRecord* record : records) {
+    if (record->isUnfinished) continue;
     record->commit();
     reviewLists(*record);
   }
@@ -257,10 +316,12 @@ void OctreeBasedCD::Implementation::detect() {
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
   for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->body.mesh);
-  setStatistics(next);
+  const bool isComplete = next.unfinishedPairs.empty() && !next.freeMotionUnfinished;
+  setStatistics(std::move(next));
   hasUpdates = false;
   const TraceSpan auditSpan(traced, "audit");
   auditFrame(settings, geometries, pairs, audit);
+  return isComplete;
 }
 
 }  // namespace palpate

@@ -12,6 +12,7 @@
 #include "Queries/QuerySource.h"
 #include "Queries/SnapshotPool.h"
 #include "Octree/Forest.h"
+#include "Core/Deadline.h"
 #include "Core/FloatingPoint.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
@@ -49,6 +50,7 @@ struct OctreeBasedCD::Implementation {
   bool hasUpdates = false;
   LooseOctree::State shownOctrees;  ///< what octree() shows
   std::vector<PairRecord*> selectedPairs;
+  std::vector<Trust> trustBefore;  ///< of selectedPairs, of a detection with a budget
   AuditRecord audit;
   std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
@@ -59,6 +61,8 @@ struct OctreeBasedCD::Implementation {
   std::mutex filling;                ///< locked while a const call fills what it returns
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
+  mutable std::atomic<bool> isCancelled = false;  ///< the detection with a budget that runs
+  Deadline::Clock clock;                          ///< of tests; empty: the system's
 
   /// Adds the counts of geometries to the statistics, and makes them visible.
   void setStatistics(FrameStatistics next);
@@ -135,7 +139,15 @@ struct OctreeBasedCD::Implementation {
   /// For a StepGuard. Results and statistics of the table's pairs stay as they are.
   void detect(const GuardedPairs& guarded);
 
-  void detect();
+  /// Returns whether everything was finished. deadline: null for none.
+  bool detect(const Deadline* deadline);
+
+  /// Completes the plans of pairs. Those for which no time is left become PairRecord::isUnfinished.
+  void prepare(std::span<PairRecord* const> records, const Deadline*, Trace*);
+  void findContacts(std::span<PairRecord* const> records, const Deadline*, FrameStatistics&,
+                    Trace*);
+  /// records: all that had to be found, in the order of urgency.
+  void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&);
 };
 
 [[noreturn]] void throwMovedFrom();

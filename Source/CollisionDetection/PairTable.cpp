@@ -119,7 +119,30 @@ void PairRecord::commit() noexcept {
                  sizeOf(CollisionData::Contents::of(next)));
   std::swap(data, next);
   hasData = true;
+  dataTopologies = topologies();
   dataVersion.commit(state());
+}
+
+void PairRecord::keepLastAnswer(std::uint64_t step) {
+  using Contents = CollisionData::Contents;
+  Contents& answer = Contents::of(data);
+  const bool isOutdated = hasData && dataTopologies != topologies();
+  if (tracker) tracker->skip(step, isOutdated, answer);
+  if (isOutdated || !hasData) {
+    const std::uint32_t age = answer.validity.age;
+    answer = {};
+    answer.validity.method = plan.method;
+    answer.validity.age = age;
+  }
+  answer.crossings.clear();
+  Validity& validity = answer.validity;
+  validity.trusted = validity.startedApart = false;
+  validity.sideMayBeWrong = true;
+  validity.reason = MethodReason::OutOfTime;
+  ++validity.age;
+  hasData = true;
+  dataTopologies = topologies();
+  dataVersion.invalidate();
 }
 
 void PairRecord::releaseMemory() {

@@ -53,6 +53,9 @@ struct PairRecord : CountedObject {
   };
   using Derived = DerivedFrom<State>;
   State state() const { return {a->body.state(), b->body.state(), settingsRevision}; }
+  std::array<Revision, 2> topologies() const {
+    return {a->body.revisions.elements.topology, b->body.revisions.elements.topology};
+  }
   MeshPair meshes(const FloatPair* floats = nullptr) const {
     PairSettings settings = pair.settings;
     settings.method = plan.method;
@@ -90,6 +93,9 @@ struct PairRecord : CountedObject {
   void addTags();
   /// Makes `next` the pair's result.
   void commit() noexcept;
+  /// The detection in the step with this number did not finish the pair: its result becomes that of
+  /// an earlier detection, or empty if there is none for the topologies now.
+  void keepLastAnswer(std::uint64_t step);
   /// Commits an empty result, for a pair that does not collide.
   void commitEmpty() noexcept;
 
@@ -121,6 +127,11 @@ struct PairRecord : CountedObject {
   CollisionData data;  ///< of the last detection that was completed
   Derived dataVersion;
   bool hasData = false;        ///< a detection was completed
+  std::array<Revision, 2> dataTopologies;  ///< of a and b in `data`
+  // Of a detection with a budget:
+  double distanceBound = 0.0;  ///< L: distanceBoundOf()
+  bool isUnfinished = false;   ///< it had no time for the pair
+  bool yields = false;         ///< though it began with the pair: other pairs go first the next time
   CollisionData next;          ///< of the detection that runs
   bool sidesAreKnown = false;  ///< whether KnownSides changed the last answer
   bool byBodies = false;       ///< whether BodyContacts changed the last answer

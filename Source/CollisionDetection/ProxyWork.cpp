@@ -7,11 +7,12 @@
 
 namespace palpate {
 
-std::size_t ProxyWork::place() {
-  return m_proxyJobs.start(*m_record, m_record->proxy.get(), m_record->pair.settings.thickness);
+std::size_t ProxyWork::place(bool divides) {
+  return m_proxyJobs.start(*m_record, m_record->proxy.get(), m_record->pair.settings.thickness,
+                           divides);
 }
 
-std::size_t ProxyWork::start(const FrameStart&) { return place(); }
+std::size_t ProxyWork::start(const FrameStart& frame) { return place(frame.deadline != nullptr); }
 
 void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
@@ -21,7 +22,7 @@ void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
 }
 
 void ProxyWork::runByBruteForce(JobScratch& scratch) {
-  place();
+  place(false);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
   m_proxyJobs.findByBruteForce(scratch);

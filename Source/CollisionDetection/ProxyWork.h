@@ -19,7 +19,7 @@ class ProxyWork {
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  std::size_t place();
+  std::size_t place(bool divides);
 
   PairRecord* m_record;
   ProxyJobs m_proxyJobs;

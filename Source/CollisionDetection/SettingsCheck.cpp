@@ -100,7 +100,7 @@ class PairCheck {
 
   void range() const {
     const auto [method, thickness, contacts, rest, allowedError, freeReach, tracks, crossings,
-                continuous, automatic, proxy] = m_settings;
+                continuous, automatic, proxy, priority] = m_settings;
     const auto [timeTolerance, earliestTimeOnly] = continuous;
     const double motionTolerance = automatic.motionTolerance, normalCone = proxy.widestNormalCone;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);

@@ -45,7 +45,13 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
   }
   const MemoryScope memory(MemoryStage::NarrowPhase);
   Stopwatch watch;
-  findWithShape(record, scratch.elements, scratch.contacts.shapes);
+  const auto find = [&](std::span<const std::uint32_t> elements) {
+    findWithShape(record, elements, scratch.contacts.shapes);
+  };
+  if (record.plan.kind == PairKind::MeshAndShape)
+    forEachPart(scratch.deadline, std::span<const std::uint32_t>(scratch.elements), find);
+  else
+    find({});
   scratch.narrowMilliseconds += watch.lap();
   if (record.pair.settings.continuous.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
 }

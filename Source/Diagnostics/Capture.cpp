@@ -241,6 +241,7 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 12) file.real(pair.settings.freeMotionReach);
   if (version >= 13) fieldOf(file, pair.settings.trackContacts);
   if (version >= 13) fieldOf(file, pair.settings.reportCrossings);
+  if (version >= 14) file.integer(pair.settings.priority);
 }
 
 template <class File, class FilterType>

@@ -333,6 +333,8 @@ const char* toString(MethodReason value) noexcept {
       return "NoAlternative";
     case MethodReason::AllowedError:
       return "AllowedError";
+    case MethodReason::OutOfTime:
+      return "OutOfTime";
   }
   return kUnknown;
 }

@@ -117,6 +117,11 @@ ContactTracker::Vertices ContactTracker::verticesOf(const ContactKey& key,
 
 bool ContactTracker::startStep(std::uint64_t step, const Contents& last) {
   if (m_step == step) return false;
+  if (m_isDropped) {
+    m_isDropped = m_repeats = false;
+    m_step = step;
+    return true;
+  }
   m_step = kNoStep;
   m_before.clear();
   forEachTracked(last, [&](ContactKind, const auto& contacts, const auto& tracked) {
@@ -290,7 +295,7 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
                            const std::array<ElementsState, 2>& elements, const Contents& last,
                            Contents& next) {
   PALPATE_ASSERT(m_step != kNoStep);
-  m_keeps = false;
+  m_keeps = m_isDropped = false;
   m_elements = elements;
   match(next);
   for (Entry* entry : m_ended) entry->isPredecessor = false;
@@ -321,6 +326,19 @@ void ContactTracker::commit(Contents& kept) noexcept {
   });
   PALPATE_ASSERT(before == m_before.data() + m_before.size());
   kept.tracked.ended.clear();
+}
+
+void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) {
+  if (m_step != step) {
+    // Nothing slid or ended in this step.
+    forEachTracked(kept, [](ContactKind, const auto&, auto& tracked) {
+      for (TrackedContact& contact : tracked) contact.predecessor.reset();
+    });
+    kept.tracked.ended.clear();
+  }
+  if (!drops) return;
+  startStep(step, kept);
+  m_isDropped = true;
 }
 
 void ContactTracker::releaseMemory(Contents& contents) {

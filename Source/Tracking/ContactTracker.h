@@ -35,6 +35,10 @@ class ContactTracker : public CountedObject {
   void keep() { m_keeps = true; }
   bool keeps() const { return m_keeps; }
   void commit(Contents& kept) noexcept;
+  /// There is no answer in this step: `kept` is that of an earlier detection, whose contacts neither
+  /// grow older nor end. drops: it will be cleared, as its elements are no more. The next answer is
+  /// compared with it even so.
+  void skip(std::uint64_t step, bool drops, Contents& kept);
 
   void releaseMemory(Contents&);  ///< keeps what contacts have been
 
@@ -90,6 +94,7 @@ class ContactTracker : public CountedObject {
   bool m_beforeOfSecond = false;                              ///< Tracked::elementsOfSecond
   std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< of m_before; of the last answer
   bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
+  bool m_isDropped = false;                 ///< m_before is all that is left of the last answer
   Buffer<Entry*> m_ended;                   ///< of m_before: not in the answer at hand
   Buffer<Begun> m_begun;                    ///< in the answer at hand
   Buffer<std::uint32_t> m_heads;            ///< of lists in m_links

@@ -200,6 +200,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.method = byProxy ? Method::Proxy : plan.method;
   validity.reason = byProxy ? MethodReason::AllowedError : plan.reason;
   validity.displacement = plan.motion;
+  validity.age = 0;
   validity.effectiveThickness = byProxy ? plan.proxyThickness
                                 : plan.method == Method::Intersection
                                     ? 0.0

@@ -68,7 +68,8 @@ PairSettings pairSettingsOf(const palpate_pair_settings* settings) {
           .continuous = {.timeTolerance = s.time_tolerance,
                          .earliestTimeOnly = s.earliest_time_only != 0},
           .automatic = {.motionTolerance = s.motion_tolerance},
-          .proxy = {.widestNormalCone = s.widest_normal_cone}};
+          .proxy = {.widestNormalCone = s.widest_normal_cone},
+          .priority = s.priority};
 }
 
 palpate_pair_settings fromPairSettings(const PairSettings& s) {
@@ -82,6 +83,7 @@ palpate_pair_settings fromPairSettings(const PairSettings& s) {
           .widest_normal_cone = s.proxy.widestNormalCone,
           .method = static_cast<int>(s.method),
           .contacts = static_cast<int>(s.contacts),
+          .priority = s.priority,
           .earliest_time_only = s.continuous.earliestTimeOnly,
           .track_contacts = s.trackContacts,
           .report_crossings = s.reportCrossings};
@@ -397,6 +399,14 @@ palpate_status palpate_update(palpate_cd* cd) {
 }
 palpate_status palpate_detect(palpate_cd* cd) {
   return guarded(__func__, [&] { of(cd).detectCollision(); });
+}
+palpate_status palpate_detect_within(palpate_cd* cd, int64_t microseconds, uint8_t* complete) {
+  return guarded(__func__, [&] {
+    given(complete, "complete") = of(cd).detectCollision(std::chrono::microseconds(microseconds));
+  });
+}
+palpate_status palpate_cancel_detection(const palpate_cd* cd) {
+  return guarded(__func__, [&] { of(cd).cancelDetection(); });
 }
 palpate_status palpate_advance(palpate_cd* cd) {
   return guarded(__func__, [&] { of(cd).advance(); });

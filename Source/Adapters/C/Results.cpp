@@ -25,6 +25,7 @@ static_assert(PALPATE_REASON_MIXED == static_cast<int>(MethodReason::Mixed));
 static_assert(PALPATE_REASON_CHEAPEST == static_cast<int>(MethodReason::Cheapest));
 static_assert(PALPATE_REASON_NO_ALTERNATIVE == static_cast<int>(MethodReason::NoAlternative));
 static_assert(PALPATE_REASON_ALLOWED_ERROR == static_cast<int>(MethodReason::AllowedError));
+static_assert(PALPATE_REASON_OUT_OF_TIME == static_cast<int>(MethodReason::OutOfTime));
 
 static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactKind::TriangleVertex));
 static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactKind::EdgeEdge));
@@ -136,7 +137,8 @@ palpate_status palpate_get_validity(const palpate_cd* cd, palpate_id a, palpate_
                  .degenerate_triangles_b = indices(v.degenerateTrianglesB),
                  .outside_band = indices(v.outsideBand),
                  .near_threshold = indices(v.nearThreshold),
-                 .unreliable_sign = indices(v.unreliableSign)};
+                 .unreliable_sign = indices(v.unreliableSign),
+                 .age = v.age};
   });
 }
 palpate_status palpate_get_earliest_time(const palpate_cd* cd, palpate_id a, palpate_id b,
@@ -229,7 +231,17 @@ palpate_status palpate_get_statistics(const palpate_cd* cd, palpate_statistics* 
                    .exact_decisions = s.exactDecisions,
                    .validity_pairs = s.validityPairs,
                    .memory = fromTwin<palpate_memory>(s.memory),
-                   .peak_memory = fromTwin<palpate_memory>(s.peakMemory)};
+                   .peak_memory = fromTwin<palpate_memory>(s.peakMemory),
+                   .free_motion_unfinished = s.freeMotionUnfinished};
+  });
+}
+palpate_status palpate_get_unfinished_pairs(const palpate_cd* cd,
+                                            const palpate_unfinished_pair** pairs, size_t* count) {
+  return guarded(__func__, [&] {
+    given(pairs, "pairs"), given(count, "count");
+    const std::vector<UnfinishedPair>& all = of(cd).statistics().unfinishedPairs;
+    *pairs = fromTwins<palpate_unfinished_pair>(all.data());
+    *count = all.size();
   });
 }
 palpate_status palpate_get_pair_statistics(const palpate_cd* cd, palpate_id a, palpate_id b,

@@ -94,6 +94,12 @@ PALPATE_SAME(palpate_crossing, ids, Crossing, ids);
 PALPATE_SAME(palpate_crossing, time, Crossing, time);
 PALPATE_SAME(palpate_crossing, forward, Crossing, forward);
 
+PALPATE_TWIN(palpate_unfinished_pair, UnfinishedPair);
+PALPATE_SAME(palpate_unfinished_pair, a, UnfinishedPair, a);
+PALPATE_SAME(palpate_unfinished_pair, b, UnfinishedPair, b);
+PALPATE_SAME(palpate_unfinished_pair, distance_bound, UnfinishedPair, distanceBound);
+PALPATE_SAME(palpate_unfinished_pair, age, UnfinishedPair, age);
+
 PALPATE_TWIN(palpate_memory, MemoryUse);
 PALPATE_SAME(palpate_memory, geometries, MemoryUse, geometries);
 PALPATE_SAME(palpate_memory, octrees, MemoryUse, octrees);

@@ -98,7 +98,8 @@ inline constexpr auto kFields<PairSettings> = std::tuple(
     field("track_contacts", &PairSettings::trackContacts),
     field("report_crossings", &PairSettings::reportCrossings),
     field(
-        "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }));
+        "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }),
+    field("priority", &PairSettings::priority));
 template <>
 inline constexpr const char* kClass<SurfaceProxySettings> = "SurfaceProxySettings";
 template <>
@@ -136,6 +137,13 @@ inline constexpr auto kFields<FrameStatistics::Stages> =
                field("narrow_phase", &FrameStatistics::Stages::narrowPhase),
                field("order", &FrameStatistics::Stages::order));
 template <>
+inline constexpr const char* kClass<UnfinishedPair> = "UnfinishedPair";
+template <>
+inline constexpr auto kFields<UnfinishedPair> =
+    std::tuple(field("a", &UnfinishedPair::a), field("b", &UnfinishedPair::b),
+               field("distance_bound", &UnfinishedPair::distanceBound),
+               field("age", &UnfinishedPair::age));
+template <>
 inline constexpr const char* kClass<FrameStatistics> = "FrameStatistics";
 template <>
 inline constexpr auto kFields<FrameStatistics> = std::tuple(
@@ -153,7 +161,9 @@ inline constexpr auto kFields<FrameStatistics> = std::tuple(
     field("intersecting_triangles", &FrameStatistics::intersectingTriangles),
     field("exact_decisions", &FrameStatistics::exactDecisions),
     field("validity_pairs", &FrameStatistics::validityPairs),
-    field("memory", &FrameStatistics::memory), field("peak_memory", &FrameStatistics::peakMemory));
+    field("memory", &FrameStatistics::memory), field("peak_memory", &FrameStatistics::peakMemory),
+    field("unfinished_pairs", &FrameStatistics::unfinishedPairs),
+    field("free_motion_unfinished", &FrameStatistics::freeMotionUnfinished));
 template <>
 inline constexpr const char* kClass<PairStatistics> = "PairStatistics";
 template <>
@@ -190,7 +200,7 @@ inline constexpr auto kFields<Validity> = std::tuple(
     field("displacement_limit", &Validity::displacementLimit),
     field("arc_deviation", &Validity::arcDeviation),
     field("effective_thickness", &Validity::effectiveThickness),
-    field("proxy_depth", &Validity::proxyDepth),
+    field("proxy_depth", &Validity::proxyDepth), field("age", &Validity::age),
     field("untrusted_vertices_a", &Validity::untrustedVerticesA),
     field("untrusted_vertices_b", &Validity::untrustedVerticesB),
     field("degenerate_triangles_a", &Validity::degenerateTrianglesA),

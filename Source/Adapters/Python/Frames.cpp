@@ -3,9 +3,26 @@
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 
 namespace palpate::python {
+
+namespace {
+
+std::chrono::microseconds microsecondsOf(double seconds) {
+  if (std::isnan(seconds))
+    throw Error(ErrorCode::InvalidSettings, "budget is not a number; it must be in seconds");
+  constexpr double kMost = 1e9;
+  return std::chrono::microseconds(
+      static_cast<std::int64_t>(1e6 * std::clamp(seconds, -kMost, kMost)));
+}
+
+}  // namespace
 
 void addFrames(CollisionsClass& collisions) {
   collisions
@@ -17,10 +34,23 @@ void addFrames(CollisionsClass& collisions) {
           "update() -> None\n\nBrings octrees to the positions now. Others do so themselves.")
       .def(
           "detect_collision",
-          [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.detectCollision(); }); },
-          R"(detect_collision() -> None
+          [](Collisions& self, const std::optional<double>& budget) {
+            return self.work([&](OctreeBasedCD& d) {
+              if (budget) return d.detectCollision(microsecondsOf(*budget));
+              d.detectCollision();
+              return true;
+            });
+          },
+          py::arg("budget") = py::none(),
+          R"(detect_collision(budget=None) -> bool
 
-Finds the contacts of every pair; see collision_data(). Releases the GIL.)")
+Finds the contacts of every pair; see collision_data(). Releases the GIL.
+budget: seconds, after which pairs keep their last answer. Returns whether all were finished.)")
+      .def(
+          "cancel_detection", [](const Collisions& self) { self.detection.cancelDetection(); },
+          R"(cancel_detection() -> None
+
+Ends a detect_collision() with a budget that another thread runs.)")
       .def(
           "write_trace",
           [](Collisions& self, const std::filesystem::path& path) {

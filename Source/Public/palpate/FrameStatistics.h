@@ -1,6 +1,10 @@
 #pragma once
 
+#include <palpate/Types.h>
+
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 namespace palpate {
 
@@ -14,6 +18,16 @@ struct MemoryUse {
   std::size_t queries = 0;      ///< of SpatialQueries, also those of snapshots
   std::size_t snapshots = 0;    ///< published ones that somebody holds, and memory for the next
   std::size_t total = 0;
+};
+
+/// A pair for which a detection with a budget had no time.
+struct UnfinishedPair {
+  GeometryId a, b;
+  /// L: no features of the two are nearer now, less radii; by Continuous and Auto at no time of the
+  /// step. Proven from boxes around the geometries. 0: they may touch.
+  double distanceBound = 0.0;
+  std::uint32_t age = 0;  ///< Validity::age of the answer that the pair keeps
+  friend bool operator==(const UnfinishedPair&, const UnfinishedPair&) = default;
 };
 
 /// Of one detectCollision() with the updates before it, over all geometries and pairs.
@@ -43,6 +57,9 @@ struct FrameStatistics {
   std::size_t validityPairs = 0;          ///< tested for Validity::startedApart only
   MemoryUse memory;                       ///< at the frame's end
   MemoryUse peakMemory;                   ///< since the start or releaseMemory(), each at its time
+  std::vector<UnfinishedPair> unfinishedPairs;  ///< in the order of pairs()
+  /// The search for free motions had no time: OctreeBasedCD::freeMotion() follows from boxes.
+  bool freeMotionUnfinished = false;
 };
 
 /// Of the last detection. All but `contacts` are 0 for a pair whose answer still holds.

@@ -14,6 +14,7 @@
 
 #include <Eigen/Geometry>
 
+#include <chrono>
 #include <concepts>
 #include <cstddef>
 #include <filesystem>
@@ -195,6 +196,18 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          executor; InvalidSettings if run() returns too early; NotAvailable after fork() in a
   ///          task.
   void detectCollision();
+  /// The same within a budget of time, which begins with the call. Pairs go in this order: those
+  /// that were unfinished before, by age; higher PairSettings::priority; those with contacts in
+  /// their last answer, then those whose boxes are nearest, less the motion in the step. Pairs that
+  /// are not finished keep their last answer, and FrameStatistics::unfinishedPairs names them.
+  /// Returns   whether everything was finished.
+  /// Overrun   octrees are always updated; beyond that by one part of the work
+  ///           (Docs/HowTo/Deadlines.md).
+  bool detectCollision(std::chrono::microseconds budget);
+  /// Ends a detectCollision() with a budget that is running as if its time were over. Otherwise it
+  /// does nothing.
+  /// Threads  safe except during construction, destruction and a move.
+  void cancelDetection() const;
 
   /// Passes candidate pairs in batches to f(std::span<const ElementPair>): all pairs of enabled
   /// elements whose boxes overlap, and some more by rounding. Boxes are inflated by half of

@@ -149,6 +149,8 @@ struct PairSettings {
   ContinuousSettings continuous{};
   AutoSettings automatic{};
   LeafSettings proxy{};
+  /// detectCollision() with a budget begins with the pairs of the highest priority. Any number.
+  int priority = 0;
 };
 
 /// Leaves of OctreeBasedCD::attachSurfaceProxy().

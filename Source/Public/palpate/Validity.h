@@ -24,7 +24,9 @@ enum class MethodReason {
   /// else Proximity. One radius per vertex: Proximity, may miss impacts. A field: DistanceField.
   NoAlternative,
   /// An attached DistanceField or proxy within allowedError proves that nothing touched.
-  AllowedError
+  AllowedError,
+  /// The last detection had no time for the pair: this is the answer of an earlier one, or empty.
+  OutOfTime
 };
 PALPATE_EXPORT const char* toString(MethodReason) noexcept;  ///< its name, or "unknown"
 
@@ -72,6 +74,10 @@ struct Validity {
   double effectiveThickness = 0;
   /// L: Proxy does not report particles deeper in a closed mesh. 0 for other methods.
   double proxyDepth = 0;
+
+  /// Detections since the one that this answer is of, or the first one if it is empty for lack of
+  /// time. Above 0 `reason` is OutOfTime, and the answer is not trusted.
+  std::uint32_t age = 0;
 
   /// Vertices that make the answer untrusted, ascending. By Proximity and Intersection: the first
   /// kMaxFastVertices of each geometry with a relative motion above `displacementLimit`; by

@@ -117,6 +117,7 @@ typedef struct palpate_pair_settings {
   double widest_normal_cone;  ///< rad, of LeafSettings
   int method;
   int contacts;
+  int priority;
   uint8_t earliest_time_only;
   uint8_t track_contacts, report_crossings;
 } palpate_pair_settings;
@@ -341,6 +342,11 @@ PALPATE_EXPORT palpate_status palpate_get_candidates(palpate_cd* cd, palpate_id 
 
 PALPATE_EXPORT palpate_status palpate_update(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_detect(palpate_cd* cd);
+/// complete: whether everything was finished.
+PALPATE_EXPORT palpate_status palpate_detect_within(palpate_cd* cd, int64_t microseconds,
+                                                    uint8_t* complete);
+/// Ends the palpate_detect_within() of another thread.
+PALPATE_EXPORT palpate_status palpate_cancel_detection(const palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_advance(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_release_memory(palpate_cd* cd);
 /// Writes the problem of the next detection to a file, which readCapture() of C++ reads.
@@ -430,7 +436,8 @@ enum {
   PALPATE_REASON_MIXED,
   PALPATE_REASON_CHEAPEST,
   PALPATE_REASON_NO_ALTERNATIVE,
-  PALPATE_REASON_ALLOWED_ERROR
+  PALPATE_REASON_ALLOWED_ERROR,
+  PALPATE_REASON_OUT_OF_TIME
 };  ///< MethodReason
 
 /// <palpate/Validity.h>
@@ -443,6 +450,7 @@ typedef struct palpate_validity {
   palpate_indices untrusted_vertices_a, untrusted_vertices_b;
   palpate_indices degenerate_triangles_a, degenerate_triangles_b;
   palpate_indices outside_band, near_threshold, unreliable_sign;
+  uint32_t age;  ///< in detections
 } palpate_validity;
 
 /// Set the size of `contacts` first. (a, b) is in the order of palpate_add_pair().
@@ -526,7 +534,14 @@ typedef struct palpate_statistics {
   size_t candidate_pairs, feature_pairs, contacts, intersecting_triangles, exact_decisions;
   size_t validity_pairs;
   palpate_memory memory, peak_memory;
+  uint8_t free_motion_unfinished;
 } palpate_statistics;
+
+typedef struct palpate_unfinished_pair {
+  palpate_id a, b;
+  double distance_bound;  ///< L
+  uint32_t age;           ///< in detections
+} palpate_unfinished_pair;
 
 typedef struct palpate_pair_statistics {
   size_t size;
@@ -537,6 +552,10 @@ typedef struct palpate_pair_statistics {
 /// Set the size of `statistics` first.
 PALPATE_EXPORT palpate_status palpate_get_statistics(const palpate_cd* cd,
                                                      palpate_statistics* statistics);
+/// A view of the pairs for which the last detection had no time.
+PALPATE_EXPORT palpate_status palpate_get_unfinished_pairs(const palpate_cd* cd,
+                                                           const palpate_unfinished_pair** pairs,
+                                                           size_t* count);
 /// Set the size of `statistics` first.
 PALPATE_EXPORT palpate_status palpate_get_pair_statistics(const palpate_cd* cd, palpate_id a,
                                                           palpate_id b,

@@ -92,6 +92,7 @@ from palpate._results import (
     SolverVertices,
     Stencils,
     TetrahedralSurface,
+    UnfinishedPair,
     Validity,
     Welded,
 )
@@ -191,6 +192,7 @@ __all__ = [
     "SurfaceProxySettings",
     "TetrahedralSurface",
     "TriangleFeature",
+    "UnfinishedPair",
     "Validity",
     "Welded",
     "add",

@@ -182,6 +182,7 @@ class MethodReason(_Named):
     CHEAPEST = 5
     NO_ALTERNATIVE = 6
     ALLOWED_ERROR = 7
+    OUT_OF_TIME = 8
 
 
 class InsideRule(_Named):

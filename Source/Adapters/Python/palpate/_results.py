@@ -258,6 +258,20 @@ class FrameStages:
 
 
 @dataclass(frozen=True, kw_only=True)
+class UnfinishedPair:
+    """A pair for which detect_collision() with a budget had no time.
+
+    distance_bound  L: features of the two are proven not to be nearer
+    age             that of the answer which the pair keeps, in detections
+    """
+
+    a: int
+    b: int
+    distance_bound: float
+    age: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class FrameStatistics:
     """Times and counts of one frame, over all geometries and pairs."""
 
@@ -278,6 +292,8 @@ class FrameStatistics:
     validity_pairs: int
     memory: MemoryUse
     peak_memory: MemoryUse
+    unfinished_pairs: list[UnfinishedPair]
+    free_motion_unfinished: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -329,6 +345,7 @@ class Validity:
     arc_deviation: float = 0.0
     effective_thickness: float = 0.0
     proxy_depth: float = 0.0
+    age: int = 0
     untrusted_vertices_a: list[int]
     untrusted_vertices_b: list[int]
     degenerate_triangles_a: list[int]

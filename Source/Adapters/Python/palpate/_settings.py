@@ -113,6 +113,7 @@ class PairSettings:
     track_contacts      contacts have an identity: CollisionData.tracked_vertex_triangle and so on
     report_crossings    Continuous only: CollisionData.crossings
     widest_normal_cone  rad, in (0, 1.5], Proxy only
+    priority            detect_collision() with a budget begins with pairs of the highest priority
     """
 
     method: Method | MethodName = Method.AUTO
@@ -127,6 +128,7 @@ class PairSettings:
     track_contacts: bool = False
     report_crossings: bool = False
     widest_normal_cone: float = 0.25
+    priority: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "method", parse(Method, self.method))

@@ -1,0 +1,126 @@
+#include "CollisionDetection/PairOrder.h"
+
+#include "DistanceField/FieldContacts.h"
+#include "Math/Tolerances.h"
+#include "Core/Assert.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <tuple>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+
+AlignedBox3d grown(const AlignedBox3d& box, double distance) {
+  const Vector3d margin = Vector3d::Constant(distance);
+  return box.isEmpty() ? box : AlignedBox3d(box.min() - margin, box.max() + margin);
+}
+
+/// The points of a shape, but a plane, are within its radius of its corners' hull. Corners move
+/// linearly.
+AlignedBox3d boxOf(const Shape& shape) {
+  PALPATE_ASSERT(!shape.isPlane() && !shape.corners().empty());
+  AlignedBox3d box;
+  for (const Vector3d& corner : shape.corners()) box.extend(corner);
+  return grown(box, shape.radius());
+}
+
+AlignedBox3d boxOf(const Positions& end) {
+  const AlignedBox3d& box = end.bounds();
+  if (box.isEmpty() || !end.isPlaced()) return box;
+  const Vector3d centre = end.transform()(box.center()),
+                 half = end.transform().rotation.cwiseAbs() * (0.5 * box.sizes());
+  return {centre - half, centre + half};
+}
+
+AlignedBox3d boxOf(const Body& body, bool ofStep) {
+  const TriangleMesh& mesh = body.mesh;
+  const auto atEnd = [&](const Positions& end, const Shape* shape) {
+    return shape ? boxOf(*shape)
+           : body.isField() ? PlacedField(*body.field, end).domain()
+                            : grown(boxOf(end), mesh.largestRadius);
+  };
+  AlignedBox3d box = atEnd(mesh.now, body.shape ? &body.shape->now : nullptr);
+  if (ofStep) box.extend(atEnd(mesh.before, body.shape ? &body.shape->before : nullptr));
+  return box;
+}
+
+/// L: the largest coordinate.
+double largestOf(const AlignedBox3d& box) {
+  return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+}
+
+/// L, signed: of a box from a half-space.
+double heightOver(const Shape& plane, const AlignedBox3d& box) {
+  const Vector3d normal = plane.axes().col(2);
+  const double centre = normal.dot(box.center() - plane.origin()),
+               half = normal.cwiseAbs().dot(0.5 * box.sizes());
+  return (plane.isTwoSided() ? std::abs(centre) : centre) - half;
+}
+
+/// L: of a box, which encloses the step, from a plane. A plane that turns has no bound.
+double distanceFrom(const PlacedShape& plane, const AlignedBox3d& box, bool ofStep) {
+  const double now = heightOver(plane.now, box);
+  if (!ofStep) return now;
+  const Vector3d turned = plane.now.axes().col(2) - plane.before.axes().col(2),
+                 moved = plane.now.origin() - plane.before.origin();
+  if (!turned.isZero(0.0)) return 0.0;
+  // A plane of two sides may pass through the box.
+  if (plane.now.isTwoSided()) return now - std::abs(plane.now.axes().col(2).dot(moved));
+  return std::min(now, heightOver(plane.before, box));
+}
+
+double distanceOf(const AlignedBox3d& a, const AlignedBox3d& b) {
+  const Vector3d gap =
+      (a.min() - b.max()).cwiseMax(b.min() - a.max()).cwiseMax(Vector3d::Zero());
+  return gap.stableNorm();
+}
+
+}  // namespace
+
+double distanceBoundOf(const PairRecord& record) {
+  const Body &a = record.a->body, &b = record.b->body;
+  const Method method = record.pair.settings.method;
+  const bool ofStep = method == Method::Continuous || method == Method::Auto;
+  if (&a == &b) return 0.0;
+  const auto isPlane = [](const Body& body) { return body.shape && body.shape->now.isPlane(); };
+  const Body *plane = isPlane(a) ? &a : isPlane(b) ? &b : nullptr, *other = plane == &a ? &b : &a;
+  if (plane && isPlane(*other)) return 0.0;
+  const AlignedBox3d box = boxOf(*other, ofStep);
+  if (box.isEmpty()) return std::numeric_limits<double>::infinity();
+  double distance = 0.0, size = largestOf(box);
+  if (plane) {
+    distance = distanceFrom(*plane->shape, box, ofStep);
+    size += plane->shape->now.magnitude() + plane->shape->before.magnitude();
+  } else {
+    const AlignedBox3d ofB = boxOf(b, ofStep);
+    if (ofB.isEmpty()) return std::numeric_limits<double>::infinity();
+    distance = distanceOf(box, ofB);
+    size += largestOf(ofB);
+  }
+  return std::max(0.0, distance - 2.0 * kShapeBoundError * size);
+}
+
+void orderByUrgency(std::span<PairRecord*> records) {
+  for (PairRecord* record : records) record->distanceBound = distanceBoundOf(*record);
+  const auto rank = [](const PairRecord& record) {
+    const Validity& last = record.data.validity();
+    const std::int64_t age = record.yields ? 0 : last.age,
+                       priority = record.pair.settings.priority;
+    const bool isApart =
+        last.atEnd + last.atImpact == 0 && record.data.intersectingTriangles().empty();
+    const double distance = std::min(record.distanceBound, std::numeric_limits<double>::max());
+    return std::tuple(-age, -priority, isApart, distance - record.plan.motion, record.index);
+  };
+  std::sort(records.begin(), records.end(), [&](const PairRecord* l, const PairRecord* r) {
+    return rank(*l) < rank(*r);
+  });
+}
+
+}  // namespace palpate

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+
+namespace palpate {
+
+/// Thrown where work ends because its time is over.
+struct OutOfTime {};
+
+/// The end of a detection's budget, or an earlier cancel. Once it is over, it stays over. Any
+/// thread may ask.
+class Deadline {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  using Clock = std::function<Time()>;
+
+  /// clock: of tests; empty: the system's.
+  Deadline(Time end, const std::atomic<bool>& isCancelled, const Clock& clock)
+      : m_end(end), m_isCancelled(&isCancelled), m_clock(&clock) {}
+
+  bool isOver() const {
+    if (m_isOver.load(std::memory_order_relaxed)) return true;
+    if (!m_isCancelled->load(std::memory_order_relaxed) && now() < m_end) return false;
+    m_isOver.store(true, std::memory_order_relaxed);
+    return true;
+  }
+
+  /// The present time, and the time that lies a budget after it.
+  static Time now(const Clock& clock) { return clock ? clock() : std::chrono::steady_clock::now(); }
+  static Time after(Time start, std::chrono::microseconds budget) {
+    return budget < Time::max() - start ? start + budget : Time::max();
+  }
+
+ private:
+  Time now() const { return now(*m_clock); }
+
+  Time m_end;
+  const std::atomic<bool>* m_isCancelled;
+  const Clock* m_clock;
+  mutable std::atomic<bool> m_isOver{false};
+};
+
+/// Throws OutOfTime if there is a deadline that is over.
+inline void checkTime(const Deadline* deadline) {
+  if (deadline && deadline->isOver()) throw OutOfTime();
+}
+
+/// Calls use(part) for the items in order: for all at once, or with a deadline for few at a time,
+/// after checkTime(). use: its result must not depend on how items are divided.
+template <class Span, class Use>
+void forEachPart(const Deadline* deadline, const Span& items, Use&& use) {
+  constexpr std::size_t kPart = 64;  // takes some microseconds
+  if (!deadline) return use(items);
+  for (std::size_t begin = 0; begin < items.size(); begin += kPart) {
+    checkTime(deadline);
+    use(items.subspan(begin, begin + kPart < items.size() ? kPart : items.size() - begin));
+  }
+}
+
+}  // namespace palpate
