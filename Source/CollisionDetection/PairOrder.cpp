@@ -56,24 +56,16 @@ double largestOf(const AlignedBox3d& box) {
   return std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
 }
 
-/// L, signed: of a box from a half-space.
-double heightOver(const Shape& plane, const AlignedBox3d& box) {
-  const Vector3d normal = plane.axes().col(2);
-  const double centre = normal.dot(box.center() - plane.origin()),
-               half = normal.cwiseAbs().dot(0.5 * box.sizes());
-  return (plane.isTwoSided() ? std::abs(centre) : centre) - half;
-}
-
 /// L: of a box, which encloses the step, from a plane. A plane that turns has no bound.
 double distanceFrom(const PlacedShape& plane, const AlignedBox3d& box, bool ofStep) {
-  const double now = heightOver(plane.now, box);
-  if (!ofStep) return now;
-  const Vector3d turned = plane.now.axes().col(2) - plane.before.axes().col(2),
-                 moved = plane.now.origin() - plane.before.origin();
-  if (!turned.isZero(0.0)) return 0.0;
-  // A plane of two sides may pass through the box.
-  if (plane.now.isTwoSided()) return now - std::abs(plane.now.axes().col(2).dot(moved));
-  return std::min(now, heightOver(plane.before, box));
+  const Shape &start = ofStep ? plane.before : plane.now, &end = plane.now;
+  const Vector3d normal = end.axes().col(2);
+  if (normal != start.axes().col(2)) return 0.0;
+  const double half = normal.cwiseAbs().dot(0.5 * box.sizes()),
+               atStart = normal.dot(box.center() - start.origin()),
+               atEnd = normal.dot(box.center() - end.origin());
+  const double least = std::min(atStart, atEnd), most = std::max(atStart, atEnd);
+  return (end.isTwoSided() && most < 0.0 ? -most : least) - half;
 }
 
 double distanceOf(const AlignedBox3d& a, const AlignedBox3d& b) {

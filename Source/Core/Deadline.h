@@ -1,7 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 
 namespace palpate {
@@ -27,10 +29,11 @@ class Deadline {
     return true;
   }
 
-  /// The present time, and the time that lies a budget after it.
   static Time now(const Clock& clock) { return clock ? clock() : std::chrono::steady_clock::now(); }
   static Time after(Time start, std::chrono::microseconds budget) {
-    return budget < Time::max() - start ? start + budget : Time::max();
+    using std::chrono::microseconds;
+    const auto most = std::chrono::duration_cast<microseconds>(Time::max() - start);
+    return start + std::clamp(budget, microseconds(0), most);
   }
 
  private:

@@ -100,6 +100,7 @@ class World {
       for (std::size_t i = 0; i < m_bodies.size(); ++i)
         for (std::size_t j = 0; j < m_bodies.size() && left > 0; ++j)
           if ((7 * i + 3 * j + number) % 3 == 0 && answers(row, m_bodies[i], m_bodies[j]) &&
+              (row.kind != PairKind::Proxy || m_bodies[j].name.starts_with("placed")) &&
               add(i, j, row, number))
             --left, ++number;
     }
@@ -172,22 +173,23 @@ std::size_t expectAnswers(OctreeBasedCD& found, const std::vector<Answer>& befor
     if (newStep)
       for (TrackedContact& contact : tracked) contact.predecessor.reset();
     EXPECT_EQ(now.tracked, tracked);
-    if (newStep)
-      EXPECT_TRUE(now.ended.empty());
-    else
-      EXPECT_EQ(now.ended, before[i].ended);
+    EXPECT_EQ(now.ended, newStep ? std::vector<TrackedContact>() : before[i].ended);
   }
   return found.statistics().unfinishedPairs.size();
 }
 
 void expectFreeMotions(const World& world, OctreeBasedCD& found, OctreeBasedCD& complete) {
-  const bool isComplete = !found.statistics().freeMotionUnfinished;
+  const FrameStatistics& statistics = found.statistics();
+  const bool isComplete =
+      statistics.unfinishedPairs.empty() && !statistics.freeMotionUnfinished;
   for (const GeometryId id : world.ids()) {
     const auto now = found.freeMotion(id), exact = complete.freeMotion(id);
     ASSERT_EQ(now.size(), exact.size());
     for (std::size_t v = 0; v < now.size(); ++v) {
       EXPECT_LE(now[v], exact[v] * (1 + 1e-12));
-      if (isComplete && found.statistics().unfinishedPairs.empty()) EXPECT_EQ(now[v], exact[v]);
+      if (isComplete) {
+        EXPECT_EQ(now[v], exact[v]);
+      }
     }
   }
 }
@@ -215,9 +217,8 @@ TEST_P(DeadlineWith, EveryPlaceOfStopping) {
   EXPECT_GT(contactsOf(truth), 100u);
   bool isComplete = false;
   std::size_t stops = 0, seenPartly = 0;
-  const std::size_t stride = settings.engine == Engine::BruteForce ? 7 : 1;
   std::size_t number = 1;
-  for (std::int64_t budget = 0; !isComplete; budget += static_cast<std::int64_t>(stride)) {
+  for (std::int64_t budget = 0; !isComplete; ++budget) {
     SCOPED_TRACE("budget " + std::to_string(budget));
     step(number++);
     const std::vector<Answer> before = answersOf(found);
@@ -290,7 +291,7 @@ struct Row {
     const Mesh cube = testing::cube(-0.5, 0.5);
     for (std::size_t i = 0; i < count; ++i) {
       meshes.push_back(cube);
-      for (Vector3d& x : meshes.back().positions) x[0] += 1.01 * static_cast<double>(i);
+      for (Vector3d& x : meshes.back().positions) x[0] += 1.015625 * static_cast<double>(i);
       ids.push_back(addMesh(collisions, meshes.back()));
       if (i > 0) collisions.addCollisionPair(ids[i - 1], ids[i], pair);
     }
@@ -346,7 +347,9 @@ TEST(Deadline, ContactsAndNearPairsComeFirst) {
   Row row(5, kTouching, {.threads = 1});
   row.move(4, {0.5, 0, 0});  // further from 3
   row.move(0, {-0.2, 0, 0});
-  EXPECT_EQ(row.order(), (std::vector{row.ids[1], row.ids[2], row.ids[0], row.ids[3]}));
+  std::vector<GeometryId> order = row.order();
+  std::sort(order.begin(), order.begin() + 2);  // they are as near
+  EXPECT_EQ(order, (std::vector{row.ids[1], row.ids[2], row.ids[0], row.ids[3]}));
 }
 
 /// A pair that takes more than the budget does not keep the others from being finished.
@@ -391,8 +394,7 @@ TEST(Deadline, DistanceBoundsHold) {
   for (std::size_t i = 0; i < bodies.size(); ++i)
     for (std::size_t j = i; j < bodies.size(); ++j) {
       const StepBody &a = bodies[i], &b = bodies[j];
-      const bool moves = !b.before.empty() && i != j && !b.name.starts_with("placed");
-      // Moved away by half a unit, or as they are.
+      const bool moves = i != j && !b.name.starts_with("placed");
       for (const double away : {0.0, 0.9, 2.0}) {
         if (away > 0.0 && !moves) continue;
         for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
@@ -406,7 +408,11 @@ TEST(Deadline, DistanceBoundsHold) {
           if (i != j) b.move(collisions, second);
           Positions before = b.before, now = b.now;
           const Vector3d shift = away * Vector3d(0.6, 0.5, 0.7);
-          if (moves) {
+          if (moves && before.empty()) {
+            Pose end = collisions.transform(second);
+            end.translation += shift;
+            collisions.setTransform(second, {Eigen::Matrix3d::Identity(), shift}, end);
+          } else if (moves) {
             for (Vector3d& x : before) x += shift;
             for (Vector3d& x : now) x += shift;
             collisions.setPositions(second, before, now);
@@ -434,7 +440,8 @@ TEST(Deadline, DistanceBoundsHold) {
                                    const Positions& from, const Positions& to) {
               if (body.before.empty()) {
                 Pose pose = collisions.transform(moved);
-                pose.translation *= time;
+                const Vector3d start = moved == second && moves ? shift : Vector3d::Zero();
+                pose.translation = start + time * (pose.translation - start);
                 return probe.setTransform(id, pose);
               }
               Positions between(from.size());
@@ -448,7 +455,9 @@ TEST(Deadline, DistanceBoundsHold) {
             const CollisionData& data = probe.collisionData(ids[0], ids[1]);
             nearest += !data.shape().empty() || !data.shapeShape().empty() ||
                        Rows(data).contacts() > 0;
-            forEachContact(data, [&](const auto& contact) { EXPECT_GE(contact.distance, bound); });
+            forEachContact(data, [&](const auto& contact) {
+              EXPECT_GE(std::max(0.0, contact.distance), bound);
+            });
           }
         }
       }
