@@ -85,7 +85,8 @@ void Frame::runRounds(const Threads& threads, const Deadline* deadline, Trace* t
     bool any = false;
     for (Pair& pair : m_pairs) {
       for (const auto& job : jobsOf(pair)) pair.isOutOfTime |= job->isOutOfTime;
-      pair.runs = !pair.isOutOfTime && std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
+      pair.runs = !pair.isOutOfTime &&
+                  std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
                              pair.work);
       any |= pair.runs;
     }
@@ -188,13 +189,13 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
     PairRecord& record = *pair.record;
     const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
     if (!pair.isOutOfTime) try {
-      checkTime(&deadline);
-      join(pair, {threads, Engine::Octree, statistics, m_results, &deadline});
-      checkTime(&deadline);
-      record.track(step);
-      record.isUnfinished = false;
-    } catch (const OutOfTime&) {
-    }
+        checkTime(&deadline);
+        join(pair, {threads, Engine::Octree, statistics, m_results, &deadline});
+        checkTime(&deadline);
+        record.track(step);
+        record.isUnfinished = false;
+      } catch (const OutOfTime&) {
+      }
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
     statistics.milliseconds.order += spent;

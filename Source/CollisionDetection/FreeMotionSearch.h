@@ -25,8 +25,9 @@ namespace palpate {
 class FreeMotionSearch {
  public:
   /// Writes Geometry::nextFreeMotion, unless nothing changed since the last commit(). The octrees
-  /// must be up to date. Returns whether the search was completed. If its time is over, free motions
-  /// follow from PairRecord::distanceBound, also those of geometries with an unfinished pair.
+  /// must be up to date. Returns whether the search was completed. If its time is over, free
+  /// motions follow from PairRecord::distanceBound, also those of geometries with an unfinished
+  /// pair.
   bool find(const GeometryTable&, const PairTable&, Engine, const Threads&,
             const Deadline* = nullptr);
   /// Makes what find() wrote the result.

@@ -227,9 +227,8 @@ void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> re
                                                  const Deadline* deadline, FrameStatistics& next,
                                                  Trace* traced) {
   if (!deadline)
-    return settings.engine == Engine::Octree
-               ? frame.detect(records, threads, next, traced)
-               : frame.detectByBruteForce(records, next, traced);
+    return settings.engine == Engine::Octree ? frame.detect(records, threads, next, traced)
+                                             : frame.detectByBruteForce(records, next, traced);
   const auto end = std::find_if(records.begin(), records.end(),
                                 [](const PairRecord* record) { return record->isUnfinished; });
   const auto prepared = records.first(static_cast<std::size_t>(end - records.begin()));
@@ -257,8 +256,8 @@ void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> 
   next.unfinishedPairs.clear();
   for (const auto& record : pairs.records())
     if (record->isUnfinished)
-      next.unfinishedPairs.push_back({record->pair.a, record->pair.b, record->distanceBound,
-                                      record->data.validity().age});
+      next.unfinishedPairs.push_back(
+          {record->pair.a, record->pair.b, record->distanceBound, record->data.validity().age});
 }
 
 bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {

@@ -42,7 +42,7 @@ AlignedBox3d boxOf(const Positions& end) {
 AlignedBox3d boxOf(const Body& body, bool ofStep) {
   const TriangleMesh& mesh = body.mesh;
   const auto atEnd = [&](const Positions& end, const Shape* shape) {
-    return shape ? boxOf(*shape)
+    return shape            ? boxOf(*shape)
            : body.isField() ? PlacedField(*body.field, end).domain()
                             : grown(boxOf(end), mesh.largestRadius);
   };
@@ -69,8 +69,7 @@ double distanceFrom(const PlacedShape& plane, const AlignedBox3d& box, bool ofSt
 }
 
 double distanceOf(const AlignedBox3d& a, const AlignedBox3d& b) {
-  const Vector3d gap =
-      (a.min() - b.max()).cwiseMax(b.min() - a.max()).cwiseMax(Vector3d::Zero());
+  const Vector3d gap = (a.min() - b.max()).cwiseMax(b.min() - a.max()).cwiseMax(Vector3d::Zero());
   return gap.stableNorm();
 }
 
@@ -103,16 +102,14 @@ void orderByUrgency(std::span<PairRecord*> records) {
   for (PairRecord* record : records) record->distanceBound = distanceBoundOf(*record);
   const auto rank = [](const PairRecord& record) {
     const Validity& last = record.data.validity();
-    const std::int64_t age = record.yields ? 0 : last.age,
-                       priority = record.pair.settings.priority;
+    const std::int64_t age = record.yields ? 0 : last.age, priority = record.pair.settings.priority;
     const bool isApart =
         last.atEnd + last.atImpact == 0 && record.data.intersectingTriangles().empty();
     const double distance = std::min(record.distanceBound, std::numeric_limits<double>::max());
     return std::tuple(-age, -priority, isApart, distance - record.plan.motion, record.index);
   };
-  std::sort(records.begin(), records.end(), [&](const PairRecord* l, const PairRecord* r) {
-    return rank(*l) < rank(*r);
-  });
+  std::sort(records.begin(), records.end(),
+            [&](const PairRecord* l, const PairRecord* r) { return rank(*l) < rank(*r); });
 }
 
 }  // namespace palpate

@@ -126,13 +126,13 @@ struct PairRecord : CountedObject {
   Revision settingsRevision;
   CollisionData data;  ///< of the last detection that was completed
   Derived dataVersion;
-  bool hasData = false;        ///< a detection was completed
+  bool hasData = false;                    ///< a detection was completed
   std::array<Revision, 2> dataTopologies;  ///< of a and b in `data`
   // Of a detection with a budget:
   double distanceBound = 0.0;  ///< L: distanceBoundOf()
   bool isUnfinished = false;   ///< it had no time for the pair
-  bool yields = false;         ///< though it began with the pair: other pairs go first the next time
-  CollisionData next;          ///< of the detection that runs
+  bool yields = false;  ///< though it began with the pair: other pairs go first the next time
+  CollisionData next;   ///< of the detection that runs
   bool sidesAreKnown = false;  ///< whether KnownSides changed the last answer
   bool byBodies = false;       ///< whether BodyContacts changed the last answer
   std::atomic<double>

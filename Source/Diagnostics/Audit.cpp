@@ -342,8 +342,8 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
     // Brute force over features does not reproduce proxies, whose contacts have an error, nor
     // what bodies tell about contacts.
     // The answer of an unfinished pair is of an earlier state.
-    if (!pair->collides() || pair->isUnfinished || pair->byBodies || pair->plan.kind == PairKind::Proxy ||
-        pair->plan.kind == PairKind::AttachedProxy)
+    if (!pair->collides() || pair->isUnfinished || pair->byBodies ||
+        pair->plan.kind == PairKind::Proxy || pair->plan.kind == PairKind::AttachedProxy)
       continue;
     const std::size_t first = failures.size();
     audit(*pair, pair->data, settings.audit, record.frame, failures);

@@ -35,9 +35,9 @@ class ContactTracker : public CountedObject {
   void keep() { m_keeps = true; }
   bool keeps() const { return m_keeps; }
   void commit(Contents& kept) noexcept;
-  /// There is no answer in this step: `kept` is that of an earlier detection, whose contacts neither
-  /// grow older nor end. drops: it will be cleared, as its elements are no more. The next answer is
-  /// compared with it even so.
+  /// There is no answer in this step: `kept` is that of an earlier detection, whose contacts
+  /// neither grow older nor end. drops: it will be cleared, as its elements are no more. The next
+  /// answer is compared with it even so.
   void skip(std::uint64_t step, bool drops, Contents& kept);
 
   void releaseMemory(Contents&);  ///< keeps what contacts have been

@@ -139,10 +139,9 @@ inline constexpr auto kFields<FrameStatistics::Stages> =
 template <>
 inline constexpr const char* kClass<UnfinishedPair> = "UnfinishedPair";
 template <>
-inline constexpr auto kFields<UnfinishedPair> =
-    std::tuple(field("a", &UnfinishedPair::a), field("b", &UnfinishedPair::b),
-               field("distance_bound", &UnfinishedPair::distanceBound),
-               field("age", &UnfinishedPair::age));
+inline constexpr auto kFields<UnfinishedPair> = std::tuple(
+    field("a", &UnfinishedPair::a), field("b", &UnfinishedPair::b),
+    field("distance_bound", &UnfinishedPair::distanceBound), field("age", &UnfinishedPair::age));
 template <>
 inline constexpr const char* kClass<FrameStatistics> = "FrameStatistics";
 template <>

@@ -180,8 +180,7 @@ std::size_t expectAnswers(OctreeBasedCD& found, const std::vector<Answer>& befor
 
 void expectFreeMotions(const World& world, OctreeBasedCD& found, OctreeBasedCD& complete) {
   const FrameStatistics& statistics = found.statistics();
-  const bool isComplete =
-      statistics.unfinishedPairs.empty() && !statistics.freeMotionUnfinished;
+  const bool isComplete = statistics.unfinishedPairs.empty() && !statistics.freeMotionUnfinished;
   for (const GeometryId id : world.ids()) {
     const auto now = found.freeMotion(id), exact = complete.freeMotion(id);
     ASSERT_EQ(now.size(), exact.size());
@@ -334,7 +333,7 @@ TEST(Deadline, PrioritiesDecideTheOrder) {
   Row row(5, kTouching, {.threads = 1});
   for (std::size_t i = 0; i < 4; ++i) {
     PairSettings pair = kTouching;
-    pair.priority = i == 2 ? std::numeric_limits<int>::max()
+    pair.priority = i == 2   ? std::numeric_limits<int>::max()
                     : i == 0 ? std::numeric_limits<int>::min()
                              : static_cast<int>(i);
     row.collisions.setPairSettings(row.ids[i], row.ids[i + 1], pair);
@@ -453,8 +452,8 @@ TEST(Deadline, DistanceBoundsHold) {
             place(b, ids[1], second, before, now);
             probe.detectCollision();
             const CollisionData& data = probe.collisionData(ids[0], ids[1]);
-            nearest += !data.shape().empty() || !data.shapeShape().empty() ||
-                       Rows(data).contacts() > 0;
+            nearest +=
+                !data.shape().empty() || !data.shapeShape().empty() || Rows(data).contacts() > 0;
             forEachContact(data, [&](const auto& contact) {
               EXPECT_GE(std::max(0.0, contact.distance), bound);
             });
@@ -474,8 +473,8 @@ TEST(Deadline, DistanceBoundsOfPlanes) {
     for (const double lift : {0.0, 1.0, 5.0}) {
       OctreeBasedCD collisions({.threads = 1});
       const GeometryId mesh = addMesh(collisions, cube),
-                       plane = collisions.addAnalyticalGeometry(
-                           Plane{{0, 0, 0}, {0, 0, 1}, twoSided});
+                       plane =
+                           collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, 1}, twoSided});
       collisions.addCollisionPair(mesh, plane, {.method = Method::Continuous, .thickness = 0.1});
       collisions.setTransform(plane, {}, {Eigen::Matrix3d::Identity(), {0, 0, lift}});
       collisions.detectCollision(microseconds(0));
