@@ -386,11 +386,11 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
   octreeMilliseconds += watch.lap();
 }
 
-const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
-                                                  const Threads& threads) {
+const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh, const Threads& threads,
+                                                  const Deadline* deadline) {
   PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.count());
   const MemoryScope memory(MemoryStage::Octrees);
-  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
+  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads, deadline);
   return m_stars.triangles();
 }
 

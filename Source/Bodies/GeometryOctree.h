@@ -11,6 +11,7 @@
 #include "Mesh/UnfoldedStars.h"
 #include "Core/ReusableMemory.h"
 #include "Core/Buffer.h"
+#include "Core/Deadline.h"
 #include "Core/Threads.h"
 
 #include <cstdint>
@@ -64,7 +65,7 @@ class GeometryOctree {
   void updateDops(const TriangleMesh&, OctreeBounds, const Threads&);
   /// For self-collision: finds neighbouring triangles that certainly meet nowhere but in common
   /// vertices and edges. Returns UnfoldedStars::triangles().
-  const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
+  const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&, const Deadline*);
 
   /// Becomes a copy of an octree that isValid(), for queries only. All copies in one object must be
   /// of one octree; only what changed since the last copy is copied.

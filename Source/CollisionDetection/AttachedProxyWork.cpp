@@ -110,7 +110,7 @@ void AttachedProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
   const bool continuous = record.plan.method == Method::Continuous;
-  results.start(jobs);
+  results.start(jobs, join.deadline);
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);

@@ -153,8 +153,9 @@ bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buf
 }  // namespace
 
 bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
-                        Buffers local, Buffers step) {
+                        Buffers local, Buffers step, const Deadline* deadline) {
   PointQueryStack& stack = m_scratch.pair.stack;
+  stack.deadline = deadline;
   m_hasTurned = false;
   stack.exactDecisions = 0;
   m_contacts.clear();

@@ -73,7 +73,7 @@ void FieldWork::runByBruteForce(JobScratch& scratch) const {
 void FieldWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
-  results.start(jobs);
+  results.start(jobs, join.deadline);
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);

@@ -69,10 +69,12 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
     else
       return numberOf(list, contact.vertex);
   };
+  TimeCheck check(ordered.deadline, 32);
   std::size_t proper = 0, excluded = 0;
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       if (!isImpact(contacts[i], list, i, end, ordered)) continue;
+      check();
       if constexpr (std::is_same_v<decltype(contacts[i]), const EdgeEdgeContact&>)
         m_dropped[list][i] = rule.isExcluded(contacts[i]);
       else
@@ -99,9 +101,11 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
     return (place.list == 0 ? contents.vertexTriangle : contents.triangleVertex)[place.index];
   };
   m_planes.clear();
-  for (const Place place : m_proper)
+  for (const Place place : m_proper) {
+    check();
     m_planes.push_back(place.list == 2 ? rule.planeOf(contents.edgeEdge[place.index])
                                        : rule.planeOf(vertexImpact(place), place.list == 1));
+  }
 
   const auto anyAt = [&](std::size_t n, auto&& f) {
     for (std::uint32_t i = m_starts[n]; i < m_starts[n + 1]; ++i)
@@ -123,6 +127,7 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       if (!m_dropped[list][i]) continue;
+      check();
       const auto& c = contacts[i];
       if constexpr (std::is_same_v<decltype(c), const EdgeEdgeContact&>)
         m_dropped[list][i] = rule.isReplaced(c, [&](auto&& f) {
@@ -146,9 +151,11 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
   });
   dropExcluded(meshes, end, ordered, contents);
   m_entries.clear();
+  TimeCheck check(ordered.deadline, 256);
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       const auto& contact = contacts[i];
+      check();
       if (!isImpact(contact, list, i, end, ordered) || m_dropped[list][i]) continue;
       std::optional<ImpactFeatures> features;
       if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
@@ -158,17 +165,20 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
       if (features) m_entries.push_back({*features, contact.timeOfImpact, list, i});
     }
   });
-  std::sort(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
-    return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
-           std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
-  });
+  sortUntil(ordered.deadline, m_entries.begin(), m_entries.end(),
+            [](const Entry& l, const Entry& r) {
+              return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
+                     std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
+            });
   for (std::size_t i = 1; i < m_entries.size(); ++i)
     if (m_entries[i].features == m_entries[i - 1].features)
       m_dropped[m_entries[i].list][m_entries[i].index] = 1;
   forEachImpactList(contents, [&](auto& contacts, std::uint32_t list) {
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < contacts.size(); ++i)
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      check();
       if (!m_dropped[list][i]) contacts[kept++] = contacts[i];
+    }
     contacts.resize(kept);
   });
 }

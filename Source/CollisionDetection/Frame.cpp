@@ -47,7 +47,11 @@ std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& th
     record->earliest = std::numeric_limits<double>::infinity();
     m_pairs.push_back({record, workOf(*record), m_places.size()});
     Pair& pair = m_pairs.back();
-    pair.jobCount = startOf(pair.work, frame);
+    try {
+      pair.jobCount = startOf(pair.work, frame);
+    } catch (const OutOfTime&) {
+      pair.isOutOfTime = true;
+    }
     for (std::size_t i = 0; i < pair.jobCount; ++i) {
       if (m_places.size() == m_jobs.size()) m_jobs.push_back(std::make_unique<JobScratch>());
       m_jobs[m_places.size()]->clear();

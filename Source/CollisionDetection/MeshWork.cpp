@@ -125,9 +125,10 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   GeometryOctree &ofA = record.a->body.tree, &ofB = record.b->body.tree;
   const std::size_t elements = ofA.octree().size() + ofB.octree().size();
   if (!hasElements(record)) return 0;
-  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
-                                       ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads)
-                                       : nullptr;
+  const Triangle* const unfolded =
+      adjacentPairs && reportsOnlyTouching(record)
+          ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads, frame.deadline)
+          : nullptr;
   m_thickness =
       record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
   const auto treesIn = [&](BoxFrame in, double distance) {
@@ -300,7 +301,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   PairResults& results = join.results;
   auto& [pierced, leaving, piercingContacts, knownSides, bodies] = results.meshes;
   pierced.clear();
-  results.start(jobs);
+  results.start(jobs, join.deadline);
   auto &found = results.found(), &intersections = results.intersections();
   StepFacts& facts = results.facts();
   const bool byIntersection = record.plan.method == Method::Intersection;
@@ -365,8 +366,9 @@ std::size_t MeshWork::preferBodies(const FrameJoin& join, std::size_t preferred)
   if (!bodies) bodies = std::make_unique<BodyContacts>();
   const bool byIntersection = record.plan.method == Method::Intersection;
   const BodyContacts::Buffers all(found), local = byIntersection ? all : intersections;
-  const bool areDeep = bodies->find(record, join.engine, join.results.facts().startsPiercing(),
-                                    local, all.subspan(byIntersection ? all.size() : preferred));
+  const bool areDeep =
+      bodies->find(record, join.engine, join.results.facts().startsPiercing(), local,
+                   all.subspan(byIntersection ? all.size() : preferred), join.deadline);
   record.byBodies = areDeep || bodies->hasTurned();
   join.statistics.exactDecisions += bodies->exactDecisions();
   if (!areDeep) return preferred;

@@ -25,7 +25,9 @@ void sortUnique(Buffer<std::uint32_t>& ids, std::size_t count, Buffer<std::uint8
 
 }  // namespace
 
-void PairResults::start(Jobs jobs) {
+void PairResults::start(Jobs jobs, const Deadline* deadline) {
+  m_orderScratch.deadline = impacts.deadline = deadline;
+  meshes.pierced.deadline = meshes.leaving.deadline = deadline;
   m_facts.clear();
   impacts.clear();
   m_found.clear();

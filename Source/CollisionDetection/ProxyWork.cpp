@@ -48,7 +48,7 @@ void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
     m_proxyJobs.write(*jobs[i], contents.shape.data() + first);
   });
   m_proxyJobs.describe(jobs, contents);
-  join.results.start(jobs);
+  join.results.start(jobs, join.deadline);
   join.results.assess(record, false, join.statistics);
   countContacts(0, contents);
 }

@@ -50,11 +50,35 @@ inline void checkTime(const Deadline* deadline) {
   if (deadline && deadline->isOver()) throw OutOfTime();
 }
 
+/// checkTime() in one of so many calls.
+class TimeCheck {
+ public:
+  TimeCheck(const Deadline* deadline, unsigned calls) : m_deadline(deadline), m_calls(calls) {}
+  void operator()() {
+    if (m_deadline && ++m_count % m_calls == 0) checkTime(m_deadline);
+  }
+
+ private:
+  const Deadline* m_deadline;
+  unsigned m_calls, m_count = 0;
+};
+
+/// std::sort() until the deadline, if there is one.
+template <class Iterator, class Less>
+void sortUntil(const Deadline* deadline, Iterator begin, Iterator end, Less&& less) {
+  if (!deadline) return std::sort(begin, end, less);
+  TimeCheck check(deadline, 512);
+  std::sort(begin, end, [&](const auto& l, const auto& r) {
+    check();
+    return less(l, r);
+  });
+}
+
 /// Calls use(part) for the items in order: for all at once, or with a deadline for few at a time,
 /// after checkTime(). use: its result must not depend on how items are divided.
 template <class Span, class Use>
 void forEachPart(const Deadline* deadline, const Span& items, Use&& use) {
-  constexpr std::size_t kPart = 64;  // takes some microseconds
+  constexpr std::size_t kPart = 16;  // takes some microseconds
   if (!deadline) return use(items);
   for (std::size_t begin = 0; begin < items.size(); begin += kPart) {
     checkTime(deadline);

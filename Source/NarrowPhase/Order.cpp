@@ -30,17 +30,19 @@ Ids byElement(const ShapeContact& c) {
 template <class Contact, class ListOf, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred, ListOf&& listOf,
                   Entries& entries, CountedVector<Contact>& out, IdsOf&& idsOf,
-                  Buffer<std::uint8_t>* flags) {
+                  Buffer<std::uint8_t>* flags, const Deadline* deadline) {
+  TimeCheck check(deadline, 256);
   std::size_t size = 0;
   for (const ContactBuffers* found : buffers) size += std::invoke(listOf, *found).size();
   entries.clear();
   if (size > entries.capacity()) entries.reserve(size + size / 8);
   for (std::size_t i = 0; i < buffers.size(); ++i)
     for (const Contact& contact : std::invoke(listOf, *buffers[i])) {
+      check();
       const Ids ids = idsOf(contact);
       entries.push_back({ContactSortKey(ids[0], ids[1], i < preferred), &contact});
     }
-  std::sort(entries.begin(), entries.end(),
+  sortUntil(deadline, entries.begin(), entries.end(),
             [](const auto& l, const auto& r) { return l.key < r.key; });
   entries.erase(
       std::unique(entries.begin(), entries.end(),
@@ -50,6 +52,7 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
   out.reserve(entries.size());
   std::size_t count = 0;
   for (const auto& entry : entries) {
+    check();
     out.push_back(*entry.contact);
     count += entry.key.isPreferred();
   }
@@ -68,12 +71,13 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
   const auto shapesOf = [](const ContactBuffers& found) -> auto& { return found.shapes.shape; };
   const std::size_t count =
       order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
-            out.vertexTriangle, byVertex, &scratch.preferred[0]) +
+            out.vertexTriangle, byVertex, &scratch.preferred[0], scratch.deadline) +
       order(buffers, preferred, &ContactBuffers::triangleVertex, scratch.vertexTriangle,
-            out.triangleVertex, byTriangle, &scratch.preferred[1]) +
+            out.triangleVertex, byTriangle, &scratch.preferred[1], scratch.deadline) +
       order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges,
-            &scratch.preferred[2]);
-  order(buffers, preferred, shapesOf, scratch.shape, out.shape, byElement, nullptr);
+            &scratch.preferred[2], scratch.deadline);
+  order(buffers, preferred, shapesOf, scratch.shape, out.shape, byElement, nullptr,
+        scratch.deadline);
   out.shapeShape.clear();
   for (const ContactBuffers* buffer : buffers)
     out.shapeShape.insert(out.shapeShape.end(), buffer->shapes.shapeShape.begin(),

@@ -207,9 +207,12 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
   collect(found, &ContactBuffers::crossings);
   findBehind(pair);
   addDepths(pair, false, out);
+  TimeCheck check(out.deadline, 32);
   for (const ContactBuffers* buffers : found)
-    for (const PiercedPair& pierced : buffers->pierced)
+    for (const PiercedPair& pierced : buffers->pierced) {
+      check();
       if (!hasEndBehind(pair, pierced)) addPierced(pair, pierced, out);
+    }
 }
 
 void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
@@ -224,6 +227,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
   for (auto first = m_behind.begin(); first != m_behind.end();) {
     const bool ofB = first->ofB;
     const std::uint32_t vertex = first->vertex;
+    checkTime(out.deadline);
     NearestInFront nearest(pair, ofB, atStart, vertex);
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
       nearest.enter(first->triangle);

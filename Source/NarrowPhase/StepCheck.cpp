@@ -61,6 +61,7 @@ void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t first
 
 void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
                       ContactBuffers& out) {
+  TimeCheck check(out.deadline, 32);
   const auto isTouched = [&](const Buffer<std::uint32_t>& sorted, auto... vertices) {
     return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
   };
@@ -71,6 +72,7 @@ void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuf
                                                   swapped ? pair.a : pair.b};
     const auto &vertices = swapped ? ofB : ofA, &corners = swapped ? ofA : ofB;
     std::erase_if(list, [&](const VertexTriangleContact& c) {
+      check();
       return c.timeOfImpact == 1.0 &&
              (isTouched(vertices, c.vertex) ||
               isTouched(corners, c.vertices[0], c.vertices[1], c.vertices[2])) &&
@@ -81,6 +83,7 @@ void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuf
   moveImpacts(found.triangleVertex, true);
   const Features<Kind::EdgeEdge> edges{pair.a, pair.b};
   std::erase_if(found.edgeEdge, [&](const EdgeEdgeContact& c) {
+    check();
     return c.timeOfImpact == 1.0 &&
            (isTouched(ofA, c.edgeA[0], c.edgeA[1]) || isTouched(ofB, c.edgeB[0], c.edgeB[1])) &&
            addImpact(pair, edges, pair.a.topology.edgeOf(c.edgeA), pair.b.topology.edgeOf(c.edgeB),

@@ -94,7 +94,9 @@ void BodyPair::forEachIntersecting(
     const Vector3d& shift, const std::function<bool(const IntersectingTriangles&)>& f) const {
   SignCounts counts;
   IntersectingTriangles both;
+  TimeCheck check(m_scratch.stack.deadline, 16);
   const auto test = [&](std::uint32_t elementB) {
+    check();
     both.elementB = elementB;
     both.b = cornersOfB(elementB);
     both.found = intersectTriangles(both.a, both.b, counts);
@@ -134,6 +136,7 @@ void BodyPair::forEachIntersecting(
 }
 
 int BodyPair::windingNumberOf(bool ofA, const Vector3d& p) const {
+  checkTime(m_scratch.stack.deadline);
   return windingNumber(geometry(ofA), p, m_engine, m_scratch.stack);
 }
 
@@ -183,6 +186,7 @@ bool BodyPair::areApart(const Vector3d& shift) const {
 
 std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& shift,
                                       const Vector3d& direction) const {
+  checkTime(m_scratch.stack.deadline);
   const Vector3d& p = vertices(part.ofA).positions[part.vertex];
   const Ray ray = part.ofA ? Ray{p + shift, direction} : Ray{p - shift, -direction};
   constexpr double kLargest = std::numeric_limits<double>::max();
@@ -196,6 +200,7 @@ std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& sh
 std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
                                                    const Vector3d& direction, double begin,
                                                    double end) const {
+  checkTime(m_scratch.stack.deadline);
   const Vector3d& p = vertices(vertex.ofA).positions[vertex.vertex];
   RayHits hits(geometry(!vertex.ofA), {p, direction, begin, end}, m_engine == Engine::BruteForce,
                m_scratch.met);

@@ -40,7 +40,9 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
   Buffer<ElementPair>& batch = counts.part;
   batch.clear();
   IntersectionAtEnd end;
+  TimeCheck checkOften(counts.deadline, 64);
   const auto check = [&] {
+    checkTime(counts.deadline);
     end.isKnown = batch.size() <= checksLeft;
     if (!end.isKnown) return;
     checksLeft -= batch.size();
@@ -52,6 +54,7 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
   // Whether the rest of the step may close the distance at the impact.
   const auto mayTouch = [&](const TriangleMesh& first, const TriangleMesh& second,
                             const auto& contact) {
+    checkOften();
     const double left = 1.0 - contact.timeOfImpact;
     return !end.piercing && end.isKnown && contact.distance <= left * pair.step.motion + rounding &&
            contact.distance <= left * motionOf(first, second, contact) + rounding;

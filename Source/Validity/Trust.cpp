@@ -246,8 +246,11 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   if (!contents.intersectingTriangles.empty()) {
     SurfaceMeeting found;
     std::span<const ElementPair> left(contents.intersectingTriangles);
-    for (; !found.piercing && !left.empty(); left = left.subspan(std::min(left.size(), kTogether)))
+    for (; !found.piercing && !left.empty();
+         left = left.subspan(std::min(left.size(), kTogether))) {
+      checkTime(counts.deadline);
       found = meetingOf(meshes, false, left.first(std::min(left.size(), kTogether)), counts);
+    }
     m_atEnd.meeting = found.piercing ? Meeting::Piercing : Meeting::Touching;
     m_atEnd.witness = found.piercing;
   } else if (byField) {

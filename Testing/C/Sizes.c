@@ -45,6 +45,7 @@ int main(void) {
   SIZE(palpate_surface_point);
   SIZE(palpate_tetrahedron_point);
   SIZE(palpate_tracked_contact);
+  SIZE(palpate_unfinished_pair);
   SIZE(palpate_validity);
   SIZE(palpate_vertex_triangle);
   return 0;

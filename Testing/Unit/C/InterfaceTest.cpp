@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -235,6 +236,40 @@ TEST_F(CScene, ContactsValidityAndStatisticsAreThoseOfCpp) {
     advance();
   }
   for (const std::size_t count : kinds) EXPECT_GT(count, 0u);
+}
+
+TEST_F(CScene, DetectionsWithABudget) {
+  std::uint8_t complete = 7;
+  step(0, 0);
+  EXPECT_OK(palpate_cancel_detection(m_cd));  // nothing runs
+  EXPECT_OK(palpate_detect_within(m_cd, std::numeric_limits<std::int64_t>::max(), &complete));
+  EXPECT_EQ(complete, 1);
+  const palpate_unfinished_pair* pairs = nullptr;
+  std::size_t count = 1;
+  EXPECT_OK(palpate_get_unfinished_pairs(m_cd, &pairs, &count));
+  EXPECT_EQ(count, 0u);
+  advance();
+  step(1, -0.1);
+  advance();  // other steps of all pairs, which step() has detected
+  EXPECT_OK(palpate_detect_within(m_cd, 0, &complete));
+  EXPECT_FALSE(cpp().detectCollision(std::chrono::microseconds(0)));
+  EXPECT_EQ(complete, 0);
+  EXPECT_OK(palpate_get_unfinished_pairs(m_cd, &pairs, &count));
+  expectSame<palpate_unfinished_pair, UnfinishedPair>({pairs, count},
+                                                      cpp().statistics().unfinishedPairs);
+  ASSERT_GT(count, 0u);
+  palpate_validity validity{};
+  validity.size = sizeof validity;
+  EXPECT_OK(palpate_get_validity(m_cd, pairs[0].a, pairs[0].b, &validity));
+  EXPECT_EQ(validity.reason, PALPATE_REASON_OUT_OF_TIME);
+  EXPECT_EQ(validity.age, 1u);
+  palpate_pair_settings settings{};
+  settings.size = sizeof settings;
+  EXPECT_OK(palpate_get_pair_settings(m_cd, pairs[0].a, pairs[0].b, &settings));
+  settings.priority = -3;
+  EXPECT_OK(palpate_set_pair_settings(m_cd, pairs[0].a, pairs[0].b, &settings));
+  EXPECT_OK(palpate_get_pair_settings(m_cd, pairs[0].a, pairs[0].b, &settings));
+  EXPECT_EQ(settings.priority, -3);
 }
 
 TEST_F(CScene, RowsAndMotionsAreThoseOfCpp) {

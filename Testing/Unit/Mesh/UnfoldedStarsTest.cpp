@@ -46,7 +46,7 @@ std::vector<ElementPair> answered(const Step& step) {
     for (const int threads : {1, 3}) {
       UnfoldedStars stars;
       stars.find(step.topology, step.topology.elements, before.data(), now.data(),
-                 Threads(threads));
+                 Threads(threads), nullptr);
       const std::vector<Triangle> found(stars.triangles(),
                                         stars.triangles() + step.topology.elements.size());
       if (first.empty()) first = found;
