@@ -10,6 +10,7 @@ mkdir -p ../Pictures
 "$python" fastNeedle.py ../Data/SpeedAccuracy.csv ../Pictures/FastNeedleSpeed
 "$python" distanceFields.py ../Data/DistanceFields.csv ../Pictures/DistanceFields
 "$python" rigidBodies.py ../Data/RigidBodies.csv ../Pictures/RigidBodies
+[[ ! -f ../Data/Budgets.csv ]] || "$python" budgets.py ../Data/Budgets.csv ../Pictures/Budgets
 "$python" performance.py ../Data/Performance.csv ../Pictures
 "$python" stability.py ../Data/Stability.csv ../Pictures/Stability
 if [[ -f diagrams.py ]]; then

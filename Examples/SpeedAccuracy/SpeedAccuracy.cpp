@@ -1,6 +1,7 @@
 // Measures the cost and the errors of each method on eight scenes, and of the methods for rigid
 // bodies on three. Writes CSV files and interactive pages. Docs/Figures/speedAccuracy.py draws the
 // printed chart from the CSV.
+#include "Budgets.h"
 #include "CommandLine.h"
 #include "Contestant.h"
 #include "HtmlReport.h"
@@ -31,6 +32,7 @@ struct Options {
   int frames = 24;
   int repetitions = 9;
   bool again = false;
+  int budgetFrames = 0;
   RigidOptions rigid;
 };
 
@@ -258,6 +260,15 @@ void runRigid(const Options& options) {
   std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
 }
 
+/// Contacts that a detection misses within a budget.
+void runBudgets(const Options& options) {
+  const std::filesystem::path csv = options.out / "budgets.csv";
+  Figures figures = emptyBudgetFigures();
+  measureBudgets(options.budgetFrames, figures);
+  scenes::writeWhole(csv, figures.csv());
+  std::printf("figures   %s\n", csv.c_str());
+}
+
 /// Each choice is part of the name of a scene or a method.
 void checkNames(const Options& options) {
   std::vector<std::string> names, families;
@@ -283,6 +294,7 @@ void run(const Options& options) {
   checkTrust(figures);
   std::printf("figures   %s\npage      %s\n", csv.c_str(), page.c_str());
   runRigid(options);
+  if (options.budgetFrames > 0) runBudgets(options);
 }
 
 Options parse(CLI::App& app, int count, char** arguments) {
@@ -304,6 +316,10 @@ Options parse(CLI::App& app, int count, char** arguments) {
       ->capture_default_str();
   app.add_option("--particles", options.rigid.particles, "particles at the bone")
       ->check(scenes::between(1, 10'000'000))
+      ->capture_default_str();
+  app.add_option("--budget-frames", options.budgetFrames,
+                 "frames of the organs within budgets, for budgets.csv")
+      ->check(scenes::between(0, 10'000))
       ->capture_default_str();
   app.add_flag("--again", options.again, "measure also rows that the CSV already has");
   app.parse(count, arguments);

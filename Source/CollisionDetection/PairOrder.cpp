@@ -1,6 +1,7 @@
 #include "CollisionDetection/PairOrder.h"
 
 #include "DistanceField/FieldContacts.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
@@ -70,7 +71,7 @@ double distanceFrom(const PlacedShape& plane, const AlignedBox3d& box, bool ofSt
 
 double distanceOf(const AlignedBox3d& a, const AlignedBox3d& b) {
   const Vector3d gap = (a.min() - b.max()).cwiseMax(b.min() - a.max()).cwiseMax(Vector3d::Zero());
-  return gap.stableNorm();
+  return stableLength(gap);
 }
 
 }  // namespace

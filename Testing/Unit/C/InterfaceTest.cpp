@@ -252,7 +252,7 @@ TEST_F(CScene, DetectionsWithABudget) {
   step(1, -0.1);
   advance();  // other steps of all pairs, which step() has detected
   EXPECT_OK(palpate_detect_within(m_cd, 0, &complete));
-  EXPECT_FALSE(cpp().detectCollision(std::chrono::microseconds(0)));
+  EXPECT_FALSE(m_whole.detection.detectCollision(std::chrono::microseconds(0)));
   EXPECT_EQ(complete, 0);
   EXPECT_OK(palpate_get_unfinished_pairs(m_cd, &pairs, &count));
   expectSame<palpate_unfinished_pair, UnfinishedPair>({pairs, count},

@@ -49,6 +49,13 @@ inline Numbers bitsOf(Tag, const Eigen::Vector3d& v) { return listOf(v[0], v[1],
 inline Numbers bitsOf(Tag, const palpate_pair& p) { return listOf(p.a, p.b); }
 inline Numbers bitsOf(Tag, const ElementPair& p) { return listOf(p.a, p.b); }
 
+inline Numbers bitsOf(Tag, const palpate_unfinished_pair& p) {
+  return listOf(p.a, p.b, p.distance_bound, p.age);
+}
+inline Numbers bitsOf(Tag, const UnfinishedPair& p) {
+  return listOf(p.a, p.b, p.distanceBound, p.age);
+}
+
 inline Numbers bitsOf(Tag, const palpate_vertex_triangle& c) {
   return listOf(c.vertex, c.triangle, c.vertices, c.weights, c.normal, c.distance, c.time_of_impact,
                 c.feature);

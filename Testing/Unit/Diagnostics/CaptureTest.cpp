@@ -109,7 +109,8 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
                              .thickness = 0.1,
                              .allowedError = 0.0123,
                              .trackContacts = true,
-                             .proxy = {.widestNormalCone = 0.21}});
+                             .proxy = {.widestNormalCone = 0.21},
+                             .priority = -5});
   detection.setCollisionFilter(scene.organ, {3, 5, Sidedness::Outer});
   detection.setDisabledElements(scene.floor, std::vector<std::uint32_t>{1, 5, 9});
   scene.move(0);
@@ -138,6 +139,7 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
     EXPECT_EQ(kept.trackContacts, given.trackContacts);
     EXPECT_EQ(kept.reportCrossings, given.reportCrossings);
     EXPECT_EQ(kept.proxy.widestNormalCone, given.proxy.widestNormalCone);
+    EXPECT_EQ(kept.priority, given.priority);
   }
   // The file does not contain a predicate, but says that there was one. The audit calls it.
   detection.setContactPredicate(scene.organ, scene.floor,
@@ -292,6 +294,9 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0 0\n",
+             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n");  // priority
+  EXPECT_EQ(asVersion(13).pairs[0].settings.priority, 0);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n",
              " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0\n");  // trackContacts, reportCrossings
   EXPECT_FALSE(asVersion(12).pairs[0].settings.trackContacts);
