@@ -8,7 +8,7 @@ import sys
 from chartStyle import distinct, plt, read, save
 
 COLOURS = ["#777777", "#0072b2"]
-PANELS = {"missed": "all contacts", "new_missed": "contacts that began in the frame"}
+PANELS = {"missed_first": "of the first pair", "missed": "of all ten pairs"}
 
 
 def main(source, picture):

@@ -45,7 +45,7 @@ run >"$folder/text" 2>"$folder/messages" || fail "the second run: $(cat "$folder
 # Contacts that are missed within a budget: fewer with more time.
 "$program" --out "$folder/budgets" --scenes bone --bone 5000 --methods Proxy --budget-frames 12 >"$folder/text" 2>"$folder/messages" ||
   fail "budgets: $(cat "$folder/messages")"
-awk -F, 'NR > 1 && $2 == 5 { low += $3 } NR > 1 && $2 == 120 { high += $3 } END { exit !(NR == 25 && low > high) }' \
+awk -F, 'NR > 1 && $2 == 5 { low += $4 } NR > 1 && $2 == 120 { high += $4 } END { exit !(NR == 25 && low > high) }' \
   "$folder/budgets/budgets.csv" || fail "figures of budgets: $(cat "$folder/budgets/budgets.csv")"
 
 # Refused in one line, and nothing written.

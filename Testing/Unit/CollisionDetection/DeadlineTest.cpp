@@ -96,7 +96,7 @@ class World {
     for (const StepBody& body : m_bodies) m_ids.push_back(body.add(m_collisions));
     std::size_t number = 0;
     for (const SupportedPairs& row : kSupport) {
-      std::size_t left = row.kind == PairKind::Proxy ? 1 : 3;
+      std::size_t left = row.kind == PairKind::Proxy ? 1 : 2;
       for (std::size_t i = 0; i < m_bodies.size(); ++i)
         for (std::size_t j = 0; j < m_bodies.size() && left > 0; ++j)
           if ((7 * i + 3 * j + number) % 3 == 0 && answers(row, m_bodies[i], m_bodies[j]) &&
