@@ -535,7 +535,7 @@ TEST(Deadline, KeptCandidates) {
     each->addCollisionPair(ids[0], ids[1], pair);
   }
   LooksClock clock(found);
-  std::size_t stopped = 0;
+  std::size_t stopped = 0, stoppedWhileKept = 0;
   std::int64_t most = 0;
   for (int i = 0; i < 200; ++i) {
     auto positions = large.positions;
@@ -545,7 +545,9 @@ TEST(Deadline, KeptCandidates) {
     truth.detectCollision();
     if (withBudget) {
       const std::int64_t before = clock.looks();
-      stopped += !found.detectCollision(microseconds(i / 8));
+      const bool isStopped = !found.detectCollision(microseconds(i / 8));
+      stopped += isStopped;
+      stoppedWhileKept += isStopped && implementationOf(found).pairs.records()[0]->keeps;
       most = std::max(most, clock.looks() - before);
     }
     found.detectCollision();
@@ -555,6 +557,7 @@ TEST(Deadline, KeptCandidates) {
     for (OctreeBasedCD* each : {&found, &truth}) each->advance();
   }
   EXPECT_GT(stopped, 10u);
+  EXPECT_GT(stoppedWhileKept, 5u);
   EXPECT_GT(most, 10);
 }
 
