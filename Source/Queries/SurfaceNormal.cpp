@@ -1,73 +1,15 @@
 #include "Queries/SurfaceNormal.h"
 
-#include "Mesh/Corners.h"
+#include "Mesh/FaceAtCorner.h"
 #include "Math/ClosestPoint.h"
-#include "Math/Foot.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-
-#include <Eigen/Geometry>
-
-#include <cmath>
-#include <numbers>
 
 namespace palpate {
 
 using Eigen::Vector3d;
 
 namespace {
-
-/// The angle in [0, pi] with this sine and cosine, both times `length`, within 2^-40 of itself.
-/// std::atan2() has other bits on other processors.
-double angleOf(double sine, double cosine, double length) {
-  if (cosine < 0.0) return std::numbers::pi - angleOf(sine, -cosine, length);
-  double tangent = sine / (length + cosine);  // of the half
-  for (int i = 0; i < 2; ++i) tangent /= 1.0 + std::sqrt(1.0 + tangent * tangent);
-  const double square = tangent * tangent;
-  constexpr double kInverse[] = {1.0 / 15, 1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3};
-  double series = 0.0;
-  for (const double inverse : kInverse) series = inverse - square * series;
-  return 8.0 * tangent * (1.0 - square * series);
-}
-
-/// A triangle as seen from one of its corners.
-class FaceAtCorner {
- public:
-  FaceAtCorner(const Corners& p, std::size_t corner)
-      : m_corners(p),
-        m_u(p[(corner + 1) % 3] - p[corner]),
-        m_v(p[(corner + 2) % 3] - p[corner]),
-        m_across(m_u.cross(m_v)),
-        m_ofU(m_u.squaredNorm()),
-        m_ofV(m_v.squaredNorm()),
-        m_square(m_across.squaredNorm()) {}
-
-  /// Its unit normal, within 2^-44; zero without area.
-  Vector3d normal() const {
-    if (isPlain()) return m_across / std::sqrt(m_square);
-    return unitCross(m_corners[0], m_corners[1], m_corners[0], m_corners[2]);
-  }
-  /// Its unit normal times the angle at the corner, in rad.
-  Vector3d weightedNormal() const {
-    if (isPlain()) {
-      const double length = std::sqrt(m_square);
-      return angleOf(length, m_u.dot(m_v), std::sqrt(m_ofU * m_ofV)) / length * m_across;
-    }
-    const Vector3d u = stableUnit(m_u), v = stableUnit(m_v);
-    return angleOf(stableLength(u.cross(v)), u.dot(v), 1.0) * normal();
-  }
-  /// Whether its size and angle are moderate, so that the cross product of the rounded edges is
-  /// within 2^-44 of its length.
-  bool isPlain() const {
-    const auto isModerate = [](double square) { return square > 0x1p-400 && square < 0x1p400; };
-    return isModerate(m_ofU) && isModerate(m_ofV) && m_square > 0x1p-10 * m_ofU * m_ofV;
-  }
-
- private:
-  const Corners& m_corners;
-  const Vector3d m_u, m_v, m_across;
-  const double m_ofU, m_ofV, m_square;  ///< squared lengths
-};
 
 /// The sum of the normals around the element's edge or vertex with the weights that are not 0; 0 on
 /// a face.
