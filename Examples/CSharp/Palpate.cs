@@ -61,7 +61,7 @@ public struct PairSettings {
   public Method Method;
   public ContactSet Contacts;
   public int Priority;
-  byte earliestTimeOnly, trackContacts, reportCrossings;
+  byte earliestTimeOnly, trackContacts, reportCrossings, smoothNormals, rememberSides;
   public bool EarliestTimeOnly {
     get { return earliestTimeOnly != 0; } set { earliestTimeOnly = value ? (byte)1 : (byte)0; }
   }
@@ -69,6 +69,8 @@ public struct PairSettings {
   public bool ReportCrossings {
     get { return reportCrossings != 0; } set { reportCrossings = value ? (byte)1 : (byte)0; }
   }
+  public bool SmoothNormals { get { return smoothNormals != 0; } set { smoothNormals = value ? (byte)1 : (byte)0; } }
+  public bool RememberSides { get { return rememberSides != 0; } set { rememberSides = value ? (byte)1 : (byte)0; } }
   public static PairSettings Default {
     get {
       PairSettings s;

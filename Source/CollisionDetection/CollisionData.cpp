@@ -75,6 +75,7 @@ CollisionData::CollisionData(const Parts& parts) {
                          parts.validity,
                          {},
                          {},
+                         {},
                          {}};
 }
 
@@ -158,6 +159,17 @@ ContactTags CollisionData::tagsOf(const ShapeShapeContact& contact) const {
       tagsIn(shapeShape(), tags(ContactKind::ShapeShape), contact, [](const auto&) { return 0; });
   return found ? *found : ContactTags{};
 }
+std::span<const Eigen::Vector3d> CollisionData::smoothVertexTriangle() const {
+  return read().smooth.vertexTriangle;
+}
+std::span<const Eigen::Vector3d> CollisionData::smoothTriangleVertex() const {
+  return read().smooth.triangleVertex;
+}
+std::span<const Eigen::Vector3d> CollisionData::smoothEdgeEdge() const {
+  return read().smooth.edgeEdge;
+}
+std::span<const Eigen::Vector3d> CollisionData::smoothShape() const { return read().smooth.shape; }
+std::span<const Crossing> CollisionData::rememberedSides() const { return read().rememberedSides; }
 double CollisionData::errorBound() const { return read().errorBound; }
 const Validity& CollisionData::validity() const { return read().validity; }
 

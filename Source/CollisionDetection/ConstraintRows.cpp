@@ -37,10 +37,11 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                     std::to_string(side.now.size()) + " now",
                 {}, vertex);
   };
-  const auto add = [&](const auto& contact, const std::array<const SolverVertices*, 4>& sides) {
+  const auto add = [&](const auto& contact, const Eigen::Vector3d& normal,
+                       const std::array<const SolverVertices*, 4>& sides) {
     const auto [vertices, weights] = stencil(contact);
     const double time = contact.timeOfImpact;
-    ConstraintRow row{{}, weights, contact.normal, 0.0};
+    ConstraintRow row{{}, weights, normal, 0.0};
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (std::size_t i = 0; i < 4; ++i) {
       const SolverVertices& side = *sides[i];
@@ -48,20 +49,34 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
       row.vertices[i] = side.first + vertices[i];
       sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
     }
-    row.offset = contact.normal.dot(sum) - contact.distance;
+    row.offset = normal.dot(sum) - contact.distance;
     rows.push_back(row);
   };
   try {
-    for (const auto& contact : contacts.vertexTriangle()) add(contact, {&a, &b, &b, &b});
-    for (const auto& contact : contacts.triangleVertex()) add(contact, {&b, &a, &a, &a});
-    for (const auto& contact : contacts.edgeEdge()) add(contact, {&a, &a, &b, &b});
+    // Calls f(contact, normal) with the smooth normals if there are any.
+    const auto forEach = [](const auto& list, std::span<const Eigen::Vector3d> smooth, auto&& f) {
+      for (std::size_t i = 0; i < list.size(); ++i)
+        f(list[i], smooth.empty() ? list[i].normal : smooth[i]);
+    };
+    forEach(contacts.vertexTriangle(), contacts.smoothVertexTriangle(),
+            [&](const auto& contact, const auto& normal) {
+              add(contact, normal, {&a, &b, &b, &b});
+            });
+    forEach(contacts.triangleVertex(), contacts.smoothTriangleVertex(),
+            [&](const auto& contact, const auto& normal) {
+              add(contact, normal, {&b, &a, &a, &a});
+            });
+    forEach(contacts.edgeEdge(), contacts.smoothEdgeEdge(),
+            [&](const auto& contact, const auto& normal) {
+              add(contact, normal, {&a, &a, &b, &b});
+            });
     if (!contacts.shape().empty() && !(a.before.empty() && a.now.empty()) &&
         !(b.before.empty() && b.now.empty()))
       throw Error(ErrorCode::WrongPositionCount,
                   "appendRows(): both sides have positions, but one of them is a shape, or a body "
                   "whose distance field answered; leave that one empty");
     const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
-    for (const ShapeContact& contact : contacts.shape()) {
+    forEach(contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const auto& normal) {
       const auto& [i, j, k] = contact.vertices;
       for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
       const std::uint32_t first = mesh.first;
@@ -70,9 +85,9 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
           (1 - time) * displacementAt(motion.before, motion.now, contact.pointOnShape, time);
       rows.push_back({{first + i, first + j, first + k, first + i},
                       {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                      contact.normal,
-                      contact.normal.dot(contact.point + rest) - contact.distance});
-    }
+                      normal,
+                      normal.dot(contact.point + rest) - contact.distance});
+    });
   } catch (...) {
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
     throw;

@@ -1,6 +1,7 @@
 #include "CollisionDetection/Frame.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "NarrowPhase/SmoothNormals.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Spin.h"
@@ -148,6 +149,13 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
     return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
   });
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
+  record.followSides();
+  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+  if (record.pair.settings.smoothNormals)
+    findSmoothNormals(record.meshes(), record.plan.kind == PairKind::MeshAndShape, join.threads,
+                      contents);
+  else
+    contents.smooth = {};
   record.statistics.exactDecisions += join.statistics.exactDecisions - exactBefore;
 }
 

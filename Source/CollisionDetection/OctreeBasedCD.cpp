@@ -139,6 +139,7 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
 
 void OctreeBasedCD::advance() {
   const Implementation::ChangeGuard all(m_implementation);
+  all->withinLimit([&] { all->followSides(); });
   all->geometries.advance();
 }
 
@@ -415,6 +416,15 @@ void OctreeBasedCD::setUserData(GeometryId a, GeometryId b, const ContactKey& ke
                                     : ": no detection has tracked contacts: "
                                       "PairSettings::trackContacts is not set"),
                 a);
+}
+
+void OctreeBasedCD::setRememberedSides(GeometryId a, GeometryId b,
+                                       std::span<const Crossing> sides) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->withinLimit([&] {
+    PairRecord& record = all->pairs.inOrder(all->geometries, a, b);
+    record.setSides(all->geometries.stepNumber(), sides);
+  });
 }
 
 std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {

@@ -260,6 +260,42 @@ void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> 
           {record->pair.a, record->pair.b, record->distanceBound, record->data.validity().age});
 }
 
+void OctreeBasedCD::Implementation::followSides() {
+  std::size_t count = 0;
+  for (const auto& record : pairs.records()) {
+    record->startSides(geometries.stepNumber());
+    if (!record->sides || !record->collides() || record->dataVersion.isCurrent(record->state()))
+      continue;
+    if (count == unfollowed.size()) unfollowed.emplace_back();
+    std::unique_ptr<PairRecord>& own = unfollowed[count++];
+    if (!own || own->guarded != record.get() || own->a != record->a || own->b != record->b) {
+      own = std::make_unique<PairRecord>();
+      own->guarded = record.get();
+      own->a = record->a;
+      own->b = record->b;
+    }
+    own->pair = {record->pair.a, record->pair.b, record->pair.settings};
+    own->pair.settings.thickness = own->pair.settings.freeMotionReach = 0.0;
+    own->pair.settings.reportCrossings = true;
+    own->pair.settings.rememberSides = own->pair.settings.smoothNormals = false;
+    own->support = record->support;
+    own->settingsRevision = record->settingsRevision;
+    own->dataVersion.invalidate();
+  }
+  unfollowed.resize(count);
+  if (count == 0) return;
+  detect(unfollowed);
+  for (const auto& own : unfollowed) {
+    PairRecord& record = const_cast<PairRecord&>(*own->guarded);
+    record.sides->follow(record.meshes(), own->data.crossings());
+  }
+  for (const auto& own : unfollowed) {
+    PairRecord& record = const_cast<PairRecord&>(*own->guarded);
+    record.sides->commit();
+    record.dataVersion.invalidate();  // the sides are not those of the last detection
+  }
+}
+
 bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
   const MemoryScope memory(MemoryStage::Pairs);
   Trace* const traced = trace ? &*trace : nullptr;
@@ -267,6 +303,7 @@ bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
   const TraceSpan span(traced, "detectCollision");
   for (const auto& record : pairs.records()) record->countIsPending = record->isUnfinished = false;
   update(false, true, traced);
+  for (const auto& record : pairs.records()) record->startSides(geometries.stepNumber());
   FrameStatistics next = updates;
   const auto records = outdatedPairs();
   for (const auto& record : pairs.records()) {

@@ -55,6 +55,7 @@ struct OctreeBasedCD::Implementation {
   std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
   std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
+  GuardedPairs unfollowed;                   ///< scratch of followSides()
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
@@ -148,6 +149,10 @@ struct OctreeBasedCD::Implementation {
                     Trace*);
   /// records: all that had to be found, in the order of urgency.
   void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&);
+
+  /// Before a step ends: finds the crossings of pairs that changed since their last detection, for
+  /// PairSettings::rememberSides. Results and statistics stay as they are.
+  void followSides();
 };
 
 [[noreturn]] void throwMovedFrom();

@@ -114,12 +114,83 @@ void PairRecord::addTags() {
   });
 }
 
+void PairRecord::startSides(std::uint64_t step) {
+  if (!pair.settings.rememberSides) return sides.reset();
+  if (!sides) sides = std::make_unique<SideMemory>();
+  sides->startStep(step);
+  if (!collides()) sides->forget();
+}
+
+void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
+  const std::string pairName = nameOf(*a, *b);
+  if (!pair.settings.rememberSides)
+    throw Error(ErrorCode::NotAvailable, pairName + ": PairSettings::rememberSides is not set",
+                pair.a);
+  std::vector<SideMemory::Side> all;
+  for (const Crossing& crossing : given) {
+    const auto& ids = crossing.ids;
+    const std::size_t number = all.size();
+    const auto need = [&](bool good, const Geometry& geometry, const std::string& feature) {
+      if (!good)
+        throw Error(ErrorCode::IndexOutOfRange,
+                    pairName + ": remembered side " + std::to_string(number) + " names " + feature +
+                        ", which " + nameOf(geometry) + " does not have",
+                    geometry.body.id);
+    };
+    const auto vertex = [&](const Geometry& geometry, std::uint32_t id) {
+      need(id < geometry.body.mesh.topology.vertexCount, geometry, "vertex " + std::to_string(id));
+    };
+    const auto triangle = [&](const Geometry& geometry, std::uint32_t id) {
+      const MeshTopology& topology = geometry.body.mesh.topology;
+      need(topology.hasFaces() && id < topology.elements.size() && !topology.isRemoved(id),
+           geometry, "triangle " + std::to_string(id));
+      return topology.elements[id];
+    };
+    const auto edge = [&](const Geometry& geometry, std::uint32_t p, std::uint32_t q) {
+      need(geometry.body.mesh.topology.edgeOf({p, q}) != kNoEdge, geometry,
+           "edge " + std::to_string(p) + " " + std::to_string(q));
+    };
+    Crossing passage = crossing;
+    passage.time = 0.0;
+    Triangle corners{};
+    if (crossing.kind == ContactKind::VertexTriangle) {
+      vertex(*a, ids[0]);
+      corners = triangle(*b, ids[1]);
+    } else if (crossing.kind == ContactKind::TriangleVertex && a != b) {
+      corners = triangle(*a, ids[0]);
+      vertex(*b, ids[1]);
+    } else if (crossing.kind == ContactKind::EdgeEdge) {
+      edge(*a, ids[0], ids[1]);
+      edge(*b, ids[2], ids[3]);
+    } else {
+      throw Error(ErrorCode::IndexOutOfRange,
+                  pairName + ": remembered side " + std::to_string(number) + " is of the kind " +
+                      toString(crossing.kind) + ", which the pair does not have",
+                  pair.a);
+    }
+    all.push_back({passage, corners});
+  }
+  startSides(step);
+  sides->set(step, all);
+}
+
+void PairRecord::followSides() {
+  CollisionData::Contents& contents = CollisionData::Contents::of(next);
+  contents.rememberedSides.clear();
+  if (!sides) return;
+  sides->follow(meshes(), contents.crossings);
+  sides->apply(meshes(), contents);
+  countContacts(sizeOf(contents), contents);
+  if (!pair.settings.reportCrossings) contents.crossings.clear();
+}
+
 void PairRecord::commit() noexcept {
   PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
                  sizeOf(CollisionData::Contents::of(next)));
   std::swap(data, next);
   hasData = true;
   dataTopologies = topologies();
+  if (sides) sides->commit();
   dataVersion.commit(state());
 }
 
@@ -152,6 +223,7 @@ void PairRecord::releaseMemory() {
   CollisionData::Contents& contents = CollisionData::Contents::of(data);
   forEachTimed(contents, [](auto& list) { releaseSpare(list); });
   if (tracker) tracker->releaseMemory(contents);
+  if (sides) sides->releaseMemory();
   releaseSpare(contents.intersectingTriangles);
 }
 

@@ -9,6 +9,7 @@
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/SurfaceProxy.h"
 #include "Tracking/ContactTracker.h"
+#include "Tracking/SideMemory.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
@@ -48,11 +49,14 @@ struct PairRecord : CountedObject {
 
   struct State {
     BodyState a, b;
-    Revision settings;  ///< with the predicate
+    Revision settings;        ///< with the predicate
+    std::uint64_t sides = 0;  ///< SideMemory::version()
     friend bool operator==(const State&, const State&) = default;
   };
   using Derived = DerivedFrom<State>;
-  State state() const { return {a->body.state(), b->body.state(), settingsRevision}; }
+  State state() const {
+    return {a->body.state(), b->body.state(), settingsRevision, sides ? sides->version() : 0};
+  }
   std::array<Revision, 2> topologies() const {
     return {a->body.revisions.elements.topology, b->body.revisions.elements.topology};
   }
@@ -68,7 +72,7 @@ struct PairRecord : CountedObject {
             plan.step,
             settings.restDistance > 0.0 ? &filters.nearAtRest : nullptr,
             filters.predicate ? &filters.predicate : nullptr,
-            guarded != nullptr};
+            guarded && !settings.reportCrossings};
   }
   /// Whether a distance field answers in this frame.
   bool usesField() const { return plan.kind == PairKind::Field; }
@@ -91,6 +95,12 @@ struct PairRecord : CountedObject {
   void track(std::uint64_t step);
   /// Writes Contents::tags of `next`, if it is new.
   void addTags();
+  /// PairSettings::rememberSides: begins the step with this number if it has not begun.
+  void startSides(std::uint64_t step);
+  /// Replaces the sides at the start of this step. Throws NotAvailable, IndexOutOfRange.
+  void setSides(std::uint64_t step, std::span<const Crossing>);
+  /// Finds the sides at the step's end, and changes the contacts of `next` by those at its start.
+  void followSides();
   /// Makes `next` the pair's result.
   void commit() noexcept;
   /// The detection in the step with this number did not finish the pair: its result becomes that of
@@ -120,7 +130,8 @@ struct PairRecord : CountedObject {
     return !plan.swept() && (a->body.tree.isSwept() || b->body.tree.isSwept());
   }
 
-  /// Of a StepGuard: the pair that it guards, whose filters apply. Null: a pair of the table.
+  /// The pair whose filters apply: that which a StepGuard guards, or whose crossings are found.
+  /// Null: a pair of the table.
   const PairRecord* guarded = nullptr;
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;
@@ -140,6 +151,7 @@ struct PairRecord : CountedObject {
   std::size_t candidateCount = 0;           ///< number of candidates when last found
   PairStatistics statistics;                ///< of the last detection
   std::unique_ptr<ContactTracker> tracker;  ///< with PairSettings::trackContacts
+  std::unique_ptr<SideMemory> sides;        ///< with PairSettings::rememberSides
   std::unique_ptr<FieldScratch> fieldScratch;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest

@@ -100,7 +100,7 @@ class PairCheck {
 
   void range() const {
     const auto [method, thickness, contacts, rest, allowedError, freeReach, tracks, crossings,
-                continuous, automatic, proxy, priority] = m_settings;
+                smooths, remembers, continuous, automatic, proxy, priority] = m_settings;
     const auto [timeTolerance, earliestTimeOnly] = continuous;
     const double motionTolerance = automatic.motionTolerance, normalCone = proxy.widestNormalCone;
     finite("restDistance", rest, rest >= 0.0, kLengthRule);
@@ -117,10 +117,18 @@ class PairCheck {
          "earliestTimeOnly is for Method::Continuous only");
     support(!tracks || !earliestTimeOnly,
             "trackContacts needs contacts, and earliestTimeOnly reports none");
-    support(!crossings || (method == Method::Continuous && !earliestTimeOnly && !m_a.body.shape &&
-                           !m_b.body.shape),
-            "reportCrossings is for Method::Continuous of meshes, lines and points, without "
-            "earliestTimeOnly");
+    const bool hasPassages =
+        method == Method::Continuous && !earliestTimeOnly && !m_a.body.shape && !m_b.body.shape;
+    constexpr const char* kPassages =
+        " is for Method::Continuous of meshes, lines and points, without earliestTimeOnly";
+    support(!crossings || hasPassages, std::string("reportCrossings") + kPassages);
+    support(!remembers || hasPassages, std::string("rememberSides") + kPassages);
+    const bool hasFaces = m_a.body.mesh.topology.hasFaces() || m_b.body.mesh.topology.hasFaces();
+    support(
+        !smooths || (hasFaces && method != Method::DistanceField && method != Method::Proxy &&
+                     !earliestTimeOnly),
+        "smoothNormals is for contacts of a triangle or tetrahedral mesh, but not by a distance "
+        "field or proxy");
     need(method >= Method::Auto && method <= Method::Proxy,
          "method is " + std::to_string(static_cast<int>(method)) +
              "; it must be Auto, Intersection, Proximity, Continuous, DistanceField or Proxy");

@@ -36,6 +36,7 @@ constexpr std::array<std::string_view, 5> kGeometryTypes{"Triangles", "Lines", "
 constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
 constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
                                                   "Box",    "Cylinder", "ConvexHull"};
+constexpr std::array<std::string_view, 3> kPassages{"VertexTriangle", "TriangleVertex", "EdgeEdge"};
 constexpr std::array<std::string_view, 2> kContacts{"Distinct", "All"};
 // Before version 9, a third value of `contacts` stood for earliestTimeOnly.
 enum class ContactsBefore9 { Distinct, All, Earliest };
@@ -196,7 +197,8 @@ void fieldOf(File& file, auto& value) {
 constexpr std::size_t kNumberText = 2, kPointText = 3 * kNumberText, kVertexText = 2 * kPointText,
                       kTriangleText = 3 * kNumberText, kTetrahedronText = 4 * kNumberText,
                       kGeometryText = std::string_view("geometry 0 0 0 ").size(),
-                      kPairText = std::string_view("pair 0 0 Auto Auto 0 All ").size();
+                      kPairText = std::string_view("pair 0 0 Auto Auto 0 All ").size(),
+                      kSideText = std::string_view("EdgeEdge 0 0 0 0 0 ").size();
 
 /// The size of a list. A Reader resizes the list to it. least: characters of an item.
 template <class File>
@@ -241,7 +243,16 @@ void pairLine(File& file, PairType& pair, int version) {
   if (version >= 12) file.real(pair.settings.freeMotionReach);
   if (version >= 13) fieldOf(file, pair.settings.trackContacts);
   if (version >= 13) fieldOf(file, pair.settings.reportCrossings);
-  if (version >= 14) file.integer(pair.settings.priority);
+  if (version < 14) return;
+  file.integer(pair.settings.priority);
+  fieldOf(file, pair.settings.smoothNormals);
+  fieldOf(file, pair.settings.rememberSides);
+  sizeOf(file, pair.sides, kSideText);
+  for (auto& side : pair.sides) {
+    file.word(side.kind, kPassages);
+    fieldOf(file, side.ids);
+    fieldOf(file, side.forward);
+  }
 }
 
 template <class File, class FilterType>
@@ -388,8 +399,11 @@ void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
     if (mesh.field && !isField) detection.attachDistanceField(id, mesh.field);
     if (mesh.proxy) detection.attachSurfaceProxy(id, mesh.proxy);
   }
-  for (const CollisionProblem::Pair& pair : problem.pairs)
+  for (const CollisionProblem::Pair& pair : problem.pairs) {
     detection.addCollisionPair(GeometryId{pair.a}, GeometryId{pair.b}, pair.settings);
+    if (!pair.sides.empty())
+      detection.setRememberedSides(GeometryId{pair.a}, GeometryId{pair.b}, pair.sides);
+  }
 }
 
 /// Throws what readCapture() would throw.

@@ -61,6 +61,8 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
         {indices.at(record->a), indices.at(record->b), record->pair.settings,
          record->plan.kind == PairKind::AttachedProxy ? Method::Proxy : record->plan.method,
          static_cast<bool>(record->predicate)});
+    if (record->sides)
+      problem.pairs.back().sides = record->sides->list(record->meshes(), geometries.stepNumber());
     if (record->pair.settings.restDistance > 0.0)
       copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,
                               record->a->body.mesh.rest);

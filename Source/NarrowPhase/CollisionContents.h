@@ -33,6 +33,10 @@ struct CollisionData::Contents : CountedObject {
   CountedVector<ContactTags>& tagsOf(ContactKind kind) {
     return tags[static_cast<std::size_t>(kind)];
   }
+  struct Smooth {  ///< PairSettings::smoothNormals: parallel to the lists
+    CountedVector<Eigen::Vector3d> vertexTriangle, triangleVertex, edgeEdge, shape;
+  } smooth{};
+  CountedVector<Crossing> rememberedSides{};
 
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {

@@ -115,7 +115,7 @@ class ContactFinder {
                                         m_settings.timeTolerance)
                           : findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    if (m_pair.settings.reportCrossings && answer.impact)
+    if (m_pair.findsPassages() && answer.impact)
       addPassages(features, firstId, secondId, swapped, query);
     return answer.impact && boxesMeet(query, m_settings.minimumDistance) &&
            add(features, firstId, secondId, swapped, query, answer.time, true);

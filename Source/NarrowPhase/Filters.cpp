@@ -127,8 +127,9 @@ bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
                                                 pair.a.tagOfEdge(p), pair.b.tagOfEdge(q)}));
 }
 
-bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction) {
-  return Surface(mesh, 1.0).isBelow(feature, direction);
+bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction,
+               double time) {
+  return Surface(mesh, time).isBelow(feature, direction);
 }
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,

@@ -36,10 +36,11 @@ bool rejectsEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB);
 bool pointsInward(const MeshPair&, const std::array<MeshFeature, 2>& features,
                   const Eigen::Vector3d& direction, double time);
 
-/// Whether a direction from a feature points below the mesh's surface at the step's end. A feature
+/// Whether a direction from a feature points below the mesh's surface at a time. A feature
 /// between faces and the other side of a folded one are decided in double: within rounding of a
 /// face's plane either answer is possible.
-bool liesBelow(const TriangleMesh&, const MeshFeature&, const Eigen::Vector3d& direction);
+bool liesBelow(const TriangleMesh&, const MeshFeature&, const Eigen::Vector3d& direction,
+               double time = 1.0);
 
 /// The same at the step's end, for features with a measured distance. Features at distance 0 have
 /// no direction, and never point inward.

@@ -55,6 +55,7 @@ struct MeshPair {
   /// For a StepGuard: Continuous reports features with radii that come nearer than findNearing()
   /// lets them.
   bool keepsApart = false;
+  bool findsPassages() const { return settings.reportCrossings || settings.rememberSides; }
   bool reportsDistinct() const { return settings.contacts == Contacts::Distinct; }
   double thicknessAtEnd() const { return settings.thickness + step.extraThickness; }
   /// L: features whose distance without radii is larger than this are no contacts.

@@ -65,6 +65,8 @@ PairSettings pairSettingsOf(const palpate_pair_settings* settings) {
           .freeMotionReach = s.free_motion_reach,
           .trackContacts = s.track_contacts != 0,
           .reportCrossings = s.report_crossings != 0,
+          .smoothNormals = s.smooth_normals != 0,
+          .rememberSides = s.remember_sides != 0,
           .continuous = {.timeTolerance = s.time_tolerance,
                          .earliestTimeOnly = s.earliest_time_only != 0},
           .automatic = {.motionTolerance = s.motion_tolerance},
@@ -86,7 +88,9 @@ palpate_pair_settings fromPairSettings(const PairSettings& s) {
           .priority = s.priority,
           .earliest_time_only = s.continuous.earliestTimeOnly,
           .track_contacts = s.trackContacts,
-          .report_crossings = s.reportCrossings};
+          .report_crossings = s.reportCrossings,
+          .smooth_normals = s.smoothNormals,
+          .remember_sides = s.rememberSides};
 }
 
 /// Sets the id of what add() adds. Nothing is added if there is no place for it.

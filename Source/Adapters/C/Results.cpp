@@ -70,6 +70,19 @@ std::span<const TrackedContact> trackedOf(const CollisionData& data, ContactKind
   return data.trackedShapeShape();
 }
 
+std::span<const Eigen::Vector3d> smoothOf(const CollisionData& data, ContactKind kind) {
+  switch (kind) {
+    case ContactKind::VertexTriangle:
+      return data.smoothVertexTriangle();
+    case ContactKind::TriangleVertex:
+      return data.smoothTriangleVertex();
+    case ContactKind::EdgeEdge:
+      return data.smoothEdgeEdge();
+    default:
+      return data.smoothShape();
+  }
+}
+
 /// Not a twin: TrackedContact has a std::optional.
 palpate_tracked_contact fromTracked(const TrackedContact& contact) {
   return {.key = fromTwin<palpate_contact_key>(contact.key),
@@ -203,6 +216,33 @@ palpate_status palpate_get_crossings(const palpate_cd* cd, palpate_id a, palpate
     const auto all = dataOf(cd, a, b).crossings();
     *crossings = fromTwins<palpate_crossing>(all.data());
     *count = all.size();
+  });
+}
+
+palpate_status palpate_get_smooth_normals(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                          int kind, const double** normals, size_t* count) {
+  return guarded(__func__, [&] {
+    given(normals, "normals"), given(count, "count");
+    const auto list = enumerator(kind, ContactKind::Shape, "kind");
+    const auto all = smoothOf(dataOf(cd, a, b), list);
+    static_assert(sizeof(Eigen::Vector3d) == 3 * sizeof(double));
+    *normals = all.empty() ? nullptr : all.data()->data();
+    *count = all.size();
+  });
+}
+palpate_status palpate_get_remembered_sides(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                            const palpate_crossing** sides, size_t* count) {
+  return guarded(__func__, [&] {
+    given(sides, "sides"), given(count, "count");
+    const auto all = dataOf(cd, a, b).rememberedSides();
+    *sides = fromTwins<palpate_crossing>(all.data());
+    *count = all.size();
+  });
+}
+palpate_status palpate_set_remembered_sides(palpate_cd* cd, palpate_id a, palpate_id b,
+                                            const palpate_crossing* sides, size_t count) {
+  return guarded(__func__, [&] {
+    of(cd).setRememberedSides(GeometryId{a}, GeometryId{b}, twins(sides, count, "sides"));
   });
 }
 

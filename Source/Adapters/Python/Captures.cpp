@@ -145,6 +145,8 @@ never changes, and its properties are copies.)");
   addProperty(pair, "method", "The Method that answered.", [](const Pair& p) { return p.method; });
   addProperty(pair, "predicate", "Whether the pair has a predicate, which a problem cannot hold.",
               [](const Pair& p) { return p.predicate; });
+  addProperty(pair, "sides", "With remember_sides the records of CollisionData.remembered_sides.",
+              [](const Pair& p) { return recordsOf(std::span<const Crossing>(p.sides)); });
   pair.def("__repr__", [](const PartOf<Pair>& self) {
     return "<palpate.ProblemPair (" + std::to_string(self.part->a) + ", " +
            std::to_string(self.part->b) + "): " + toString(self.part->settings.method) + ">";

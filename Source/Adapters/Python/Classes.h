@@ -97,6 +97,8 @@ inline constexpr auto kFields<PairSettings> = std::tuple(
     field("free_motion_reach", &PairSettings::freeMotionReach),
     field("track_contacts", &PairSettings::trackContacts),
     field("report_crossings", &PairSettings::reportCrossings),
+    field("smooth_normals", &PairSettings::smoothNormals),
+    field("remember_sides", &PairSettings::rememberSides),
     field(
         "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }),
     field("priority", &PairSettings::priority));

@@ -42,6 +42,13 @@ void addTracked(DataClass& data, const char* name,
       text);
 }
 
+/// A property with one unit normal for each contact of a list.
+void addNormals(DataClass& data, const char* name,
+                std::span<const Eigen::Vector3d> (CollisionData::*list)() const, const char* text) {
+  data.def_property_readonly(
+      name, [list](const CollisionData& self) { return copyOf((self.*list)()); }, text);
+}
+
 py::object stencils(const CollisionData& data, const py::object& firstA, const py::object& firstB) {
   const std::uint32_t a = elementIndex(firstA, "first_a"), b = elementIndex(firstB, "first_b");
   const std::size_t count =
@@ -281,6 +288,19 @@ A pickled copy has none.)");
 OctreeBasedCD.set_tags(): (n, 2), the tags of both geometries' features for each contact of the list
 of this ContactKind; vertices and edges have that of the lowest enabled element that holds them.
 Empty if neither geometry has tags, and in a pickled copy.)");
+  addNormals(data, "smooth_vertex_triangle", &CollisionData::smoothVertexTriangle,
+             R"(With smooth_normals (n, 3) unit normals, one for each contact of vertex_triangle.
+
+They are interpolated between the normals of the mesh's vertices, on the side of the contact's
+normal. rows() and constraint_rows() use them. A pickled copy has none.)");
+  addNormals(data, "smooth_triangle_vertex", &CollisionData::smoothTriangleVertex,
+             "The same for triangle_vertex.");
+  addNormals(data, "smooth_edge_edge", &CollisionData::smoothEdgeEdge, "The same for edge_edge.");
+  addNormals(data, "smooth_shape", &CollisionData::smoothShape, "The same for shape.");
+  addList(data, "remembered_sides", &CollisionData::rememberedSides,
+          R"(With remember_sides the passages of earlier steps from which nothing has returned.
+
+They are records as those of `crossings`, of the step's start, with time 0. A pickled copy has none.)");
   data.def_property_readonly("earliest_time_of_impact", &CollisionData::earliestTimeOfImpact,
                              "The least time of impact, in [0, 1]; infinity without contacts.")
       .def_property_readonly("error_bound", &CollisionData::errorBound,

@@ -27,8 +27,11 @@ std::chrono::microseconds microsecondsOf(double seconds) {
 void addFrames(CollisionsClass& collisions) {
   collisions
       .def(
-          "advance", [](Collisions& self) { self.change([](OctreeBasedCD& d) { d.advance(); }); },
-          "advance() -> None\n\nEnds the step: the positions now become those before.")
+          "advance", [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.advance(); }); },
+          R"(advance() -> None
+
+Ends the step: the positions now become those before. With PairSettings.remember_sides it detects
+crossings up to positions that were set after the last detection. Releases the GIL.)")
       .def(
           "update", [](Collisions& self) { self.work([](OctreeBasedCD& d) { d.update(); }); },
           "update() -> None\n\nBrings octrees to the positions now. Others do so themselves.")

@@ -181,6 +181,18 @@ Gives 64 bits each to contacts of the last detection, for as long as they last a
 successors. keys: the field `key` of records such as CollisionData.tracked_edge_edge, or one of
 them. data: one integer, or one for each key.)")
       .def(
+          "set_remembered_sides",
+          [](Collisions& self, Object first, Object second, Object sides) {
+            const GeometryId a = geometryId(first), b = geometryId(second);
+            const std::vector<Crossing> all = structsIn<Crossing>(sides);
+            self.change([&](OctreeBasedCD& d) { d.setRememberedSides(a, b, all); });
+          },
+          py::arg("a"), py::arg("b"), py::arg("sides"),
+          R"(set_remembered_sides(a, b, sides) -> None
+
+Replaces CollisionData.remembered_sides of the present step by such records; an empty array of them,
+as CollisionData.remembered_sides[:0], forgets all sides.)")
+      .def(
           "free_motion",
           [](Collisions& self, Object geometry) {
             const GeometryId id = geometryId(geometry);

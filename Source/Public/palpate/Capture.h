@@ -79,6 +79,8 @@ struct CollisionProblem {
     PairSettings settings;
     Method method;           ///< the method that answered; no answer depends on it
     bool predicate = false;  ///< of which there is no copy: a replay may find more
+    /// CollisionData::rememberedSides() of the step.
+    std::vector<Crossing> sides{};
   };
   Settings settings;  ///< without an executor
   std::vector<Geometry> geometries;

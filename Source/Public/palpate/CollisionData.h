@@ -23,7 +23,8 @@ namespace palpate {
 //          positions at that time. Continuous adds timeTolerance times the relative motion.
 // Time     contacts by Proximity and Intersection, also in Auto, are at the step's end: time 1.
 // Sign     a distance is negative where (1) radii overlap, (2) a shape overlaps, (3) by
-//          Intersection a vertex is behind the triangle or edges have crossed, (4) Side applies.
+//          Intersection a vertex is behind the triangle or edges have crossed, (4) Side applies,
+//          (5) by rememberSides features have passed through each other in an earlier step.
 // Depth    Intersection: a vertex is behind a surface if an edge leaves the surface towards it. It
 //          has one contact of negative distance: with the nearest feature around the triangles
 //          that its edges pierce, in the lowest triangle of that feature behind which it is. In
@@ -191,8 +192,23 @@ class PALPATE_EXPORT CollisionData {
   ContactTags tagsOf(const ShapeContact&) const;
   ContactTags tagsOf(const ShapeShapeContact&) const;
 
-  /// Of all contacts in their order, without validity(), tracking and tags: the same bits on every
-  /// machine.
+  /// With PairSettings::smoothNormals one unit normal for each contact, in the same order; else
+  /// empty. It is interpolated between the angle-weighted normals of the mesh's vertices, with the
+  /// contact's weights and at its time, and is on the side of the contact's normal. For two edges
+  /// both meshes count, for a vertex only that of the triangle. It is the contact's normal where
+  /// both are over 60 degrees apart, and without a triangle.
+  std::span<const Eigen::Vector3d> smoothVertexTriangle() const;
+  std::span<const Eigen::Vector3d> smoothTriangleVertex() const;
+  std::span<const Eigen::Vector3d> smoothEdgeEdge() const;
+  std::span<const Eigen::Vector3d> smoothShape() const;
+
+  /// With PairSettings::rememberSides the passages from which features had not returned when this
+  /// step began. Each names the features that were nearest then; its time is 0.
+  /// Order    by kind, ids.
+  std::span<const Crossing> rememberedSides() const;
+
+  /// Of all contacts in their order, without validity(), tracking, tags and smooth normals: the same
+  /// bits on every machine.
   std::uint64_t hash() const;
 
   struct Contents;  ///< not part of the interface

@@ -16,17 +16,19 @@ namespace palpate {
 
 /// A contact as a row of a solver: gap(x) = normal . sum of weights[i] x[vertices[i]] - offset.
 /// Units    L. A solver keeps the gap at least h; the depth is h - gap (Docs/HowTo/Solvers.md).
+/// Normal   the smooth one of a pair with PairSettings::smoothNormals, else the contact's.
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
 ///          plus the element's radius; p is the shape's touched point, where it is at the step's
 ///          end.
 /// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
 ///          on by d until the step's end.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. It is also the distance's,
-///          unless radii differ along an element or the centres coincide.
+///          unless radii differ along an element, the centres coincide, or normals are smooth.
 ///          (3) a step along this row alone, by inverse masses, to a gap g > 0 gives the signed
 ///          distance g, up to (g + radii) (4 s / e)^2: s is the longest displacement of a vertex; e
 ///          the triangle's least height, or the shorter edge times the sine of the edges' angle. A
-///          vertex behind a triangle, next to an edge or corner, gets a distance in (0, g].
+///          vertex behind a triangle, next to an edge or corner, gets a distance in (0, g]. Not
+///          with smooth normals.
 struct ConstraintRow {
   /// The solver's numbers. One may occur again with weight 0, or if a triangle names it twice.
   std::array<std::uint32_t, 4> vertices;

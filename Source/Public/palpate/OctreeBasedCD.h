@@ -101,7 +101,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// without vertices; infinite for a plane. Linear in the vertices.
   Eigen::AlignedBox3d bounds(GeometryId) const;
 
-  void advance();  ///< `now` becomes `before`; results stay readable
+  /// `now` becomes `before`; results stay readable. Throws as detectCollision() if a pair with
+  /// PairSettings::rememberSides changed since it was last called.
+  void advance();
 
   /// Sets positions, one per vertex, in linear time. Only two arrays and advance() set `before`; in
   /// the step in which the geometry is added or its topology set, one array does, too.
@@ -258,6 +260,11 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// successor. (a, b) in the order of the addition.
   /// Errors   NotAvailable if the detection has no such contact, or does not track contacts.
   void setUserData(GeometryId a, GeometryId b, const ContactKey&, std::uint64_t);
+  /// Replaces CollisionData::rememberedSides() of the present step; none forgets all sides. Times
+  /// do not count. (a, b) is in the order of the addition.
+  /// Errors   NotAvailable without PairSettings::rememberSides; IndexOutOfRange for a feature that
+  ///          does not exist.
+  void setRememberedSides(GeometryId a, GeometryId b, std::span<const Crossing>);
   /// L, one per vertex, or one for a shape. While no point has moved further since the last
   /// detection, no new contact or crossing exists, rounding included
   /// (Docs/Algorithms/FreeMotion.md). Infinity without PairSettings::freeMotionReach. Valid until

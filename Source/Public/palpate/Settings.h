@@ -146,6 +146,12 @@ struct PairSettings {
   bool trackContacts = false;
   /// Of Continuous for meshes, lines and points: CollisionData::crossings().
   bool reportCrossings = false;
+  /// With a triangle or tetrahedral mesh: CollisionData::smoothVertexTriangle() and so on.
+  bool smoothNormals = false;
+  /// Of Continuous for meshes, lines and points: features that passed through each other in an
+  /// earlier step have contacts that lead back, until they have returned. advance() then detects
+  /// crossings up to positions that were set after the last detection.
+  bool rememberSides = false;
   ContinuousSettings continuous{};
   AutoSettings automatic{};
   LeafSettings proxy{};

@@ -120,6 +120,7 @@ typedef struct palpate_pair_settings {
   int priority;
   uint8_t earliest_time_only;
   uint8_t track_contacts, report_crossings;
+  uint8_t smooth_normals, remember_sides;
 } palpate_pair_settings;
 PALPATE_EXPORT palpate_status palpate_init_pair_settings(palpate_pair_settings* settings,
                                                          size_t size);
@@ -519,6 +520,19 @@ PALPATE_EXPORT palpate_status palpate_get_crossings(const palpate_cd* cd, palpat
                                                     palpate_id b,
                                                     const palpate_crossing** crossings,
                                                     size_t* count);
+/// A view of x, y, z of each contact of this kind. Empty without `smooth_normals`.
+PALPATE_EXPORT palpate_status palpate_get_smooth_normals(const palpate_cd* cd, palpate_id a,
+                                                         palpate_id b, int kind,
+                                                         const double** normals, size_t* count);
+/// A view. Empty without `remember_sides`.
+PALPATE_EXPORT palpate_status palpate_get_remembered_sides(const palpate_cd* cd, palpate_id a,
+                                                           palpate_id b,
+                                                           const palpate_crossing** sides,
+                                                           size_t* count);
+PALPATE_EXPORT palpate_status palpate_set_remembered_sides(palpate_cd* cd, palpate_id a,
+                                                           palpate_id b,
+                                                           const palpate_crossing* sides,
+                                                           size_t count);
 
 /// Bytes.
 typedef struct palpate_memory {

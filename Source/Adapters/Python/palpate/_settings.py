@@ -112,6 +112,8 @@ class PairSettings:
     free_motion_reach   L: positive: detect_collision() also finds free_motion(), up to half of this
     track_contacts      contacts have an identity: CollisionData.tracked_vertex_triangle and so on
     report_crossings    Continuous only: CollisionData.crossings
+    smooth_normals      CollisionData.smooth_vertex_triangle and so on, which rows use
+    remember_sides      Continuous only: contacts of what passed lead back until it has returned
     widest_normal_cone  rad, in (0, 1.5], Proxy only
     priority            detect_collision() with a budget begins with pairs of the highest priority
     """
@@ -127,6 +129,8 @@ class PairSettings:
     free_motion_reach: float = 0.0
     track_contacts: bool = False
     report_crossings: bool = False
+    smooth_normals: bool = False
+    remember_sides: bool = False
     widest_normal_cone: float = 0.25
     priority: int = 0
 

@@ -1,0 +1,519 @@
+#include "Tracking/SideMemory.h"
+
+#include "NarrowPhase/Filters.h"
+#include "NarrowPhase/Proximity.h"
+#include "NarrowPhase/SmoothNormals.h"
+#include "Math/ClosestPoint.h"
+#include "Exact/Predicates.h"
+#include "Core/Assert.h"
+
+#include <algorithm>
+#include <bit>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+using Eigen::Vector3d;
+using Side = SideMemory::Side;
+
+bool isEdges(const Crossing& passage) { return passage.kind == ContactKind::EdgeEdge; }
+Segment edgeA(const Crossing& passage) { return {passage.ids[0], passage.ids[1]}; }
+Segment edgeB(const Crossing& passage) { return {passage.ids[2], passage.ids[3]}; }
+
+bool precedes(const Side& l, const Side& r) {
+  return std::tie(l.passage.kind, l.passage.ids) < std::tie(r.passage.kind, r.passage.ids);
+}
+bool areEqual(const Side& l, const Side& r) {
+  return l.passage == r.passage && l.corners == r.corners;
+}
+void sortUnique(Buffer<Side>& sides) {
+  std::sort(sides.begin(), sides.end(), precedes);
+  sides.erase(std::unique(sides.begin(), sides.end(),
+                          [](const Side& l, const Side& r) { return !precedes(l, r); }),
+              sides.end());
+}
+
+/// A vertex and a triangle: of which meshes they are, and by what ids of a passage.
+struct VertexSide {
+  VertexSide(const MeshPair& pair, ContactKind kind)
+      : swapped(kind == ContactKind::TriangleVertex),
+        vertices(swapped ? pair.b : pair.a),
+        triangles(swapped ? pair.a : pair.b) {}
+  std::uint32_t vertexOf(const Crossing& p) const { return p.ids[swapped]; }
+  std::uint32_t triangleOf(const Crossing& p) const { return p.ids[!swapped]; }
+
+  bool swapped;
+  const TriangleMesh &vertices, &triangles;
+};
+
+/// At an end of the step.
+const Positions& at(const TriangleMesh& mesh, bool now) { return now ? mesh.now : mesh.before; }
+
+VertexTriangleDistance distanceOf(const VertexSide& of, std::uint32_t vertex,
+                                  const Triangle& corners, bool now) {
+  const Positions& p = at(of.triangles, now);
+  return finiteVertexTriangleDistance(at(of.vertices, now)[vertex], p[corners[0]], p[corners[1]],
+                                      p[corners[2]]);
+}
+
+EdgeEdgeDistance distanceOf(const MeshPair& pair, const Segment& a, const Segment& b, bool now) {
+  const Positions &p = at(pair.a, now), &q = at(pair.b, now);
+  return finiteEdgeEdgeDistance(p[a[0]], p[a[1]], q[b[0]], q[b[1]]);
+}
+
+/// Whether features may still be a contact: they exist, are enabled, and no filter rejects them.
+bool mayTouch(const MeshPair& pair, const VertexSide& of, std::uint32_t vertex,
+              std::uint32_t triangle) {
+  return of.triangles.topology.isEnabled(triangle) && !pair.excludesVertex(vertex, triangle) &&
+         !rejectsVertex(pair, vertex, triangle, of.swapped);
+}
+bool mayTouch(const MeshPair& pair, const Segment& a, const Segment& b) {
+  std::uint32_t p = pair.a.topology.edgeOf(a), q = pair.b.topology.edgeOf(b);
+  if (pair.self() && q < p) std::swap(p, q);
+  return p != kNoEdge && q != kNoEdge && !pair.a.topology.edgeTriangles[p].empty() &&
+         !pair.b.topology.edgeTriangles[q].empty() && !pair.excludesEdges(p, q) &&
+         !rejectsEdges(pair, p, q);
+}
+
+/// Calls f(edge, isTurned) for the enabled edges that have a common vertex with this one. isTurned:
+/// a path through both has one of them reversed.
+template <class F>
+void forEachNeighbour(const MeshTopology& topology, const Segment& edge, F&& f) {
+  for (int end = 0; end < 2; ++end)
+    for (const std::uint32_t t : topology.vertexTriangles[edge[end]])
+      for (const std::uint32_t id : topology.triangleEdges[t]) {
+        if (id == kNoEdge) continue;
+        const Segment& other = topology.edges[id];
+        if (other != edge && (other[0] == edge[end] || other[1] == edge[end]))
+          f(other, other[end == 0] != edge[end]);
+      }
+}
+
+/// Whether other is edge or has a common vertex with it; sets isTurned then.
+bool isNear(const Segment& edge, const Segment& other, bool& isTurned) {
+  isTurned = false;
+  if (edge == other) return true;
+  for (int end = 0; end < 2; ++end)
+    for (int k = 0; k < 2; ++k)
+      if (edge[end] == other[k]) return isTurned = end == k, true;
+  return false;
+}
+
+bool shareCorner(const Triangle& s, const Triangle& t) {
+  return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) { return containsVertex(t, v); });
+}
+
+/// Slides a vertex along the surface to the next triangle that is nearer to it.
+bool slideVertex(const MeshPair& pair, bool now, Side& side) {
+  const VertexSide of(pair, side.passage.kind);
+  const MeshTopology& topology = of.triangles.topology;
+  const std::uint32_t vertex = of.vertexOf(side.passage);
+  PALPATE_ASSERT(topology.elements[of.triangleOf(side.passage)] == side.corners);
+  double least = distanceOf(of, vertex, side.corners, now).distance;
+  std::uint32_t nearest = kNoElement;
+  for (const std::uint32_t corner : side.corners)
+    for (const std::uint32_t t : topology.vertexTriangles[corner]) {
+      const double distance = distanceOf(of, vertex, topology.elements[t], now).distance;
+      if (!(distance < least) || !mayTouch(pair, of, vertex, t)) continue;
+      least = distance;
+      nearest = t;
+    }
+  if (nearest == kNoElement) return false;
+  side.passage.ids[!of.swapped] = nearest;
+  side.corners = topology.elements[nearest];
+  return true;
+}
+
+/// The same for two edges, one of which slides on.
+bool slideEdges(const MeshPair& pair, bool now, Side& side) {
+  const Segment a = edgeA(side.passage), b = edgeB(side.passage);
+  double least = distanceOf(pair, a, b, now).distance;
+  Crossing nearest = side.passage;
+  const auto offer = [&](const Segment& nextA, const Segment& nextB, bool isTurned) {
+    const double distance = distanceOf(pair, nextA, nextB, now).distance;
+    if (!(distance < least) || !mayTouch(pair, nextA, nextB)) return;
+    least = distance;
+    nearest.ids = {nextA[0], nextA[1], nextB[0], nextB[1]};
+    nearest.forward = side.passage.forward != isTurned;
+  };
+  forEachNeighbour(pair.a.topology, a, [&](const Segment& e, bool turned) { offer(e, b, turned); });
+  forEachNeighbour(pair.b.topology, b, [&](const Segment& e, bool turned) { offer(a, e, turned); });
+  if (nearest == side.passage) return false;
+  if (pair.self() && edgeB(nearest) < edgeA(nearest))  // the same side of both
+    nearest.ids = {nearest.ids[2], nearest.ids[3], nearest.ids[0], nearest.ids[1]};
+  side.passage = nearest;
+  return true;
+}
+
+bool slide(const MeshPair& pair, bool now, Side& side) {
+  return isEdges(side.passage) ? slideEdges(pair, now, side) : slideVertex(pair, now, side);
+}
+
+/// Whether a point of the feature has the surface on all sides of it, or the line on both.
+bool isInside(const MeshTopology& topology, const MeshFeature& feature) {
+  if (feature.kind == MeshFeature::Kind::Face) return true;
+  if (feature.kind == MeshFeature::Kind::Vertex)
+    return topology.hasFaces() ? topology.hasClosedStar[feature.id] != 0
+                               : topology.vertexTriangles[feature.id].size() > 1;
+  return !topology.hasFaces() || topology.edgeTriangles[feature.id].size() == 2;
+}
+
+/// Whether the exact side of the plane through the features is the one to which they passed.
+bool isOn(bool forward, const Vector3d& a, const Vector3d& b, const Vector3d& c,
+          const Vector3d& d) {
+  SignCounts counts;
+  const int sign = orient3d(a, b, c, d, counts);
+  return sign == 0 || (sign > 0) == forward;
+}
+
+/// Finds a triangle with these corners, whatever its index is now. Returns whether there is one.
+bool findTriangle(const MeshTopology& topology, const Triangle& corners, std::uint32_t& triangle) {
+  if (triangle < topology.elements.size() && topology.elements[triangle] == corners) return true;
+  if (corners[0] >= topology.vertexCount) return false;
+  for (const std::uint32_t t : topology.vertexTriangles[corners[0]])
+    if (topology.elements[t] == corners) return triangle = t, true;
+  return false;
+}
+
+/// Brings a side to the positions at the step's start. Returns whether it lasts.
+bool locateVertex(const MeshPair& pair, Side& side) {
+  const VertexSide of(pair, side.passage.kind);
+  const std::uint32_t vertex = of.vertexOf(side.passage);
+  if (vertex >= of.vertices.topology.vertexCount ||
+      of.vertices.topology.vertexTriangles[vertex].empty() ||
+      !findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]) ||
+      !mayTouch(pair, of, vertex, of.triangleOf(side.passage)))
+    return false;
+  while (slideVertex(pair, false, side)) {
+  }
+  const VertexTriangleDistance measured = distanceOf(of, vertex, side.corners, false);
+  const MeshFeature feature =
+      featureOf(of.triangles.topology, of.triangleOf(side.passage), measured.feature);
+  if (feature.kind != MeshFeature::Kind::Face)
+    return isInside(of.triangles.topology, feature) &&
+           (measured.distance == 0.0 ||
+            liesBelow(of.triangles, feature, measured.difference, 0.0) != side.passage.forward);
+  const Positions& p = of.triangles.before;
+  const auto& [a, b, c] = side.corners;
+  return isOn(side.passage.forward, p[a], p[b], p[c], of.vertices.before[vertex]);
+}
+
+bool locateEdges(const MeshPair& pair, Side& side) {
+  if (!mayTouch(pair, edgeA(side.passage), edgeB(side.passage))) return false;
+  while (slideEdges(pair, false, side)) {
+  }
+  const Segment a = edgeA(side.passage), b = edgeB(side.passage);
+  const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
+  const EdgeEdgeDistance measured = distanceOf(pair, a, b, false);
+  const MeshFeature onA = featureOf(ofA, ofA.edgeOf(a), measured.featureA),
+                    onB = featureOf(ofB, ofB.edgeOf(b), measured.featureB);
+  constexpr auto kVertex = MeshFeature::Kind::Vertex;
+  if (onA.kind == kVertex || onB.kind == kVertex)
+    return (onA.kind != kVertex || isInside(ofA, onA)) &&
+           (onB.kind != kVertex || isInside(ofB, onB));
+  const Positions &p = pair.a.before, &q = pair.b.before;
+  return isOn(side.passage.forward, p[a[0]], p[a[1]], q[b[0]], q[b[1]]);
+}
+
+/// The contacts of a remembered side: at the step's start, with the normal that leads back.
+VertexTriangleContact contactOfVertex(const MeshPair& pair, const Side& side) {
+  const VertexSide of(pair, side.passage.kind);
+  const std::uint32_t vertex = of.vertexOf(side.passage);
+  VertexTriangleDistance measured = distanceOf(of, vertex, side.corners, false);
+  if (measured.feature == TriangleFeature::Face || measured.distance == 0.0) {
+    const Positions& p = of.triangles.before;
+    const auto& [a, b, c] = side.corners;
+    measured.normal = windingNormal(p[a], p[b], p[c]);
+    if (!side.passage.forward) measured.normal = -measured.normal;
+  }
+  VertexTriangleContact contact =
+      contactOf(vertex, of.triangleOf(side.passage), side.corners, measured, 0.0);
+  contact.normal = -contact.normal;
+  contact.distance = -contact.distance - (pair.a.largestRadius + pair.b.largestRadius);
+  return contact;
+}
+
+EdgeEdgeContact contactOfEdges(const MeshPair& pair, const Side& side) {
+  const Segment a = edgeA(side.passage), b = edgeB(side.passage);
+  EdgeEdgeDistance measured = distanceOf(pair, a, b, false);
+  const bool areInteriors =
+      measured.featureA == EdgeFeature::Interior && measured.featureB == EdgeFeature::Interior;
+  if ((areInteriors || measured.distance == 0.0) && !measured.parallel) {
+    const Positions &p = pair.a.before, &q = pair.b.before;
+    measured.normal = normalOfCrossing(p[a[0]], p[a[1]], q[b[0]], q[b[1]]);
+    if (!side.passage.forward) measured.normal = -measured.normal;
+  }
+  EdgeEdgeContact contact = contactOf(a, b, measured, 0.0);
+  contact.normal = -contact.normal;
+  contact.distance = -contact.distance - (pair.a.largestRadius + pair.b.largestRadius);
+  return contact;
+}
+
+Crossing featuresOf(ContactKind kind, const VertexTriangleContact& contact) {
+  Crossing features{kind, {contact.vertex, contact.triangle, kNoElement, kNoElement}};
+  if (kind == ContactKind::TriangleVertex) std::swap(features.ids[0], features.ids[1]);
+  return features;
+}
+Crossing featuresOf(ContactKind kind, const EdgeEdgeContact& contact) {
+  return {kind, {contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]}};
+}
+
+template <class Contact>
+void insert(CountedVector<Contact>& contacts, ContactKind kind, const Contact& contact) {
+  const auto place = std::lower_bound(contacts.begin(), contacts.end(), contact,
+                                      [&](const Contact& l, const Contact& r) {
+                                        return featuresOf(kind, l).ids < featuresOf(kind, r).ids;
+                                      });
+  PALPATE_ASSERT(place == contacts.end() ||
+                 featuresOf(kind, *place).ids != featuresOf(kind, contact).ids);
+  contacts.insert(place, contact);
+}
+
+}  // namespace
+
+void SideMemory::startStep(std::uint64_t step) noexcept {
+  if (std::exchange(m_step, step) == step) return;
+  if (std::ranges::equal(m_start, m_end, areEqual)) return;
+  m_start.swap(m_end);
+  ++m_version;
+}
+
+void SideMemory::set(std::uint64_t step, std::span<const Side> sides) {
+  m_start.assign(sides.begin(), sides.end());
+  sortUnique(m_start);
+  m_step = step;
+  ++m_version;
+}
+
+void SideMemory::forget() noexcept {
+  if (!m_start.empty()) ++m_version;
+  for (auto* sides : {&m_start, &m_end, &m_next, &m_here}) sides->clear();
+  m_courses.clear();
+}
+
+/// The list with the courses of a vertex, or of all edges.
+std::size_t SideMemory::listOf(const Crossing& features) const {
+  PALPATE_ASSERT(!m_heads.empty() && features.kind <= ContactKind::EdgeEdge);
+  if (isEdges(features)) return m_heads.size() - 1;
+  const bool ofB = features.kind == ContactKind::TriangleVertex;
+  return (std::size_t{2} * features.ids[ofB] + ofB) & (m_heads.size() - 2);
+}
+
+/// Whether f(index of a course) is true for any course of the vertex, or of edges.
+template <class F>
+bool SideMemory::anyCourse(const Crossing& features, F&& f) const {
+  const bool ofB = features.kind == ContactKind::TriangleVertex;
+  for (std::uint32_t i = m_heads[listOf(features)]; i != kNoElement; i = m_courses[i].next) {
+    const Crossing& own = m_courses[i].side.passage;
+    if (own.kind == features.kind && (isEdges(own) || own.ids[ofB] == features.ids[ofB]) && f(i))
+      return true;
+  }
+  return false;
+}
+
+/// To which side a vertex had passed when the step began; none if it had not. kind: of vertices of
+/// its mesh.
+std::optional<bool> SideMemory::sideOf(ContactKind kind, std::uint32_t vertex) const {
+  std::optional<bool> forward;
+  anyCourse({kind, {vertex, vertex}}, [&](std::uint32_t i) {
+    if (i < m_here.size()) forward = m_here[i].passage.forward;
+    return forward.has_value();
+  });
+  return forward;
+}
+
+/// The same for all vertices with weight.
+template <std::size_t N>
+std::optional<bool> SideMemory::sideOf(ContactKind kind, const Part<N>& part) const {
+  std::optional<bool> forward;
+  for (std::size_t i = 0; i < N; ++i) {
+    if (part.weights[i] == 0.0) continue;
+    const std::optional<bool> side = sideOf(kind, part.vertices[i]);
+    if (!side || (forward && forward != side)) return {};
+    forward = side;
+  }
+  return forward;
+}
+
+/// Turns contacts of elements all of whose vertices had passed through the other mesh. Not where
+/// they are clearly on the side from which they came: this is another fold of the surface.
+void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
+  constexpr double kClearly = 0.5;  // a cosine; directions along the surface are on no side
+  constexpr ContactKind kOfA = ContactKind::VertexTriangle, kOfB = ContactKind::TriangleVertex;
+  const auto hasPassed = [&](ContactKind kind, const auto& part, const TriangleMesh& surface,
+                             const auto& onSurface, const Vector3d& direction, double time) {
+    const std::optional<bool> forward = sideOf(kind, part);
+    if (!forward) return false;
+    const Vector3d normal =
+        interpolatedNormal(surface, onSurface.vertices, onSurface.weights.data(), time);
+    return (*forward ? -1.0 : 1.0) * direction.dot(normal) < kClearly;
+  };
+  // a, b: parts of both meshes. toA: from b to a.
+  const auto turn = [&](auto& contact, const auto& a, const auto& b, const Vector3d& toA) {
+    const double time = contact.timeOfImpact;
+    if (!hasPassed(kOfA, a, pair.b, b, toA, time) && !hasPassed(kOfB, b, pair.a, a, -toA, time))
+      return;
+    contact.normal = -contact.normal;
+    contact.distance = -contact.distance - 2.0 * (pair.a.largestRadius + pair.b.largestRadius);
+  };
+  const auto vertexOf = [](const VertexTriangleContact& c) { return Part<1>{{c.vertex}, {1.0}}; };
+  const auto cornersOf = [](const VertexTriangleContact& c) {
+    return Part<3>{c.vertices, {c.weights[0], c.weights[1], c.weights[2]}};
+  };
+  const auto endsOf = [](const Segment& edge, double weight) {
+    return Part<2>{edge, {1.0 - weight, weight}};
+  };
+  for (auto& c : contents.vertexTriangle) turn(c, vertexOf(c), cornersOf(c), c.normal);
+  for (auto& c : contents.triangleVertex) turn(c, cornersOf(c), vertexOf(c), -c.normal);
+  for (auto& c : contents.edgeEdge)
+    turn(c, endsOf(c.edgeA, c.weightA), endsOf(c.edgeB, c.weightB), c.normal);
+}
+
+/// Whether features are among those along which a side of the same vertex, or of edges, slides, or
+/// next to them. isSame: receives whether the passage has the direction in which the side passed.
+bool SideMemory::contains(const Course& course, const Side& features, bool* isSame) const {
+  const Crossing& passage = features.passage;
+  const std::size_t end = course.first + course.count;
+  PALPATE_ASSERT(course.count > 0 && end <= m_visited.size());
+  for (std::size_t i = course.first; i < end; ++i) {
+    const auto& [visited, corners] = m_visited[i];
+    bool isTurnedA = false, isTurnedB = false;
+    if (isEdges(passage) ? !isNear(edgeA(visited), edgeA(passage), isTurnedA) ||
+                               !isNear(edgeB(visited), edgeB(passage), isTurnedB)
+                         : !shareCorner(corners, features.corners))
+      continue;
+    if (isSame) *isSame = (visited.forward == passage.forward) == (isTurnedA == isTurnedB);
+    return true;
+  }
+  return false;
+}
+
+void SideMemory::add(const MeshPair& pair, const Side& side, double time) {
+  Course course{side, time, true, m_visited.size(), 0, kNoElement};
+  do m_visited.push_back(course.side);
+  while (slide(pair, true, course.side));
+  course.count = m_visited.size() - course.first;
+  course.next =
+      std::exchange(m_heads[listOf(side.passage)], static_cast<std::uint32_t>(m_courses.size()));
+  m_courses.push_back(course);
+}
+
+/// A passage undoes that of a side next to it in the other direction. One in the same direction is
+/// the same passage, through a common edge or vertex.
+void SideMemory::take(const MeshPair& pair, const Crossing& passage) {
+  PALPATE_ASSERT(passage.kind <= ContactKind::EdgeEdge);
+  Side side{passage, {}};
+  side.passage.time = 0.0;
+  if (!isEdges(passage)) {
+    const VertexSide of(pair, passage.kind);
+    side.corners = of.triangles.topology.elements[of.triangleOf(passage)];
+  }
+  bool isKnown = false, isSame = false;
+  anyCourse(passage, [&](std::uint32_t i) {
+    if (contains(m_courses[i], side, &isSame)) {
+      m_courses[i].hasPassed = isSame;
+      isKnown = true;
+    }
+    return false;
+  });
+  if (isKnown || (isEdges(passage) && hasPassedEnd(passage))) return;
+  add(pair, side, passage.time);
+}
+
+/// Whether an end of an edge passes through the surface of the other one. The edge then pierces the
+/// surface, and its passages through edges only move the place.
+bool SideMemory::hasPassedEnd(const Crossing& passage) const {
+  const auto passes = [&](ContactKind kind, std::uint32_t vertex) {
+    return anyCourse({kind, {vertex, vertex}}, [](std::uint32_t) { return true; });
+  };
+  const auto& [p, q, r, s] = passage.ids;
+  return passes(ContactKind::VertexTriangle, p) || passes(ContactKind::VertexTriangle, q) ||
+         passes(m_ofSecond, r) || passes(m_ofSecond, s);
+}
+
+void SideMemory::follow(const MeshPair& pair, std::span<const Crossing> passages) {
+  m_here.clear();
+  m_courses.clear();
+  m_visited.clear();
+  for (Side side : m_start)
+    if (isEdges(side.passage) ? locateEdges(pair, side) : locateVertex(pair, side))
+      m_here.push_back(side);
+  sortUnique(m_here);
+  m_ofSecond = pair.self() ? ContactKind::VertexTriangle : ContactKind::TriangleVertex;
+  m_heads.assign(std::bit_ceil(m_here.size() + passages.size() + 1) + 1, kNoElement);
+  for (const Side& side : m_here) add(pair, side, 0.0);
+  // Those of vertices first, each kind in the order of time.
+  m_order.resize(passages.size());
+  std::iota(m_order.begin(), m_order.end(), 0u);
+  std::sort(m_order.begin(), m_order.end(), [&](std::uint32_t l, std::uint32_t r) {
+    const auto keyOf = [&](std::uint32_t i) {
+      return std::tuple(isEdges(passages[i]), passages[i].time, i);
+    };
+    return keyOf(l) < keyOf(r);
+  });
+  for (const std::uint32_t i : m_order) take(pair, passages[i]);
+  m_next.clear();
+  for (const Course& course : m_courses)
+    if (course.hasPassed) m_next.push_back(course.side);
+  sortUnique(m_next);
+}
+
+void SideMemory::apply(const MeshPair& pair, Contents& contents) const {
+  contents.rememberedSides.clear();
+  for (const Side& side : m_here) contents.rememberedSides.push_back(side.passage);
+  if (m_courses.empty()) return;
+  // What had passed when the step began has the contacts below instead. What passes within the step
+  // keeps that of the features through which it passes, and those before.
+  const auto isReplaced = [&](const Side& features, double time) {
+    return anyCourse(features.passage, [&](std::uint32_t i) {
+      const Course& course = m_courses[i];
+      const bool isLater = course.hasPassed && time > course.time &&
+                           m_visited[course.first].passage.ids != features.passage.ids;
+      return (i < m_here.size() || isLater) && contains(course, features);
+    });
+  };
+  const auto replace = [&](ContactKind kind, auto& contacts, auto&& cornersOf) {
+    std::erase_if(contacts, [&](const auto& contact) {
+      return isReplaced({featuresOf(kind, contact), cornersOf(contact)}, contact.timeOfImpact);
+    });
+  };
+  const auto ofTriangle = [](const VertexTriangleContact& contact) { return contact.vertices; };
+  const auto ofEdges = [](const EdgeEdgeContact&) { return Triangle{}; };
+  replace(ContactKind::VertexTriangle, contents.vertexTriangle, ofTriangle);
+  replace(ContactKind::TriangleVertex, contents.triangleVertex, ofTriangle);
+  replace(ContactKind::EdgeEdge, contents.edgeEdge, ofEdges);
+  if (!pair.self()) turnPassed(pair, contents);
+  for (const Side& side : m_here)
+    if (isEdges(side.passage))
+      insert(contents.edgeEdge, side.passage.kind, contactOfEdges(pair, side));
+    else
+      insert(side.passage.kind == ContactKind::VertexTriangle ? contents.vertexTriangle
+                                                              : contents.triangleVertex,
+             side.passage.kind, contactOfVertex(pair, side));
+}
+
+std::vector<Crossing> SideMemory::list(const MeshPair& pair, std::uint64_t step) const {
+  std::vector<Crossing> all;
+  for (Side side : step == m_step ? m_start : m_end) {
+    const VertexSide of(pair, side.passage.kind);
+    if (isEdges(side.passage) ||
+        findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]))
+      all.push_back(side.passage);
+  }
+  return all;
+}
+
+void SideMemory::releaseMemory() {
+  for (auto* list : {&m_start, &m_end, &m_here}) releaseSpare(*list);
+  m_next = {};
+  m_courses = {};
+  m_visited = {};
+  m_heads = {};
+  m_order = {};
+}
+
+}  // namespace palpate

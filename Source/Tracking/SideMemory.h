@@ -1,0 +1,94 @@
+#pragma once
+
+#include <palpate/Tracking.h>
+
+#include "NarrowPhase/CollisionContents.h"
+#include "NarrowPhase/NarrowPhase.h"
+#include "Core/Buffer.h"
+#include "Core/MemoryBudget.h"
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace palpate {
+
+/// From which sides the features of one pair came (PairSettings::rememberSides).
+/// Docs/HowTo/ContactsOverTime.md
+/// has the rules. Its scratch remembers its peak.
+class SideMemory : public CountedObject {
+ public:
+  using Contents = CollisionData::Contents;
+  /// A passage from which the features have not returned, with the features between which they are
+  /// now.
+  struct Side {
+    Crossing passage;
+    Triangle corners;  ///< of the triangle
+  };
+
+  /// If a step has begun since, the sides at the end of the last one become those at its start.
+  void startStep(std::uint64_t step) noexcept;
+  /// Other sides at the step's start have another number.
+  std::uint64_t version() const { return m_version; }
+  /// The sides at the start of this step, without those of triangles that are no longer there.
+  std::vector<Crossing> list(const MeshPair&, std::uint64_t step) const;
+  /// Replaces the sides at the start of this step.
+  void set(std::uint64_t step, std::span<const Side>);
+
+  /// Finds the sides at the step's end from the passages within it.
+  void follow(const MeshPair&, std::span<const Crossing> passages);
+  /// Gives the pairs that had passed when the step began their contacts. Call after follow().
+  void apply(const MeshPair&, Contents&) const;
+  bool changesContacts() const { return !m_courses.empty(); }  ///< apply()
+  /// What follow() found holds for the step.
+  void commit() noexcept { m_end.swap(m_next); }
+  void forget() noexcept;
+
+  void releaseMemory();
+
+ private:
+  /// The vertices of one mesh that hold a closest point, with their weights.
+  template <std::size_t N>
+  struct Part {
+    std::array<std::uint32_t, N> vertices;
+    std::array<double, N> weights;
+  };
+  /// A remembered side within the step, and the features along which it slides.
+  struct Course {
+    Side side;    ///< at the step's end
+    double time;  ///< of the passage; 0: the step began so
+    bool hasPassed;
+    std::size_t first, count;  ///< of m_visited
+    std::uint32_t next;        ///< in the list of its features
+  };
+
+  std::size_t listOf(const Crossing&) const;
+  template <class F>
+  bool anyCourse(const Crossing& features, F&&) const;
+  std::optional<bool> sideOf(ContactKind, std::uint32_t vertex) const;
+  template <std::size_t N>
+  std::optional<bool> sideOf(ContactKind, const Part<N>&) const;
+  void turnPassed(const MeshPair&, Contents&) const;
+  bool contains(const Course&, const Side&, bool* isSame = nullptr) const;
+  bool hasPassedEnd(const Crossing&) const;
+  void add(const MeshPair&, const Side&, double time);
+  void take(const MeshPair&, const Crossing&);
+
+  static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t m_step = kNoStep, m_version = 0;
+  Buffer<Side> m_start, m_end;
+  // Of follow():
+  Buffer<Side> m_next;
+  Buffer<Side> m_here;       ///< those of m_start that last, at the step's start
+  Buffer<Course> m_courses;  ///< first those of m_here
+  Buffer<Side> m_visited;
+  Buffer<std::uint32_t> m_heads;  ///< of lists of m_courses: by the vertex, the last one of edges
+  Buffer<std::uint32_t> m_order;
+  ContactKind m_ofSecond = ContactKind::TriangleVertex;  ///< of the second mesh's vertices
+};
+
+}  // namespace palpate
