@@ -1,4 +1,4 @@
-"""PairSettings.track_contacts and report_crossings."""
+"""PairSettings.track_contacts, report_crossings, smooth_normals and remember_sides."""
 
 import numpy as np
 import pytest
@@ -90,3 +90,60 @@ def test_crossings_are_records():
     assert not crossing.forward
     with pytest.raises(palpate.Error, match="reportCrossings"):
         collisions.set_pair_settings(tips, sheet, report_crossings=True)
+
+
+def test_smooth_normals_are_those_of_rows():
+    corners = CORNERS + np.array([[0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0, -2]])
+    collisions = palpate.OctreeBasedCD()
+    sheet = collisions.add_triangle_mesh(corners, TRIANGLES)
+    tips = np.array([[4.9, 4.9, 0.1]])
+    points = collisions.add_point_set(tips)
+    collisions.add_collision_pair(
+        points, sheet, method="proximity", thickness=0.2, smooth_normals=True
+    )
+    collisions.detect_collision()
+    data = collisions.collision_data(points, sheet)
+    (contact,) = data.vertex_triangle
+    (smooth,) = data.smooth_vertex_triangle
+    assert contact.normal.tolist() == [0, 0, 1]
+    assert smooth[0] == pytest.approx(smooth[1]) and 0.05 < smooth[0] < smooth[2] < 1
+    (row,) = data.constraint_rows(tips, corners)
+    assert row["normal"].tolist() == smooth.tolist()
+    for name in ("triangle_vertex", "edge_edge", "shape"):
+        assert getattr(data, "smooth_" + name).shape == (0, 3)
+
+
+def test_sides_are_remembered_and_set():
+    collisions, tips, sheet = scene(method="continuous", remember_sides=True)
+    for z in (0.1, -0.1):
+        collisions.set_positions(tips, np.array([[3, 3, z], [2, 3, 0.1]]))
+        collisions.detect_collision()
+        collisions.advance()
+    collisions.detect_collision()
+    data = collisions.collision_data(tips, sheet)
+    assert len(data.crossings) == 0
+    (side,) = data.remembered_sides
+    assert side.ids[:2].tolist() == [0, 0] and not side.forward and side.time == 0
+    assert data.vertex_triangle["distance"].tolist() == pytest.approx([-0.1, 0.1])
+    assert data.vertex_triangle["normal"].tolist() == [[0, 0, 1], [0, 0, 1]]
+    assert (collisions.problem().pairs[0].sides == data.remembered_sides).all()
+    collisions.set_remembered_sides(tips, sheet, data.remembered_sides[:0])
+    collisions.detect_collision()
+    assert len(collisions.collision_data(tips, sheet).remembered_sides) == 0
+    collisions.set_remembered_sides(tips, sheet, data.remembered_sides)
+    collisions.detect_collision()
+    again = collisions.collision_data(tips, sheet)
+    assert again.hash() == data.hash()
+    with pytest.raises(palpate.Error, match="rememberSides"):
+        collisions.set_pair_settings(tips, sheet, remember_sides=True)
+
+
+def test_advance_calls_a_predicate_of_python():
+    collisions, tips, sheet = scene(method="continuous", remember_sides=True)
+    collisions.set_contact_predicate(tips, sheet, lambda features: features.a[0] == 1)
+    collisions.detect_collision()
+    collisions.advance()
+    collisions.set_positions(tips, np.array([[3, 3, -0.1], [2, 3, -0.1]]))
+    collisions.advance()
+    (side,) = collisions.problem().pairs[0].sides
+    assert side.ids[0] == 1

@@ -335,21 +335,24 @@ TEST_F(CScene, ContactsOverTimeAreThoseOfCpp) {
     pair.settings.trackContacts = true;
     if (pair.b == GeometryId{floor} && pair.a == GeometryId{organ}) {
       pair.settings.method = Method::Continuous;
-      pair.settings.reportCrossings = true;
+      pair.settings.reportCrossings = pair.settings.rememberSides = true;
+      pair.settings.smoothNormals = true;
     }
     whole.setPairSettings(pair.a, pair.b, pair.settings);
     palpate_pair_settings p{};
     p.size = sizeof p;
     EXPECT_OK(palpate_get_pair_settings(m_cd, a, b, &p));
-    EXPECT_FALSE(p.track_contacts || p.report_crossings);
+    EXPECT_FALSE(p.track_contacts || p.report_crossings || p.smooth_normals || p.remember_sides);
     p.track_contacts = 1;
-    p.report_crossings = pair.settings.reportCrossings;
+    p.report_crossings = p.smooth_normals = p.remember_sides = pair.settings.reportCrossings;
     p.method = static_cast<int>(pair.settings.method);
     EXPECT_OK(palpate_set_pair_settings(m_cd, a, b, &p));
     EXPECT_OK(palpate_get_pair_settings(m_cd, a, b, &p));
     EXPECT_TRUE(p.track_contacts && p.report_crossings == pair.settings.reportCrossings);
+    EXPECT_TRUE(p.smooth_normals == p.report_crossings && p.remember_sides == p.report_crossings);
   }
-  std::size_t lasting[5] = {}, slides = 0, ends = 0, crossings = 0, kept = 0;
+  std::size_t lasting[5] = {}, slides = 0, ends = 0, crossings = 0, kept = 0, normals = 0,
+              sides = 0;
   for (int frame = 0; frame < 5; ++frame) {
     step(0.4 * frame, -0.05 * frame);
     for (const CollisionPair& pair : tracked) {
@@ -383,6 +386,27 @@ TEST_F(CScene, ContactsOverTimeAreThoseOfCpp) {
       EXPECT_OK(palpate_get_crossings(m_cd, a, b, &passed, &passedCount));
       expectSame(std::span(passed, passedCount), expected.crossings());
       ends += ended.size(), crossings += passedCount;
+      const std::span<const Eigen::Vector3d> smooth[] = {
+          expected.smoothVertexTriangle(), expected.smoothTriangleVertex(),
+          expected.smoothEdgeEdge(), expected.smoothShape()};
+      for (int kind = 0; kind < 4; ++kind) {
+        const double* all = nullptr;
+        std::size_t count = 0;
+        EXPECT_OK(palpate_get_smooth_normals(m_cd, a, b, kind, &all, &count));
+        ASSERT_EQ(count, smooth[kind].size());
+        for (std::size_t i = 0; i < count; ++i)
+          EXPECT_EQ(Eigen::Vector3d(all + 3 * i), smooth[kind][i]);
+        normals += count;
+      }
+      EXPECT_OK(palpate_get_remembered_sides(m_cd, a, b, &passed, &passedCount));
+      expectSame(std::span(passed, passedCount), expected.rememberedSides());
+      sides += passedCount;
+      if (!pair.settings.rememberSides) continue;
+      // Half of the sides are forgotten.
+      const auto half = expected.rememberedSides().first(passedCount / 2);
+      const std::vector<Crossing> left(half.begin(), half.end());
+      EXPECT_OK(palpate_set_remembered_sides(m_cd, a, b, passed, left.size()));
+      whole.setRememberedSides(pair.a, pair.b, left);
     }
     advance();
   }
@@ -391,6 +415,8 @@ TEST_F(CScene, ContactsOverTimeAreThoseOfCpp) {
   EXPECT_GT(ends, 0u);
   EXPECT_GT(crossings, 0u);
   EXPECT_GT(kept, 0u);
+  EXPECT_GT(normals, 0u);
+  EXPECT_GT(sides, 0u);
 }
 
 /// Queries of the scene and of its snapshot by C, against those of C++.

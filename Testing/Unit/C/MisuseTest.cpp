@@ -173,6 +173,12 @@ TEST_F(CMisuse, ContactsOverTime) {
   pair.report_crossings = 7;  // counts as 1
   EXPECT_REFUSED(palpate_set_pair_settings(m_cd, m_a, m_b, &pair), PALPATE_UNSUPPORTED_METHOD,
                  "reportCrossings");
+  const double* normals = nullptr;
+  for (const int kind : {-1, 4})
+    EXPECT_REFUSED(palpate_get_smooth_normals(m_cd, m_a, m_b, kind, &normals, &count),
+                   PALPATE_INVALID_ARGUMENT, "kind is " + std::to_string(kind));
+  EXPECT_REFUSED(palpate_set_remembered_sides(m_cd, m_a, m_b, nullptr, 0), PALPATE_NOT_AVAILABLE,
+                 "rememberSides is not set");
   EXPECT_REFUSED(palpate_get_tracked(m_cd, m_b, 99, 0, nullptr, 0, &count),
                  PALPATE_UNKNOWN_GEOMETRY, "99");
 }
@@ -335,6 +341,14 @@ TEST_F(CMisuse, NullIsRefused) {
       [&] { return palpate_get_crossings(nullptr, a, b, &crossings, count); },
       [&] { return palpate_get_crossings(cd, a, b, nullptr, count); },
       [&] { return palpate_get_crossings(cd, a, b, &crossings, nullptr); },
+      [&] { return palpate_get_smooth_normals(nullptr, a, b, 0, view, count); },
+      [&] { return palpate_get_smooth_normals(cd, a, b, 0, nullptr, count); },
+      [&] { return palpate_get_smooth_normals(cd, a, b, 0, view, nullptr); },
+      [&] { return palpate_get_remembered_sides(nullptr, a, b, &crossings, count); },
+      [&] { return palpate_get_remembered_sides(cd, a, b, nullptr, count); },
+      [&] { return palpate_get_remembered_sides(cd, a, b, &crossings, nullptr); },
+      [&] { return palpate_set_remembered_sides(nullptr, a, b, nullptr, 0); },
+      [&] { return palpate_set_remembered_sides(cd, a, b, nullptr, 1); },
       [&] { return palpate_get_statistics(cd, nullptr); },
       [&] { return palpate_get_pair_statistics(cd, a, b, nullptr); },
       [&] { return palpate_get_rows(nullptr, a, b, side, side, nullptr, nullptr, 0, count); },

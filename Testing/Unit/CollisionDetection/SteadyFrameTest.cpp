@@ -172,6 +172,47 @@ TEST(SteadyFrame, AllocatesNothingForAnyRowOfTheTable) {
     }
 }
 
+/// Particles and a body that pass through a sheet and come back; advance() detects every third
+/// step.
+TEST(SteadyFrame, AllocatesNothingWithSidesAndSmoothNormals) {
+  using namespace testing;
+  const IntegersApart integers;
+  OctreeBasedCD detection({.threads = 1});
+  const Mesh floor = sheet(10, 0.0, 0.0), ball = sphere(6, 8, {0.31, 0.62, 0}, 0.15);
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 30; ++i) points.push_back({0.2 + 0.02 * i, 0.71 - 0.013 * i, 0});
+  const GeometryId tissue = addMesh(detection, floor), body = addMesh(detection, ball),
+                   tips = detection.addPointSet(points);
+  const PairSettings pair{.method = Method::Continuous,
+                          .thickness = 0.05,
+                          .trackContacts = true,
+                          .smoothNormals = true,
+                          .rememberSides = true};
+  detection.addCollisionPair(tips, tissue, pair);
+  detection.addCollisionPair(body, tissue, pair);
+  std::vector<Eigen::Vector3d> now;
+  const auto lift = [&](GeometryId id, const std::vector<Eigen::Vector3d>& rest, double z) {
+    now = rest;
+    for (Eigen::Vector3d& p : now) p[2] += z;
+    detection.setPositions(id, now);
+  };
+  std::size_t made = 0, sides = 0;
+  for (int frame = 0; frame < 36; ++frame) {
+    const std::size_t before = allocations;
+    const double z = frame % 6 < 3 ? 0.1 : -0.1;
+    lift(tips, points, z);
+    lift(body, ball.positions, z);
+    detection.detectCollision();
+    sides += detection.collisionData(tips, tissue).rememberedSides().size() +
+             detection.collisionData(body, tissue).rememberedSides().size();
+    if (frame % 3 == 0) lift(tips, points, z + 0.01);
+    detection.advance();
+    if (frame >= 18) made += allocations - before;
+  }
+  EXPECT_EQ(made, 0u);
+  EXPECT_GT(sides, 1000u);
+}
+
 /// Snapshots that a reader holds for two steps, and queries of them.
 TEST(SteadyFrame, AllocatesNothingWithSnapshots) {
   using namespace testing;

@@ -138,6 +138,8 @@ TEST_F(Capture, KeepsEveryGeometryTypeMethodAndFilter) {
     EXPECT_EQ(kept.allowedError, given.allowedError);
     EXPECT_EQ(kept.trackContacts, given.trackContacts);
     EXPECT_EQ(kept.reportCrossings, given.reportCrossings);
+    EXPECT_EQ(kept.smoothNormals, given.smoothNormals);
+    EXPECT_EQ(kept.rememberSides, given.rememberSides);
     EXPECT_EQ(kept.proxy.widestNormalCone, given.proxy.widestNormalCone);
     EXPECT_EQ(kept.priority, given.priority);
   }
@@ -294,9 +296,13 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
-  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0 0\n",
-             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n");  // priority
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0 0 0 0 0
+",
+             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0
+");  // priority to sides
   EXPECT_EQ(asVersion(13).pairs[0].settings.priority, 0);
+  EXPECT_FALSE(asVersion(13).pairs[0].settings.smoothNormals);
+  EXPECT_FALSE(asVersion(13).pairs[0].settings.rememberSides);
   replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n",
              " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0\n");  // trackContacts, reportCrossings
   EXPECT_FALSE(asVersion(12).pairs[0].settings.trackContacts);

@@ -1,0 +1,724 @@
+#include "Common/ExpectRefused.h"
+#include "Common/PairRun.h"
+#include "Common/TemporaryFolder.h"
+#include "Common/TestGeometry.h"
+#include "Unit/Math/ImpactOracle.h"
+
+#include <palpate/Capture.h>
+#include <palpate/ConstraintRows.h>
+#include <palpate/Error.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+// PairSettings::rememberSides: after a solver let features pass, contacts lead back to where they
+// came from, as the history of all exact crossings has it.
+
+namespace palpate {
+namespace {
+
+using namespace testing;
+
+constexpr double kRound = 1e-5;  // of the step: times of crossings and contacts this near are equal
+
+PairSettings remembering(double thickness, Contacts contacts = Contacts::Distinct) {
+  return {.method = Method::Continuous,
+          .thickness = thickness,
+          .contacts = contacts,
+          .rememberSides = true};
+}
+
+struct Passage {
+  double time;
+  bool forward;
+};
+
+/// The passages of two features in a step, by rational arithmetic.
+std::vector<Passage> passagesOf(bool edges, const impact::Positions& p) {
+  std::vector<Passage> all;
+  for (const auto& passage : impact::Query(edges, p).passages()) {
+    impact::Real time = passage.time;
+    while (!time.p.empty() && time.high - time.low > kRound / 16) time.refine();
+    all.push_back({impact::Rational((time.low + time.high) / 2).get_d(), passage.forward});
+  }
+  return all;
+}
+
+/// Two geometries that move in steps.
+struct Motion {
+  TestGeometry a, b;
+  Positions nowA, nowB;
+
+  impact::Positions of(const std::vector<std::uint32_t>& ofA,
+                       const std::vector<std::uint32_t>& ofB) const {
+    impact::Positions p;
+    std::size_t i = 0;
+    for (const std::uint32_t v : ofA) p[i] = a.positions[v], p[4 + i++] = nowA[v];
+    for (const std::uint32_t v : ofB) p[i] = b.positions[v], p[4 + i++] = nowB[v];
+    return p;
+  }
+  void advance() { a.positions = nowA, b.positions = nowB; }
+};
+
+/// How often each vertex of a has passed through the surface b to the front, less to the back.
+class VertexHistory {
+ public:
+  explicit VertexHistory(const Motion& motion) : m_count(motion.a.positions.size()) {}
+  void read(const Motion& motion) {
+    m_passages.clear();
+    for (std::uint32_t v = 0; v < m_count.size(); ++v)
+      for (const auto& [i, j, k] : motion.b.triangles)
+        for (const Passage& passage : passagesOf(false, motion.of({v}, {i, j, k})))
+          m_passages[v].push_back(passage);
+  }
+  int atStart(std::uint32_t v) const { return m_count[v]; }
+  bool passes(std::uint32_t v) const { return m_passages.contains(v); }
+  /// None where a passage is as near as times are round.
+  std::optional<int> at(std::uint32_t v, double time) const {
+    int count = m_count[v];
+    if (const auto found = m_passages.find(v); found != m_passages.end() && time > 0.0)
+      for (const Passage& passage : found->second) {
+        if (std::abs(passage.time - time) < kRound) return {};
+        if (passage.time < time) count += passage.forward ? 1 : -1;
+      }
+    return count;
+  }
+  void advance() {
+    for (const auto& [v, passages] : m_passages)
+      for (const Passage& passage : passages) m_count[v] += passage.forward ? 1 : -1;
+  }
+
+ private:
+  std::vector<int> m_count;
+  std::map<std::uint32_t, std::vector<Passage>> m_passages;
+};
+
+template <class Contact>
+void expectLaw(const Motion& motion, const Contact& contact, std::size_t ofA) {
+  const Stencil s = stencil(contact);
+  Vector3d sum = Vector3d::Zero();
+  double radii = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const TestGeometry& geometry = i < ofA ? motion.a : motion.b;
+    const Positions& now = i < ofA ? motion.nowA : motion.nowB;
+    const std::uint32_t v = s.vertices[i];
+    const double t = contact.timeOfImpact;
+    sum += s.weights[i] * ((1 - t) * geometry.positions[v] + t * now[v]);
+    radii += std::abs(s.weights[i]) * geometry.radii[0];
+  }
+  EXPECT_LT((sum - (contact.distance + radii) * contact.normal).norm(), 1e-5);
+  EXPECT_NEAR(contact.normal.norm(), 1.0, 1e-12);
+}
+
+/// The answer of each step with any engine and number of threads.
+class Runs {
+ public:
+  Runs(const Motion& motion, const PairSettings& pair) {
+    std::vector<Settings> all = octreeSettings();
+    all.push_back(testing::settingsOf(Engine::BruteForce));
+    for (Settings& settings : all) {
+      settings.audit.features = 1000;
+      OctreeBasedCD& run = m_runs.emplace_back(settings);
+      m_a = motion.a.addTo(run), m_b = motion.b.addTo(run);
+      run.addCollisionPair(m_a, m_b, pair);
+      run.advance();  // the first step is at rest
+    }
+  }
+  const CollisionData& detect(const Motion& motion) {
+    for (OctreeBasedCD& run : m_runs) {
+      run.setPositions(m_a, motion.nowA);
+      run.setPositions(m_b, motion.nowB);
+      run.detectCollision();
+      EXPECT_TRUE(run.auditFailures().empty());
+      const CollisionData &data = run.collisionData(m_a, m_b),
+                          &first = m_runs.front().collisionData(m_a, m_b);
+      EXPECT_EQ(data.hash(), first.hash());
+      EXPECT_TRUE(std::ranges::equal(data.rememberedSides(), first.rememberedSides()));
+      EXPECT_TRUE(data.crossings().empty());
+    }
+    return m_runs.front().collisionData(m_a, m_b);
+  }
+  void advance() {
+    for (OctreeBasedCD& run : m_runs) run.advance();
+  }
+
+ private:
+  std::vector<OctreeBasedCD> m_runs;
+  GeometryId m_a, m_b;
+};
+
+/// A wavy membrane that quivers, and points or lines above it that a bad solver pushes through.
+struct Membrane : Motion {
+  explicit Membrane(Random& random, TestGeometry above) : Motion{std::move(above), {}, {}, {}} {
+    b = testGeometry(sheet(8, 0.5, uniform(random, 0, 6)));
+    for (Vector3d& p : b.positions) p += randomPoint(random, -0.02, 0.02);
+    rest = b.positions;
+    nowB = b.positions;
+    for (Vector3d& p : a.positions) p[2] = uniform(random, 0.62, 0.7);
+    nowA = a.positions;
+  }
+  void move(Random& random, double motion) {
+    for (Vector3d& p : nowA) {
+      p += Vector3d(uniform(random, -0.3, 0.3) * motion, uniform(random, -0.3, 0.3) * motion,
+                    uniform(random, -1, 1) * motion);
+      for (int k = 0; k < 2; ++k) p[k] = std::clamp(p[k], 0.25, 0.75);
+      p[2] = std::clamp(p[2], 0.3, 0.7);
+    }
+    for (std::size_t v = 0; v < nowB.size(); ++v)
+      nowB[v] = rest[v] + randomPoint(random, -0.01, 0.01);
+  }
+  Positions rest;
+};
+
+TEST(SideMemory, OfVerticesIsThatOfTheHistoryOfCrossings) {
+  Random random(11);
+  std::size_t checked = 0, wrong = 0, returned = 0;
+  for (const Contacts contacts : {Contacts::Distinct, Contacts::All})
+    for (const double motion : {0.03, 0.25}) {
+      Membrane scene(random, particles(random, 12, contacts == Contacts::All ? 0.01 : 0.0));
+      const double radius = scene.a.radii[0];
+      VertexHistory history(scene);
+      Runs runs(scene, remembering(0.04, contacts));
+      for (int step = 0; step < 30 / kShareOfCases; ++step) {
+        SCOPED_TRACE("step " + std::to_string(step));
+        scene.move(random, motion);
+        const CollisionData& data = runs.detect(scene);
+        history.read(scene);
+        std::set<std::uint32_t> ledBack, remembered, passed;
+        for (const auto& contact : data.vertexTriangle()) {
+          expectLaw(scene, contact, 1);
+          const std::optional<int> count = history.at(contact.vertex, contact.timeOfImpact);
+          if (!count || contact.distance + radius == 0.0) continue;
+          EXPECT_TRUE(*count == 0 || *count == -1);
+          EXPECT_EQ(contact.distance + radius < 0.0, *count != 0)
+              << "vertex " << contact.vertex << ", triangle " << contact.triangle << ", time "
+              << contact.timeOfImpact;
+          ++checked;
+          if (*count != 0) ledBack.insert(contact.vertex);
+        }
+        for (const Crossing& side : data.rememberedSides()) remembered.insert(side.ids[0]);
+        for (std::uint32_t v = 0; v < scene.nowA.size(); ++v) {
+          if (history.atStart(v) != 0) passed.insert(v);
+          returned += history.atStart(v) != 0 && history.at(v, 2.0) == 0;
+        }
+        EXPECT_EQ(remembered, passed);
+        EXPECT_TRUE(std::ranges::includes(ledBack, passed));
+        wrong += passed.size();
+        history.advance();
+        runs.advance();
+        scene.advance();
+      }
+    }
+  EXPECT_GT(checked, 700u / kShareOfCases);
+  EXPECT_GT(wrong, 100u);
+  EXPECT_GT(returned, 50u);
+}
+
+/// Whether an edge of a crosses a triangle of b when the step begins.
+bool pierces(const Motion& motion, const Segment& edge) {
+  const Vector3d &p = motion.a.positions[edge[0]], &q = motion.a.positions[edge[1]];
+  const auto isAhead = [](const Vector3d& a, const Vector3d& b, const Vector3d& c,
+                          const Vector3d& d) { return (b - a).cross(c - a).dot(d - a) > 0; };
+  return std::ranges::any_of(motion.b.triangles, [&](const Triangle& t) {
+    const Vector3d &a = motion.b.positions[t[0]], &b = motion.b.positions[t[1]],
+                   &c = motion.b.positions[t[2]];
+    const bool side = isAhead(p, q, a, b);
+    return isAhead(a, b, c, p) != isAhead(a, b, c, q) && isAhead(p, q, b, c) == side &&
+           isAhead(p, q, c, a) == side;
+  });
+}
+
+/// A thread over a membrane. An edge is on the side of its ends if it does not pierce the membrane.
+TEST(SideMemory, OfAThreadAndAMembraneIsThatOfTheHistoryOfCrossings) {
+  Random random(5);
+  std::size_t above = 0, below = 0;
+  for (const double motion : {0.03, 0.2}) {
+    TestGeometry line{GeometryType::Lines, {}, {}, {}, {0.005}};
+    for (std::uint32_t i = 0; i < 7; ++i) {
+      line.positions.push_back({0.28 + 0.07 * i, 0.5, 0.65});
+      if (i > 0) line.segments.push_back({i - 1, i});
+    }
+    Membrane scene(random, line);
+    VertexHistory history(scene);
+    Runs runs(scene, remembering(0.04));
+    for (int step = 0; step < 40 / kShareOfCases; ++step) {
+      SCOPED_TRACE("step " + std::to_string(step));
+      scene.move(random, 0.3 * motion);
+      // The thread goes up and down as a whole.
+      for (Vector3d& p : scene.nowA) p[2] += motion * (step / 5 % 2 ? 0.5 : -0.5);
+      const CollisionData& data = runs.detect(scene);
+      history.read(scene);
+      for (const auto& contact : data.vertexTriangle()) {
+        expectLaw(scene, contact, 1);
+        const std::optional<int> count = history.at(contact.vertex, contact.timeOfImpact);
+        EXPECT_TRUE(!count || (contact.distance + 0.005 < 0.0) == (*count != 0));
+      }
+      std::set<Segment> passing;  // an edge of the membrane, in this step
+      for (const Segment& e : scene.a.edges())
+        for (const Segment& f : scene.b.edges())
+          if (!passagesOf(true, scene.of({e[0], e[1]}, {f[0], f[1]})).empty()) passing.insert(e);
+      for (const auto& contact : data.edgeEdge()) {
+        expectLaw(scene, contact, 2);
+        const auto [p, q] = contact.edgeA;
+        if (passing.contains(contact.edgeA) || history.passes(p) || history.passes(q)) continue;
+        if (history.atStart(p) != history.atStart(q) || pierces(scene, contact.edgeA)) continue;
+        EXPECT_EQ(contact.distance + 0.005 < 0.0, history.atStart(p) != 0)
+            << p << " " << q << ", " << contact.edgeB[0] << " " << contact.edgeB[1] << " at "
+            << contact.timeOfImpact << " weights " << contact.weightA << " " << contact.weightB
+            << " distance " << contact.distance << " normal " << contact.normal.transpose();
+        ++(history.atStart(p) != 0 ? below : above);
+      }
+      history.advance();
+      runs.advance();
+      scene.advance();
+    }
+  }
+  EXPECT_GT(above, 10u);
+  EXPECT_GT(below, 10u);
+}
+
+/// Two threads that cross once, as seen from above, with their vertices in any order. self: they
+/// are one geometry.
+struct CrossedThreads : Motion {
+  CrossedThreads(Random& random, std::uint32_t segments, double radius, bool self) {
+    a = b = {GeometryType::Lines, {}, {}, {}, {radius}};
+    const auto add = [&](TestGeometry& line, int axis, double z) {
+      const auto first = static_cast<std::uint32_t>(line.positions.size());
+      std::vector<std::uint32_t> names(segments + 1);
+      std::iota(names.begin(), names.end(), first);
+      std::shuffle(names.begin(), names.end(), random);
+      line.positions.resize(first + segments + 1);
+      for (std::uint32_t i = 0; i <= segments; ++i) {
+        Vector3d p(0.5, 0.5, z);
+        p[axis] = double(i) / segments;
+        line.positions[names[i]] = p + randomPoint(random, -0.01, 0.01);
+        if (i > 0) line.segments.push_back({names[i - 1], names[i]});
+      }
+    };
+    add(a, 0, 0.1);
+    upper = a.segments;
+    add(self ? a : b, 1, 0.0);
+    lower.assign((self ? a : b).segments.end() - segments, (self ? a : b).segments.end());
+    isSelf = self;
+    nowA = a.positions, nowB = b.positions;
+  }
+  void move(Random& random, double motion, double up) {
+    for (Positions* now : {&nowA, &nowB})
+      for (Vector3d& p : *now) p += randomPoint(random, -motion, motion);
+    std::set<std::uint32_t> raised;
+    for (const auto& [p, q] : upper) raised.insert({p, q});
+    for (const std::uint32_t v : raised) nowA[v][2] += up;
+  }
+  /// forward: the upper thread comes above the lower one.
+  std::vector<Passage> passages() const {
+    std::vector<Passage> all;
+    for (const auto& [p, q] : upper)
+      for (const auto& [r, s] : lower)
+        for (const Passage& passage :
+             passagesOf(true, isSelf ? of({p, q, r, s}, {}) : of({p, q}, {r, s})))
+          all.push_back(passage);
+    return all;
+  }
+  std::vector<Segment> upper, lower;  ///< along the threads
+  bool isSelf = false;
+};
+
+TEST(SideMemory, OfThreadsIsThatOfTheHistoryOfCrossings) {
+  Random random(3);
+  std::size_t checked = 0, wrong = 0;
+  for (const bool self : {false, true})
+    for (const double radius : {0.0, 0.01})
+      for (const std::uint32_t segments : {3u, 8u}) {
+        CrossedThreads scene(random, segments, radius, self);
+        OctreeBasedCD collisions;
+        const GeometryId a = scene.a.addTo(collisions), b = self ? a : scene.b.addTo(collisions);
+        PairSettings pair = remembering(0.04);
+        if (self) pair.restDistance = 0.6;
+        collisions.addCollisionPair(a, b, pair);
+        collisions.advance();  // the first step is at rest
+        int count = 0;
+        for (int step = 0; step < 40; ++step) {
+          SCOPED_TRACE("step " + std::to_string(step));
+          scene.move(random, 0.004, (step / 4 % 2 ? 1 : -1) * uniform(random, 0.0, 0.06));
+          collisions.setPositions(a, scene.nowA);
+          if (!self) collisions.setPositions(b, scene.nowB);
+          collisions.detectCollision();
+          const CollisionData& data = collisions.collisionData(a, b);
+          const std::vector<Passage> passages = scene.passages();
+          for (const EdgeEdgeContact& contact : data.edgeEdge()) {
+            expectLaw(scene, contact, self ? 4 : 2);
+            int before = count;
+            bool isClose = false;
+            for (const Passage& passage : passages) {
+              isClose |= std::abs(passage.time - contact.timeOfImpact) < kRound;
+              if (contact.timeOfImpact > 0 && passage.time < contact.timeOfImpact)
+                before += passage.forward ? 1 : -1;
+            }
+            if (isClose || contact.distance + 2 * radius == 0) continue;
+            EXPECT_EQ(contact.distance + 2 * radius < 0, before != 0)
+                << contact.edgeA[0] << " " << contact.edgeA[1] << ", " << contact.edgeB[0] << " "
+                << contact.edgeB[1] << " at " << contact.timeOfImpact;
+            ++checked;
+          }
+          EXPECT_EQ(data.rememberedSides().size(), count != 0 ? 1u : 0u);
+          wrong += count != 0;
+          for (const Passage& passage : passages) count += passage.forward ? 1 : -1;
+          collisions.advance();
+          scene.advance();
+        }
+      }
+  EXPECT_GT(checked, 200u);
+  EXPECT_GT(wrong, 50u);
+}
+
+/// A sheet in the plane z = 0, and one point.
+class OnePoint : public ::testing::Test {
+ protected:
+  OnePoint() {
+    for (Vector3d& p : sheetPositions) p[2] = 0.0;
+    m_sheet = m_collisions.addTriangleMesh(sheetPositions, mesh.triangles);
+    m_tip = m_collisions.addPointSet(Positions{{0.43, 0.47, 0.1}});
+    m_collisions.addCollisionPair(m_tip, m_sheet, remembering(0.02));
+  }
+  void moveTo(const Vector3d& p) { m_collisions.setPositions(m_tip, Positions{p}); }
+  const CollisionData& detectAt(const Vector3d& p) {
+    moveTo(p);
+    m_collisions.detectCollision();
+    return data();
+  }
+  const CollisionData& stepTo(const Vector3d& p) {
+    detectAt(p);
+    m_collisions.advance();
+    return data();
+  }
+  const CollisionData& data() const { return m_collisions.collisionData(m_tip, m_sheet); }
+  /// How many sides the next step begins with.
+  std::size_t remembered() const { return m_collisions.problem().pairs.at(0).sides.size(); }
+  void pass() {
+    stepTo({0.43, 0.47, 0.1});
+    stepTo({0.43, 0.47, -0.1});
+    ASSERT_EQ(remembered(), 1u);
+  }
+
+  const Mesh mesh = sheet(6, 0.0, 0.0);
+  Positions sheetPositions = mesh.positions;
+  OctreeBasedCD m_collisions;
+  GeometryId m_sheet, m_tip;
+};
+
+TEST_F(OnePoint, IsLedBackFromAnyDepthAndPlace) {
+  pass();
+  for (const Vector3d& p : Positions{{0.43, 0.47, -0.3}, {0.8, 0.2, -0.01}, {0.2, 0.7, -0.4}}) {
+    const CollisionData& led = stepTo(p);
+    ASSERT_EQ(led.vertexTriangle().size(), 1u);
+    EXPECT_EQ(led.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
+    EXPECT_LT(led.vertexTriangle()[0].distance, 0);
+    EXPECT_EQ(led.vertexTriangle()[0].timeOfImpact, 0);
+    EXPECT_EQ(led.validity().atImpact, 1u);
+  }
+  EXPECT_EQ(stepTo({0.2, 0.7, 0.01}).vertexTriangle()[0].distance, -0.4);
+  EXPECT_EQ(remembered(), 0u);
+  EXPECT_GT(stepTo({0.2, 0.7, 0.01}).vertexTriangle()[0].distance, 0);
+}
+
+/// A solver's rounds: only the positions at advance() count.
+TEST_F(OnePoint, RemembersPositionsAtTheStepsEnd) {
+  stepTo({0.43, 0.47, 0.1});
+  detectAt({0.43, 0.47, -0.1});
+  moveTo({0.43, 0.47, 0.05});
+  const std::uint64_t hash = data().hash();
+  m_collisions.advance();
+  EXPECT_EQ(data().hash(), hash);  // results stay readable
+  EXPECT_EQ(remembered(), 0u);
+  detectAt({0.43, 0.47, 0.05});
+  moveTo({0.43, 0.47, -0.1});
+  m_collisions.advance();
+  EXPECT_EQ(remembered(), 1u);
+  moveTo({0.43, 0.47, 0.2});  // without any detection
+  m_collisions.advance();
+  EXPECT_EQ(remembered(), 0u);
+  EXPECT_TRUE(stepTo({0.43, 0.47, 0.2}).vertexTriangle().empty());
+}
+
+/// An answer that nothing changed is kept, unless another step has other sides.
+TEST_F(OnePoint, EqualStepsWithOtherSidesHaveOtherAnswers) {
+  const Positions above{{0.43, 0.47, 0.01}}, below{{0.43, 0.47, -0.01}};
+  for (int i = 0; i < 4; ++i) {
+    m_collisions.setPositions(m_tip, above, below);
+    m_collisions.detectCollision();
+    ASSERT_EQ(data().vertexTriangle().size(), 1u);
+    EXPECT_GT(data().vertexTriangle()[0].distance, 0) << i;
+    m_collisions.advance();
+    EXPECT_EQ(remembered(), 1u);
+  }
+  m_collisions.detectCollision();
+  EXPECT_LT(data().vertexTriangle()[0].distance, 0);
+  m_collisions.advance();
+  m_collisions.detectCollision();
+  EXPECT_LT(data().vertexTriangle()[0].distance, 0);
+}
+
+TEST_F(OnePoint, MemoryEnds) {
+  const auto expectEnd = [&](auto&& change) {
+    m_collisions.setRememberedSides(m_tip, m_sheet, {});
+    m_collisions.setPositions(m_tip, Positions{{0.43, 0.47, 0.1}}, Positions{{0.43, 0.47, 0.1}});
+    pass();
+    change();
+    m_collisions.detectCollision();
+    EXPECT_TRUE(data().rememberedSides().empty());
+    m_collisions.advance();
+    EXPECT_EQ(remembered(), 0u);
+  };
+  // Around the border.
+  expectEnd([&] { stepTo({1.2, 0.5, -0.1}); });
+  // Put above the surface.
+  expectEnd([&] {
+    m_collisions.setPositions(m_tip, Positions{{0.5, 0.5, 0.3}}, Positions{{0.5, 0.5, 0.3}});
+  });
+  expectEnd([&] { m_collisions.setRememberedSides(m_tip, m_sheet, {}); });
+  expectEnd([&] {
+    m_collisions.setContactPredicate(m_tip, m_sheet, [](const ContactFeatures&) { return false; });
+  });
+  m_collisions.setContactPredicate(m_tip, m_sheet, {});
+  expectEnd([&] {
+    m_collisions.setCollisionFilter(m_tip, {.groups = 0});
+    m_collisions.detectCollision();
+    m_collisions.setCollisionFilter(m_tip, {});
+  });
+  expectEnd([&] {
+    m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+    m_collisions.detectCollision();
+    m_collisions.setPairSettings(m_tip, m_sheet, remembering(0.02));
+  });
+  expectEnd([&] {
+    std::vector<std::uint32_t> all(mesh.triangles.size());
+    std::iota(all.begin(), all.end(), 0u);
+    m_collisions.setDisabledElements(m_sheet, all);
+  });
+  m_collisions.setDisabledElements(m_sheet, {});
+  expectEnd([&] {
+    // A cut of the triangle, and of no other.
+    std::vector<Triangle> rest = mesh.triangles;
+    rest.erase(rest.begin() + m_collisions.problem().pairs[0].sides[0].ids[1]);
+    m_collisions.setTriangles(m_sheet, sheetPositions, rest);
+  });
+}
+
+TEST_F(OnePoint, MemoryLastsThroughATopologyThatKeepsTheVertices) {
+  pass();
+  std::vector<Triangle> turned(mesh.triangles.rbegin(), mesh.triangles.rend());
+  m_collisions.setTriangles(m_sheet, sheetPositions, turned);
+  const std::vector<Crossing> sides = m_collisions.problem().pairs[0].sides;
+  ASSERT_EQ(sides.size(), 1u);
+  const CollisionData& led = stepTo({0.43, 0.47, -0.1});
+  ASSERT_EQ(led.vertexTriangle().size(), 1u);
+  EXPECT_EQ(led.vertexTriangle()[0].normal, Vector3d(0, 0, 1));
+  EXPECT_TRUE(std::ranges::equal(led.rememberedSides(), sides));
+}
+
+TEST_F(OnePoint, CapturesHoldTheMemory) {
+  pass();
+  moveTo({0.43, 0.47, -0.05});
+  const TemporaryFolder folder;
+  capture(m_collisions, folder.path / "sides.capture");
+  const CollisionProblem problem = readCapture(folder.path / "sides.capture");
+  EXPECT_EQ(problem.pairs[0].sides, m_collisions.problem().pairs[0].sides);
+  OctreeBasedCD replay = setUp(problem);
+  const GeometryId sheet{0}, tip{1};
+  for (const double z : {-0.05, 0.01, -0.2, -0.3, 0.1}) {
+    replay.setPositions(tip, Positions{{0.5, 0.5, z}});
+    replay.detectCollision();
+    EXPECT_EQ(detectAt({0.5, 0.5, z}).hash(), replay.collisionData(tip, sheet).hash());
+    EXPECT_EQ(m_collisions.problem().pairs[0].sides, replay.problem().pairs[0].sides);
+    replay.advance();
+    m_collisions.advance();
+  }
+}
+
+TEST_F(OnePoint, RefusesSidesOfNoFeatures) {
+  constexpr std::uint32_t kNone = kNoElement;
+  const auto refuse = [&](ContactKind kind, const std::array<std::uint32_t, 4>& ids,
+                          const std::string& text, GeometryId id) {
+    expectRefused(
+        ErrorCode::IndexOutOfRange, "pair (1, 0): remembered side 1 " + text,
+        [&] {
+          const std::vector<Crossing> sides{{ContactKind::VertexTriangle, {0, 3, kNone, kNone}},
+                                            {kind, ids}};
+          m_collisions.setRememberedSides(m_tip, m_sheet, sides);
+        },
+        id);
+    EXPECT_EQ(remembered(), 1u);
+  };
+  pass();
+  refuse(ContactKind::VertexTriangle, {1, 0, kNone, kNone}, "names vertex 1", m_tip);
+  refuse(ContactKind::VertexTriangle, {0, 72, kNone, kNone}, "names triangle 72", m_sheet);
+  refuse(ContactKind::TriangleVertex, {0, 0, kNone, kNone}, "names triangle 0", m_tip);
+  refuse(ContactKind::EdgeEdge, {0, 1, 0, 1}, "names edge 0 1", m_tip);
+  refuse(ContactKind::Shape, {0, 1, 0, 1}, "is of the kind Shape", m_tip);
+  m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+  expectRefused(
+      ErrorCode::NotAvailable, "pair (1, 0): PairSettings::rememberSides is not set",
+      [&] { m_collisions.setRememberedSides(m_tip, m_sheet, {}); }, m_tip);
+}
+
+TEST_F(OnePoint, RefusesOtherMethods) {
+  const GeometryId ball = m_collisions.addAnalyticalGeometry(Sphere{{0, 0, 3}, 1});
+  const auto refuse = [&](GeometryId b, PairSettings settings) {
+    settings.rememberSides = true;
+    expectRefused(
+        ErrorCode::UnsupportedMethod, "rememberSides is for Method::Continuous",
+        [&] {
+          b == ball ? m_collisions.addCollisionPair(m_sheet, b, settings)
+                    : m_collisions.setPairSettings(m_tip, b, settings);
+        },
+        b == ball ? m_sheet : m_tip);
+  };
+  refuse(m_sheet, {.thickness = 0.1});
+  refuse(m_sheet, {.method = Method::Proximity, .thickness = 0.1});
+  refuse(m_sheet, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
+  refuse(ball, {.method = Method::Continuous, .thickness = 0.1});
+}
+
+/// A body that passed as a whole: every contact leads it back, also of edges that passed none.
+TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
+  OctreeBasedCD collisions;
+  Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3), membrane = sheet(16, 0.0, 0.0);
+  for (Vector3d& p : membrane.positions) p[2] = 0.0;
+  const GeometryId body = addMesh(collisions, cube), tissue = addMesh(collisions, membrane);
+  collisions.addCollisionPair(body, tissue, remembering(0.03, Contacts::All));
+  collisions.detectCollision();
+  collisions.advance();
+  const auto shift = [&](double z) {
+    for (Vector3d& p : cube.positions) p[2] += z;
+    collisions.setPositions(body, cube.positions);
+    collisions.detectCollision();
+    collisions.advance();
+  };
+  shift(-0.15);  // the lower half has passed
+  shift(-0.06);  // all of it
+  shift(0.005);
+  const CollisionData& data = collisions.collisionData(body, tissue);
+  std::size_t vertices = 0;
+  for (const auto& contact : data.vertexTriangle()) vertices += contact.normal[2] == 1.0;
+  EXPECT_EQ(vertices, data.vertexTriangle().size());
+  EXPECT_EQ(vertices, cube.positions.size());
+  EXPECT_FALSE(data.edgeEdge().empty());
+  for (const auto& contact : data.edgeEdge()) EXPECT_GE(contact.normal[2], -1e-12);
+  for (const auto& contact : data.triangleVertex()) EXPECT_LE(contact.normal[2], 1e-12);
+}
+
+/// A needle that a hand drives into a membrane and lets go. The solver has one iteration, and ends
+/// with the membrane's elasticity, which undoes what contacts did.
+class NeedleInMembrane {
+ public:
+  explicit NeedleInMembrane(bool remembers) {
+    Mesh membrane = sheet(10, 0.0, 0.0);
+    std::vector<Segment> segments;
+    for (std::uint32_t i = 0; i < kCount; ++i) {
+      m_now.push_back({0.53 + 0.004 * i, 0.47, 0.03 + 0.05 * i});
+      m_mobility.push_back(0.0);
+      if (i > 0) segments.push_back({i - 1, i});
+    }
+    m_needle = collisions.addLineMesh(m_now, segments);
+    for (Vector3d& p : membrane.positions) {
+      p[2] = 0.0;
+      m_now.push_back(p);
+      m_mobility.push_back(std::min({p[0], p[1], 1 - p[0], 1 - p[1]}) < 0.01 ? 0.0 : 1.0);
+    }
+    m_tissue = collisions.addTriangleMesh(membrane.positions, membrane.triangles);
+    collisions.addCollisionPair(m_needle, m_tissue,
+                                {.method = Method::Continuous,
+                                 .thickness = kThickness,
+                                 .reportCrossings = true,
+                                 .rememberSides = remembers});
+    collisions.advance();
+    for (const auto& [p, q] : segments) addSpring(p, q);
+    for (const auto& [p, q] : testGeometry(membrane).edges()) addSpring(kCount + p, kCount + q);
+    m_before = m_now;
+  }
+
+  /// drive: the hand's motion; 0: it has let go.
+  void step(double drive) {
+    const Positions last = std::exchange(m_before, m_now);
+    for (std::size_t v = 0; v < m_now.size(); ++v)
+      if (m_mobility[v] > 0.0) m_now[v] += 0.5 * (m_now[v] - last[v]);
+    for (std::size_t v = 0; v < kCount; ++v) {
+      m_mobility[v] = drive == 0.0 ? 1.0 : 0.0;
+      if (drive != 0.0) m_now[v] = m_before[v] + Vector3d(0, 0, drive);
+    }
+    std::vector<ConstraintRow> rows;
+    const std::span<const Vector3d> before(m_before), now(m_now);
+    appendRows(detect(), {0, before.first(kCount), now.first(kCount)},
+               {kCount, before.subspan(kCount), now.subspan(kCount)}, rows);
+    for (ConstraintRow& row : rows) {
+      row.offset += 0.75 * kThickness;
+      double mobility = 0.0;
+      for (std::size_t i = 0; i < 4; ++i)
+        mobility += m_mobility[row.vertices[i]] * row.weights[i] * row.weights[i];
+      if (const double depth = -row.gap(m_now); depth > 0.0 && mobility > 0.0)
+        for (std::size_t i = 0; i < 4; ++i)
+          m_now[row.vertices[i]] +=
+              m_mobility[row.vertices[i]] * row.weights[i] * depth / mobility * row.normal;
+    }
+    for (const auto& [p, q, length] : m_springs) {
+      const Vector3d along = m_now[p] - m_now[q];
+      const double mobility = m_mobility[p] + m_mobility[q];
+      if (mobility == 0.0) continue;
+      const Vector3d change = (length / along.norm() - 1.0) / mobility * along;
+      m_now[p] += m_mobility[p] * change;
+      m_now[q] -= m_mobility[q] * change;
+    }
+    for (const Crossing& crossing : detect().crossings())  // what passes in the end
+      if (crossing.kind == ContactKind::VertexTriangle) passed += crossing.forward ? -1 : 1;
+    collisions.advance();
+  }
+
+  OctreeBasedCD collisions;
+  int passed = 0;  ///< vertices of the needle that are behind the membrane
+
+ private:
+  static constexpr std::uint32_t kCount = 6;  // vertices of the needle, which come first
+  static constexpr double kThickness = 0.02;
+  struct Spring {
+    std::uint32_t p, q;
+    double length;
+  };
+
+  void addSpring(std::uint32_t p, std::uint32_t q) {
+    m_springs.push_back({p, q, (m_now[p] - m_now[q]).norm()});
+  }
+  const CollisionData& detect() {
+    const std::span<const Vector3d> now(m_now);
+    collisions.setPositions(m_needle, now.first(kCount));
+    collisions.setPositions(m_tissue, now.subspan(kCount));
+    collisions.detectCollision();
+    return collisions.collisionData(m_needle, m_tissue);
+  }
+
+  Positions m_before, m_now;
+  std::vector<double> m_mobility;
+  std::vector<Spring> m_springs;
+  GeometryId m_needle, m_tissue;
+};
+
+TEST(SideMemory, ASolverWithTooFewIterationsRecovers) {
+  for (const bool remembers : {false, true}) {
+    NeedleInMembrane scene(remembers);
+    for (int i = 0; i < 20; ++i) scene.step(-0.01);
+    EXPECT_GE(scene.passed, 1);
+    for (int i = 0; i < 60; ++i) scene.step(0.0);
+    EXPECT_EQ(scene.passed > 0, !remembers);
+  }
+}
+
+}  // namespace
+}  // namespace palpate
