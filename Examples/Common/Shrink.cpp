@@ -36,8 +36,10 @@ CollisionProblem withoutTriangles(CollisionProblem problem, std::size_t begin, s
     };
     const auto from = static_cast<std::uint32_t>(place(begin) - mesh.triangles.begin()),
                to = static_cast<std::uint32_t>(place(end) - mesh.triangles.begin());
-    std::erase_if(mesh.disabled, [&](std::uint32_t id) { return id >= from && id < to; });
-    for (std::uint32_t& id : mesh.disabled) id -= id >= to ? to - from : 0;
+    for (auto* ids : {&mesh.disabled, &mesh.removed}) {
+      std::erase_if(*ids, [&](std::uint32_t id) { return id >= from && id < to; });
+      for (std::uint32_t& id : *ids) id -= id >= to ? to - from : 0;
+    }
     mesh.triangles.erase(place(begin), place(end));
     first += size;
   }
@@ -129,8 +131,11 @@ const CollisionData& dataOf(const OctreeBasedCD& detection, const CollisionProbl
 }
 
 CollisionProblem shrink(CollisionProblem problem, const Fails& fails) {
-  for (CollisionProblem::Geometry& mesh : problem.geometries)
+  for (CollisionProblem::Geometry& mesh : problem.geometries) {
     mesh.tetrahedra.clear();  // but surfaces
+    mesh.removedTetrahedra.clear();
+    mesh.tags.clear();  // only predicates use them
+  }
   dropPairs(problem, fails);
   while (dropTriangles(problem, fails) && dropPairs(problem, fails)) continue;
   accept(problem, withoutUnusedVertices(problem), fails);

@@ -343,27 +343,24 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
 struct GeometryTable::Cut {
   /// Checks the new vertices.
   Cut(Geometry& newGeometry, const NewVertices& added)
-      : geometry(newGeometry),
-        positions(newGeometry.body.mesh.topology.vertexCount),
-        rest(newGeometry.body.mesh.rest) {
-    const std::size_t first = rest.size();
-    const auto append = [&](std::span<const Eigen::Vector3d> from, const char* which, auto& out) {
-      out.resize(first + from.size());
-      checkPositions(geometry, from, out.data() + first, which, Threads(1), nullptr, nullptr,
-                     first);
+      : geometry(newGeometry), positions(added.positions.size()) {
+    const CountedVector<Eigen::Vector3d>& before = geometry.body.mesh.rest;
+    const auto check = [&](std::span<const Eigen::Vector3d> from, const char* which,
+                           Eigen::Vector3d* out) {
+      checkPositions(geometry, from, out, which, Threads(1), nullptr, nullptr, before.size());
     };
-    append(added.positions, "", positions);
-    if (added.rest.empty())
-      rest.insert(rest.end(), added.positions.begin(), added.positions.end());
-    else
-      append(added.rest, " at rest", rest);
-    if (rest.size() != positions.size())
+    check(added.positions, "", positions.data());
+    if (!added.rest.empty() && added.rest.size() != positions.size())
       throw Error(ErrorCode::WrongPositionCount,
                   nameOf(geometry) + ": " + std::to_string(added.rest.size()) +
-                      " positions at rest given for " + std::to_string(added.positions.size()) +
+                      " positions at rest given for " + std::to_string(positions.size()) +
                       " new vertices",
                   geometry.body.id);
-    positions.erase(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(first));
+    rest.reserve(before.size() + positions.size());
+    rest.assign(before.begin(), before.end());
+    rest.resize(before.size() + positions.size());
+    check(added.rest.empty() ? added.positions : added.rest, " at rest",
+          rest.data() + before.size());
   }
   /// Whether the cut removes no triangle that has it.
   bool keepsSmallestHeight() const {

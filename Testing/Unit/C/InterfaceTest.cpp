@@ -656,6 +656,12 @@ TEST_F(CScene, GeometriesAreSetAndReadAsByCpp) {
   for (std::uint32_t i = 0; i < 10; ++i) tags.push_back(i % 3);
   EXPECT_OK(palpate_set_tags(m_cd, floor, tags.data(), tags.size()));
   other.setTags(GeometryId{floor}, tags);
+  for (const palpate_id whole : {tool, bone, organ}) {
+    const std::vector<std::uint32_t> same(
+        whole == tool ? 1 : (whole == bone ? m_input.bone : m_input.organ).triangles.size(), whole);
+    EXPECT_OK(palpate_set_tags(m_cd, whole, same.data(), same.size()));
+    other.setTags(GeometryId{whole}, same);
+  }
   const std::uint32_t disabled[] = {0, 7, 8};
   EXPECT_OK(palpate_set_disabled_elements(m_cd, organ, disabled, 3));
   other.setDisabledElements(organId, disabled);

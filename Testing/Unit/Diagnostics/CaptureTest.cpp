@@ -296,10 +296,10 @@ TEST_F(Capture, ReadsEarlierVersions) {
     write(text);
     return readCapture(file());
   };
-  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0 0 0 0 0
-",
-             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0
-");  // priority to sides
+  replaceAll(" Both 0 0 0 0 0 0\n", " Both 0 0 0\n");  // tags, removed, removedTetrahedra
+  replaceAll(" 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0 0 0 0 0\n",
+             " 1.0c6f7a0b5ed8dp-20 0 0p+0 1p-2 0p+0 0 0\n");  // priority to sides
+  EXPECT_TRUE(asVersion(13).geometries[0].tags.empty());
   EXPECT_EQ(asVersion(13).pairs[0].settings.priority, 0);
   EXPECT_FALSE(asVersion(13).pairs[0].settings.smoothNormals);
   EXPECT_FALSE(asVersion(13).pairs[0].settings.rememberSides);
