@@ -207,8 +207,8 @@ class PALPATE_EXPORT CollisionData {
   /// Order    by kind, ids.
   std::span<const Crossing> rememberedSides() const;
 
-  /// Of all contacts in their order, without validity(), tracking, tags and smooth normals: the same
-  /// bits on every machine.
+  /// Of all contacts in their order, without validity(), tracking, tags and smooth normals: the
+  /// same bits on every machine.
   std::uint64_t hash() const;
 
   struct Contents;  ///< not part of the interface
