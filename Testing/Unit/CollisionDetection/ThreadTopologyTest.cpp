@@ -179,7 +179,7 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
 TEST(ThreadTopology, EventsAreThePassagesOfRationalArithmetic) {
   Random random(2);
   std::size_t passages = 0, ends = 0;
-  for (int repeat = 0; repeat < 60; ++repeat) {
+  for (int repeat = 0; repeat < 90; ++repeat) {
     Watched all(polygon(random, 5), polygon(random, 5), repeat % 3 == 0);
     for (int i = 0; i < 10; ++i) {
       const Positions thread = moved(random, all.thread, 0.3), loop = moved(random, all.loop, 0.3);
@@ -216,11 +216,6 @@ TEST(ThreadTopology, IsConsistentWhereFeaturesOnlyTouch) {
       // The same positions count the same, however they were reached.
       Watched fresh(all.thread, all.loop, isClosed);
       ASSERT_EQ(fresh.count(), all.count());
-      if (!isClosed) continue;
-      // With all vertices moved a little at random, curves that do not touch have this number.
-      if (const double integral = linkingIntegral(all.thread, all.loop);
-          std::abs(integral - std::round(integral)) < 1e-9 && std::isfinite(integral))
-        continue;
     }
   }
   EXPECT_GT(changes, 500u);
