@@ -261,38 +261,36 @@ void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> 
 }
 
 void OctreeBasedCD::Implementation::followSides() {
-  std::size_t count = 0;
+  unfollowed.clear();
   for (const auto& record : pairs.records()) {
     record->startSides(geometries.stepNumber());
     if (!record->sides || !record->collides() || record->dataVersion.isCurrent(record->state()))
       continue;
-    if (count == unfollowed.size()) unfollowed.emplace_back();
-    std::unique_ptr<PairRecord>& own = unfollowed[count++];
-    if (!own || own->guarded != record.get() || own->a != record->a || own->b != record->b) {
-      own = std::make_unique<PairRecord>();
-      own->guarded = record.get();
-      own->a = record->a;
-      own->b = record->b;
-    }
-    own->pair = {record->pair.a, record->pair.b, record->pair.settings};
-    own->pair.settings.thickness = own->pair.settings.freeMotionReach = 0.0;
-    own->pair.settings.reportCrossings = true;
-    own->pair.settings.rememberSides = own->pair.settings.smoothNormals = false;
-    own->support = record->support;
-    own->settingsRevision = record->settingsRevision;
-    own->dataVersion.invalidate();
+    if (!record->atEnd) record->atEnd = std::make_unique<PairRecord>();
+    unfollowed.push_back(std::move(record->atEnd));
+    PairRecord& own = *unfollowed.back();
+    own.guarded = record.get();
+    own.a = record->a;
+    own.b = record->b;
+    own.pair = record->pair;
+    own.pair.settings.thickness = own.pair.settings.freeMotionReach = 0.0;
+    own.pair.settings.reportCrossings = true;
+    own.pair.settings.rememberSides = own.pair.settings.smoothNormals = false;
+    own.support = record->support;
+    own.settingsRevision = record->settingsRevision;
+    own.dataVersion.invalidate();
   }
-  unfollowed.resize(count);
-  if (count == 0) return;
+  if (unfollowed.empty()) return;
   detect(unfollowed);
   for (const auto& own : unfollowed) {
-    PairRecord& record = const_cast<PairRecord&>(*own->guarded);
+    PairRecord& record = *pairs.records()[own->guarded->index];
     record.sides->follow(record.meshes(), own->data.crossings());
   }
-  for (const auto& own : unfollowed) {
-    PairRecord& record = const_cast<PairRecord&>(*own->guarded);
+  for (auto& own : unfollowed) {
+    PairRecord& record = *pairs.records()[own->guarded->index];
     record.sides->commit();
     record.dataVersion.invalidate();  // the sides are not those of the last detection
+    record.atEnd = std::move(own);
   }
 }
 

@@ -115,7 +115,11 @@ void PairRecord::addTags() {
 }
 
 void PairRecord::startSides(std::uint64_t step) {
-  if (!pair.settings.rememberSides) return sides.reset();
+  if (!pair.settings.rememberSides) {
+    sides.reset();
+    atEnd.reset();
+    return;
+  }
   if (!sides) sides = std::make_unique<SideMemory>();
   sides->startStep(step);
   if (!collides()) sides->forget();
@@ -224,6 +228,7 @@ void PairRecord::releaseMemory() {
   forEachTimed(contents, [](auto& list) { releaseSpare(list); });
   if (tracker) tracker->releaseMemory(contents);
   if (sides) sides->releaseMemory();
+  atEnd.reset();
   releaseSpare(contents.intersectingTriangles);
 }
 

@@ -152,6 +152,7 @@ struct PairRecord : CountedObject {
   PairStatistics statistics;                ///< of the last detection
   std::unique_ptr<ContactTracker> tracker;  ///< with PairSettings::trackContacts
   std::unique_ptr<SideMemory> sides;        ///< with PairSettings::rememberSides
+  std::unique_ptr<PairRecord> atEnd;        ///< its detection by advance()
   std::unique_ptr<FieldScratch> fieldScratch;
   ContactPredicate predicate;
   IndexLists nearAtRest;  ///< per vertex: later ones within settings.restDistance at rest

@@ -123,9 +123,9 @@ void expectLaw(const Motion& motion, const Contact& contact, std::size_t ofA) {
 class Runs {
  public:
   Runs(const Motion& motion, const PairSettings& pair) {
-    std::vector<Settings> all = octreeSettings();
-    all.push_back(testing::settingsOf(Engine::BruteForce));
-    for (Settings& settings : all) {
+    for (Settings settings : {testing::settingsOf(Engine::Octree),
+                              testing::settingsOf(Engine::Octree, 2, OctreeUpdate::Rebuild),
+                              testing::settingsOf(Engine::BruteForce)}) {
       settings.audit.features = 1000;
       OctreeBasedCD& run = m_runs.emplace_back(settings);
       m_a = motion.a.addTo(run), m_b = motion.b.addTo(run);

@@ -193,7 +193,7 @@ TEST(SteadyFrame, AllocatesNothingWithSidesAndSmoothNormals) {
   std::vector<Eigen::Vector3d> now;
   const auto lift = [&](GeometryId id, const std::vector<Eigen::Vector3d>& rest, double z) {
     now = rest;
-    for (Eigen::Vector3d& p : now) p[2] += z;
+    for (Eigen::Vector3d& p : now) p += z * Eigen::Vector3d(0.113, 0.071, 1);
     detection.setPositions(id, now);
   };
   std::size_t made = 0, sides = 0;
@@ -210,7 +210,7 @@ TEST(SteadyFrame, AllocatesNothingWithSidesAndSmoothNormals) {
     if (frame >= 18) made += allocations - before;
   }
   EXPECT_EQ(made, 0u);
-  EXPECT_GT(sides, 1000u);
+  EXPECT_GT(sides, 500u);
 }
 
 /// Snapshots that a reader holds for two steps, and queries of them.
