@@ -175,14 +175,15 @@ void place(World& world) {
 void prepare(vtk::Window& window, LiveScene& scene, const SceneProgram& program,
              const Options& options) {
   for (const BodyLook& look : scene.looks())
-    window.setAppearance(
-        scene.world().bodies()[look.body].id,
-        {look.label, look.colour, look.opacity, look.frontFaces, look.roughness, look.metallic},
-        look.firstElement);
+    window.setAppearance(scene.world().bodies()[look.body].id,
+                         {look.label, look.colour, look.opacity, look.frontFaces, look.roughness,
+                          look.metallic, look.isCut},
+                         look.firstElement);
   const PictureView view = scene.view();
   window.setView({.from = view.from, .up = view.up, .centre = view.centre, .height = view.height});
   if (view.insetHeight > 0)
     window.setInset({view.inset, view.insetHeight, view.insetLeft, view.insetTop});
+  if (view.section) window.setSection(*view.section);
   window.setLengthUnit(options.unit);
   for (const char key : program.keys + options.keys) window.press(key);
 }

@@ -36,6 +36,7 @@ struct BodyLook {
   std::uint32_t firstElement = 0;
   double roughness = 0.4;  ///< wet tissue 0.3, bone 0.7
   double metallic = 0;
+  bool isCut = true;  ///< false: a section leaves the body whole
 };
 
 /// A text in a picture. With `from`, an arrow leads from there to `at`, and the text stands there.
@@ -59,6 +60,7 @@ struct PictureView {
   Eigen::Vector3d inset = Eigen::Vector3d::Zero();
   double insetHeight = 0;                   ///< L, of an enlarged part about `inset`; 0: none
   bool insetLeft = false, insetTop = true;  ///< its corner
+  std::optional<Plane> section{};           ///< what is out of its half-space is not shown
 };
 
 /// A scene that is computed frame by frame.

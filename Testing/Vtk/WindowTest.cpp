@@ -187,6 +187,13 @@ TEST(Window, AppearanceAndViewAreHonoured) {
   window.setAppearance(id, {.colour = {0.1, 0.9, 0.1}}, 1);  // all triangles but the first
   window.show();
   EXPECT_GT(pixel(window.image(), 100, 100).green, pixel(window.image(), 100, 100).blue + 60);
+  window.setSection({});  // the lower half
+  window.show();
+  EXPECT_TRUE(pixel(window.image(), 100, 130).isWhite());
+  EXPECT_FALSE(pixel(window.image(), 100, 70).isWhite());
+  window.setAppearance(id, {.isCut = false});
+  window.show();
+  EXPECT_FALSE(pixel(window.image(), 100, 130).isWhite());
   window.setAppearance(id, {.opacity = 0});
   window.show();
   EXPECT_TRUE(pixel(window.image(), 100, 100).isWhite());
@@ -208,6 +215,8 @@ TEST(Window, RefusesAppearancesAndViewsOutOfRange) {
   for (const Inset& wrong :
        {Inset{.centre = {nan, 0, 0}}, Inset{.height = 0}, Inset{.height = nan}})
     refuse([&] { window.setInset(wrong); });
+  for (const Plane& wrong : {Plane{.point = {nan, 0, 0}}, Plane{.normal = {0, 0, 0}}})
+    refuse([&] { window.setSection(wrong); });
 }
 
 /// Where the middle of the picture looks: from the front, somewhat to the right and above.
@@ -289,6 +298,12 @@ TEST(Window, ContactLiesBetweenItsFeatures) {
   window.press('n');
   EXPECT_TRUE(pixel(window.image(), 100, 100).isVivid());
   EXPECT_LT(count(window.image(), &Pixel::isVivid, false), 200u);
+  window.setSection({.point = {0, 0, -0.5}});
+  window.show();
+  EXPECT_EQ(count(window.image(), &Pixel::isVivid, false), 0u);
+  window.setSection({.point = {0, 0, 0.5}});
+  window.show();
+  EXPECT_TRUE(pixel(window.image(), 100, 100).isVivid());
   window.press('c');
   EXPECT_FALSE(pixel(window.image(), 100, 100).isVivid());
 }

@@ -7,6 +7,7 @@
 #include <vtkDoubleArray.h>
 #include <vtkIdTypeArray.h>
 #include <vtkNew.h>
+#include <vtkPlane.h>
 #include <vtkPointData.h>
 #include <vtkPolyData.h>
 #include <vtkPolyDataMapper.h>
@@ -207,8 +208,8 @@ void tessellate(Mesh& shape, double size) {
   }
 }
 
-vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, const Parts& parts, double thinnest,
-                 double pixelsPerLength) {
+vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, const Parts& parts,
+                 const std::optional<Plane>& section, double thinnest, double pixelsPerLength) {
   const Appearance& look = parts.begin()->second;
   if (look.opacity == 0) return nullptr;
   const bool tubes = mesh.type == GeometryType::Lines && mesh.triangles.size() <= kMostTubes,
@@ -232,13 +233,23 @@ vtkProp* addBody(vtkRenderer* renderer, const Mesh& mesh, const Parts& parts, do
   normals->ConsistencyOff();
   vtkNew<vtkPolyDataMapper> mapper;
   thin ? mapper->SetInputData(data) : mapper->SetInputConnection(normals->GetOutputPort());
+  if (section && look.isCut) {
+    const Vector3d in = -section->normal;
+    vtkNew<vtkPlane> cut;
+    cut->SetOrigin(section->point.data());
+    cut->SetNormal(in.data());
+    mapper->AddClippingPlane(cut);
+  }
   vtkNew<vtkActor> actor;
   actor->SetMapper(mapper);
   vtkProperty* property = actor->GetProperty();
   property->SetColor(look.colour[0], look.colour[1], look.colour[2]);
   property->SetOpacity(look.opacity);
   property->SetFrontfaceCulling(!look.frontFaces);
-  if (tubes || !thin) property->SetInterpolationToPBR();
+  if (tubes || !thin)
+    property->SetInterpolationToPBR();
+  else
+    property->SetAmbient(0.5);
   property->SetRoughness(look.roughness);
   property->SetMetallic(look.metallic);
   const double diameter = mesh.radii.empty() ? 0 : 2 * mesh.radii.front();

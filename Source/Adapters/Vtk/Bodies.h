@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 
 class vtkProp;
 class vtkRenderer;
@@ -21,9 +22,9 @@ Appearance usualAppearance(std::size_t index);
 void tessellate(CollisionProblem::Geometry& shape, double size);
 
 /// Adds a body to the renderer, or returns null for an invisible one. Each cell has the id of its
-/// element in the cell array "element". thinnest: L, the least radius with which lines are drawn.
-/// pixelsPerLength: of the picture.
-vtkProp* addBody(vtkRenderer*, const CollisionProblem::Geometry&, const Parts&, double thinnest,
-                 double pixelsPerLength);
+/// element in the cell array "element". section: what is out of its half-space is cut off.
+/// thinnest: L, the least radius with which lines are drawn. pixelsPerLength: of the picture.
+vtkProp* addBody(vtkRenderer*, const CollisionProblem::Geometry&, const Parts&,
+                 const std::optional<Plane>& section, double thinnest, double pixelsPerLength);
 
 }  // namespace palpate::vtk

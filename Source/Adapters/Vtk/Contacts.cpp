@@ -12,7 +12,7 @@ using Mesh = CollisionProblem::Geometry;
 
 void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProblem& problem,
                             const std::map<GeometryId, std::size_t>& indices, double size,
-                            const Vector3d& towards) {
+                            const Vector3d& towards, const std::optional<Plane>& section) {
   constexpr double kBall = 0.011, kArrow = 0.04, kMark = 0.014;  // shares of the size
   constexpr double kFew = 400, kSmallest = 0.5;                  // many contacts are drawn smaller
   const double shrink = std::clamp(
@@ -21,7 +21,11 @@ void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProbl
     const Mesh &a = problem.geometries[indices.at(first)],
                &b = problem.geometries[indices.at(second)];
     const CollisionData& data = answerOf(detection, first, second);
+    const auto isHidden = [&](const Vector3d& at) {
+      return section && (at - section->point).dot(section->normal) > 0;
+    };
     const auto add = [&](const auto& c, const Vector3d& at) {
+      if (isHidden(at)) return;
       spheres.add(at, c.distance, shrink * kBall * size, Quaterniond::Identity());
       arrows.add(at, c.distance, shrink * kArrow * size,
                  Quaterniond::FromTwoVectors(Vector3d::UnitX(), c.normal));
@@ -38,7 +42,7 @@ void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProbl
       const Vector3d at = middle(features, meshes);
       add(c, at);
       const double depth = towards.dot(at);
-      if (nearest && depth >= nearest->depth) return;
+      if (isHidden(at) || (nearest && depth >= nearest->depth)) return;
       const auto* v = features.vertices.data();
       nearest = {{{{meshes[0], {v, v + split}}, {meshes[3], {v + split, v + 4}}}}, depth};
     };
@@ -48,7 +52,8 @@ void ContactGlyphs::collect(const OctreeBasedCD& detection, const CollisionProbl
     for (const auto& c : data.shape()) add(c, (c.point + c.pointOnShape) / 2);
     for (const auto& c : data.shapeShape()) add(c, (c.pointA + c.pointB) / 2);
     const auto mark = [&](const Mesh& mesh, std::uint32_t vertex) {
-      untrusted.add(mesh.now[vertex], 0, kMark * size, Quaterniond::Identity());
+      if (!isHidden(mesh.now[vertex]))
+        untrusted.add(mesh.now[vertex], 0, kMark * size, Quaterniond::Identity());
     };
     const Validity& validity = data.validity();
     for (const auto v : validity.untrustedVerticesA) mark(a, v);

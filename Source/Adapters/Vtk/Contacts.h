@@ -27,10 +27,10 @@ struct ContactGlyphs {
   std::optional<FeaturePair> nearest{};  ///< the contact of two meshes nearest to the camera
 
   /// indices: of the geometries in the problem. size: L, of what is in view.
-  /// towards: the direction of the view.
+  /// towards: the direction of the view. section: nothing out of its half-space is collected.
   void collect(const OctreeBasedCD&, const CollisionProblem&,
                const std::map<GeometryId, std::size_t>& indices, double size,
-               const Eigen::Vector3d& towards);
+               const Eigen::Vector3d& towards, const std::optional<Plane>& section);
 };
 
 /// The node that holds the element of each feature, and the node above it.

@@ -112,6 +112,7 @@ struct Window::Implementation {
   std::string picked{}, unit{};
   View view{};
   std::optional<Inset> insetView{};
+  std::optional<Plane> section{};
   std::optional<FeaturePair> nearest{};  // contact to the camera
   Eigen::AlignedBox3d box{};
   Clock::time_point lastShow{};
@@ -237,8 +238,8 @@ void Window::Implementation::drawBodies() {
     double& opacity = look.begin()->second.opacity;
     const bool thin = mesh.type == GeometryType::Lines || mesh.type == GeometryType::Points;
     if (translucent && !thin) opacity = std::min(opacity, kTranslucent);
-    vtkProp* body =
-        addBody(renderer, mesh, look, kThinnest * box.diagonal().norm(), pixelsPerLength());
+    vtkProp* body = addBody(renderer, mesh, look, section, kThinnest * box.diagonal().norm(),
+                            pixelsPerLength());
     if (body == nullptr) continue;
     bodies[body] = &mesh;
     if (insetView) inset->AddViewProp(body);
@@ -292,7 +293,7 @@ void Window::Implementation::drawContacts() {
   const auto collect = [&](ContactGlyphs& glyphs, vtkRenderer* shown) {
     vtkCamera* camera = shown->GetActiveCamera();
     glyphs.collect(detection, problem, indices, 2.5 * camera->GetParallelScale(),
-                   Vector3d(camera->GetDirectionOfProjection()));
+                   Vector3d(camera->GetDirectionOfProjection()), section);
   };
   collect(main, renderer);
   nearest = main.nearest;
@@ -507,6 +508,12 @@ void Window::setInset(const Inset& shown) {
   own.inset->SetViewport(x, y, x + kWidth, y + kHeight);
   own.inset->SetDraw(true);
   own.isNew = true;
+}
+
+void Window::setSection(const Plane& plane) {
+  if (!plane.point.allFinite() || !plane.normal.allFinite() || !(plane.normal.norm() > 0))
+    throw Error(ErrorCode::InvalidSettings, "A section needs a finite plane with a normal.");
+  m_implementation->section = plane;
 }
 
 void Window::setNotes(std::vector<Note> notes) { m_implementation->notes = std::move(notes); }

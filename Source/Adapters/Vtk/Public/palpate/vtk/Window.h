@@ -32,6 +32,7 @@ struct Appearance {
   bool frontFaces = true;                          ///< false: only faces away from the camera
   double roughness = 0.4;                          ///< in [0, 1]; 0: a mirror
   double metallic = 0;                             ///< in [0, 1]; 1: metal
+  bool isCut = true;                               ///< false: a section leaves the body whole
 };
 
 /// An enlarged part of the scene, seen from the same direction.
@@ -82,6 +83,9 @@ class PALPATE_EXPORT Window {
   /// Shows an enlarged part of the scene in a corner, and frames it in the picture. Throws
   /// InvalidSettings if not finite, or if the height is not positive.
   void setInset(const Inset&);
+  /// Shows only bodies and contacts in the half-space of a plane. Throws InvalidSettings if the
+  /// plane is not finite or has no normal.
+  void setSection(const Plane&);
   void setNotes(std::vector<Note>);  ///< for the next show(); without an effect if not finite
   void setLengthUnit(std::string);   ///< the name of L in the picture, such as "mm"
   /// Draws the last frame and handles input; false once closed. frame: its number in the panel and
