@@ -1,5 +1,5 @@
 #!/bin/bash
-# From nothing to seen: packages, build, and five organs gliding through each other. Ends with each stage's times
+# From nothing to seen: packages, build, and five organs that breathe. Ends with each stage's times
 # and the place of the picture. Further arguments go to OrganScene (see --help).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -1,6 +1,9 @@
 #include "Anatomy.h"
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -10,7 +13,9 @@ using Eigen::AlignedBox3d, Eigen::Vector3d;
 
 namespace {
 
-const Vector3d kFundus(-27, -64, -52), kBody(-21, -44, -33), kNeck(-9, -14, -8);
+const Vector3d kFundus(-27, -65, -50), kBody(-24, -55, -39), kNeck(-19, -42, -26);
+
+constexpr double kRoom = 0.8;  // between organs
 
 double bump(double x, double width) { return std::exp(-x * x / (2 * width * width)); }
 
@@ -20,9 +25,10 @@ double visceralHeight(const Vector3d& p) {
 }
 
 double gallbladder(const Vector3d& p) {
-  const double sac =
-      smoothMin(toCone(p, kFundus, kBody, 13, 12.5), toCone(p, kBody, kNeck, 12.5, 5), 8);
-  return smoothMin(sac, toCone(p, kNeck, {-2, -8, -18}, 4, 2.6), 5);
+  const double sac = smoothMin(toCone(p, kFundus, kBody, 9, 8), toCone(p, kBody, kNeck, 8, 3.5), 5);
+  const double duct = std::min(toCone(p, kNeck, {-9, -24, -22}, 3, 2.4),
+                               toCone(p, {-9, -24, -22}, {-2, -8, -18}, 2.4, 2.4));
+  return smoothMin(sac, duct, 4);
 }
 
 double liver(const Vector3d& p) {
@@ -31,29 +37,38 @@ double liver(const Vector3d& p) {
                middle = toEllipsoid(p, {0, -2, 20}, {60, 50, 55});
   double body = smoothMin(smoothMin(right, middle, 30), left, 25);
   // The lower surface meets the front in an edge.
-  body = smoothMax(body, 0.72 * (visceralHeight(p) - p.z()), 7);
+  body = smoothMax(body, 0.72 * (visceralHeight(p) - p.z()), 18);
   // The notch between the lobes.
   body = smoothMax(body, -toEllipsoid(p, {17, -40, -8}, {5, 25, 14}), 8);
-  return smoothMax(body, 0.8 - gallbladder(p), 3);  // the gallbladder's fossa
+  return smoothMax(body, kRoom - gallbladder(p), 3);  // the gallbladder's fossa
 }
 
-/// Points of a smooth curve through these.
-std::vector<Vector3d> curve(const std::vector<Vector3d>& through) {
-  constexpr int kSteps = 8;
-  const auto at = [&](std::ptrdiff_t i) {
-    return through[std::clamp<std::ptrdiff_t>(i, 0, std::ssize(through) - 1)];
+double stomach(const Vector3d& p) {
+  // From the fundus under the diaphragm along the greater curvature to the pylorus.
+  static const std::vector<Vector3d> kAxis = curve(
+      {{66, 20, 42}, {60, 14, 16}, {56, 0, -14}, {45, -14, -42}, {24, -20, -56}, {3, -14, -56}});
+  const auto radius = [](std::size_t i) {  // widest in its body
+    const double along = static_cast<double>(i) / static_cast<double>(kAxis.size() - 1);
+    return 28 - 20 * along * along;
   };
-  std::vector<Vector3d> points;
-  for (std::ptrdiff_t i = 0; i + 1 < std::ssize(through); ++i) {
-    for (int step = 0; step < kSteps; ++step) {
-      const double t = static_cast<double>(step) / kSteps, u = 1 - t;
-      const Vector3d slope0 = (at(i + 1) - at(i - 1)) / 2, slope1 = (at(i + 2) - at(i)) / 2;
-      points.push_back(u * u * (1 + 2 * t) * at(i) + t * t * (1 + 2 * u) * at(i + 1) +
-                       t * u * (u * slope0 - t * slope1));
-    }
-  }
-  points.push_back(through.back());
-  return points;
+  double body = 1e9;
+  for (std::size_t i = 0; i + 1 < kAxis.size(); ++i)
+    body = std::min(body, toCone(p, kAxis[i], kAxis[i + 1], radius(i), radius(i + 1)));
+  return smoothMax(body, kRoom - liver(p), 4);
+}
+
+double kidney(const Vector3d& p) {
+  const Vector3d q = Eigen::AngleAxisd(0.25, Vector3d::UnitY()) * (p - Vector3d(-58, 36, -34));
+  const double bean =
+      toEllipsoid(q + Vector3d(0.003 * q.z() * q.z(), 0, 0), {3, 0, 0}, {27, 21, 54});
+  const double hilum = toEllipsoid(q, {31, 0, 2}, {11, 9, 15});
+  return smoothMax(smoothMax(bean, -hilum, 9), kRoom - liver(p), 4);
+}
+
+double spleen(const Vector3d& p) {
+  const Vector3d q = Eigen::AngleAxisd(-0.5, Vector3d::UnitY()) * (p - Vector3d(101, 30, 16));
+  const double lens = toEllipsoid(q, {0, 0, 0}, {22, 36, 55});
+  return smoothMax(smoothMax(lens, kRoom - stomach(p), 5), kRoom - liver(p), 4);
 }
 
 /// Round branches that run into each other.
@@ -91,7 +106,19 @@ SceneMesh anatomicalLiver(double edge) {
 bool isInLiver(const Vector3d& p) { return liver(p) < 0; }
 
 SceneMesh anatomicalGallbladder(double edge) {
-  return meshOf(gallbladder, AlignedBox3d(Vector3d(-50, -85, -75), Vector3d(10, 5, 10)), edge);
+  return meshOf(gallbladder, AlignedBox3d(Vector3d(-50, -85, -75), Vector3d(10, 5, -5)), edge);
+}
+
+SceneMesh anatomicalStomach(double edge) {
+  return meshOf(stomach, AlignedBox3d(Vector3d(-15, -50, -85), Vector3d(105, 60, 85)), edge);
+}
+
+SceneMesh anatomicalKidney(double edge) {
+  return meshOf(kidney, AlignedBox3d(Vector3d(-110, 0, -100), Vector3d(-10, 70, 35)), edge);
+}
+
+SceneMesh anatomicalSpleen(double edge) {
+  return meshOf(spleen, AlignedBox3d(Vector3d(45, -15, -60), Vector3d(155, 80, 90)), edge);
 }
 
 SceneMesh portalVein(double edge) {

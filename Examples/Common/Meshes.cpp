@@ -165,6 +165,24 @@ SceneMesh tubeAround(std::span<const Vector3d> line, double radius, int around) 
   return mesh;
 }
 
+std::vector<Vector3d> curve(const std::vector<Vector3d>& through) {
+  constexpr int kSteps = 8;
+  const auto at = [&](std::ptrdiff_t i) {
+    return through[std::clamp<std::ptrdiff_t>(i, 0, std::ssize(through) - 1)];
+  };
+  std::vector<Vector3d> points;
+  for (std::ptrdiff_t i = 0; i + 1 < std::ssize(through); ++i) {
+    for (int step = 0; step < kSteps; ++step) {
+      const double t = static_cast<double>(step) / kSteps, u = 1 - t;
+      const Vector3d slope0 = (at(i + 1) - at(i - 1)) / 2, slope1 = (at(i + 2) - at(i)) / 2;
+      points.push_back(u * u * (1 + 2 * t) * at(i) + t * t * (1 + 2 * u) * at(i + 1) +
+                       t * u * (u * slope0 - t * slope1));
+    }
+  }
+  points.push_back(through.back());
+  return points;
+}
+
 void append(SceneMesh& mesh, const SceneMesh& other) {
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   mesh.positions.insert(mesh.positions.end(), other.positions.begin(), other.positions.end());

@@ -42,6 +42,9 @@ SceneMesh capsule(const Eigen::Vector3d& p0, const Eigen::Vector3d& p1, double r
 /// Open tube around a polyline of at least two positions, for pictures.
 SceneMesh tubeAround(std::span<const Eigen::Vector3d> line, double radius, int around);
 
+/// Points of a smooth curve through these: eight for each of them.
+std::vector<Eigen::Vector3d> curve(const std::vector<Eigen::Vector3d>& through);
+
 void append(SceneMesh& mesh, const SceneMesh& other);
 
 /// L: mean over every side of every triangle of all meshes.

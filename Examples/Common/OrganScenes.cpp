@@ -1,3 +1,4 @@
+#include "Anatomy.h"
 #include "Scenes.h"
 
 #include <Eigen/Geometry>
@@ -14,8 +15,7 @@ using std::numbers::pi;
 namespace {
 
 /// A bumpy sphere (star-shaped while the bumps stay below 1), stretched, tapered and bent along x.
-struct OrganShape {
-  const char* name;
+struct RoundShape {
   int frequency;
   Vector3d radii;
   double bumps;  ///< of the radius
@@ -24,15 +24,15 @@ struct OrganShape {
   double bend;   ///< at x = 1 the section is bend higher
 };
 
-const std::array<OrganShape, 5> kOrganShapes{{
-    {"Liver", 11, {1.25, 0.85, 0.75}, 0.10, {3.1, 4.3, 2.2}, -0.35, -0.15},
-    {"Stomach", 11, {1.15, 0.80, 0.80}, 0.08, {4.0, 2.5, 3.7}, 0.25, 0.30},
-    {"Kidney", 10, {1.05, 0.80, 0.75}, 0.05, {2.0, 5.0, 3.0}, 0.05, 0.35},
-    {"Spleen", 10, {1.10, 0.85, 0.70}, 0.07, {5.2, 3.3, 4.1}, 0.15, -0.25},
-    {"Gallbladder", 10, {1.15, 0.75, 0.75}, 0.06, {2.7, 2.9, 5.1}, 0.40, 0.10},
+const std::array<RoundShape, 5> kRoundShapes{{
+    {11, {1.25, 0.85, 0.75}, 0.10, {3.1, 4.3, 2.2}, -0.35, -0.15},
+    {11, {1.15, 0.80, 0.80}, 0.08, {4.0, 2.5, 3.7}, 0.25, 0.30},
+    {10, {1.05, 0.80, 0.75}, 0.05, {2.0, 5.0, 3.0}, 0.05, 0.35},
+    {10, {1.10, 0.85, 0.70}, 0.07, {5.2, 3.3, 4.1}, 0.15, -0.25},
+    {10, {1.15, 0.75, 0.75}, 0.06, {2.7, 2.9, 5.1}, 0.40, 0.10},
 }};
 
-SceneMesh shaped(const OrganShape& shape) {
+SceneMesh shaped(const RoundShape& shape) {
   SceneMesh mesh = sphere(shape.frequency);
   for (Vector3d& p : mesh.positions) {
     const Vector3d waves = (shape.bumpWaves.cwiseProduct(p)).array().sin();
@@ -84,13 +84,39 @@ Scene glidingScene(std::string name, std::vector<SceneMesh> meshes, double reach
 }  // namespace
 
 std::vector<Organ> organMeshes() {
-  std::vector<Organ> organs;
-  for (const OrganShape& shape : kOrganShapes) organs.push_back({shape.name, shaped(shape)});
+  std::vector<Organ> organs{{"Liver", anatomicalLiver(7)},
+                            {"Stomach", anatomicalStomach(5.7)},
+                            {"Kidney", anatomicalKidney(5)},
+                            {"Spleen", anatomicalSpleen(5.3)},
+                            {"Gallbladder", anatomicalGallbladder(2.15)}};
+  for (Organ& organ : organs)
+    for (Vector3d& p : organ.mesh.positions) p = (p * 1e3).array().round() / 1e3;
   return organs;
 }
 
+Scene breathingOrgans() {
+  // mm: how far an organ goes down when the diaphragm does, and how its surface ripples.
+  constexpr std::array kFalls{14.0, 11.0, 11.0, 11.0, 12.0}, kRipples{0.6, 1.5, 0.3, 0.6, 0.6};
+  Scene scene{"breathing organs", {}, {}, {}};
+  for (Organ& organ : organMeshes()) {
+    const std::size_t b = scene.meshes.size();
+    scene.meshes.push_back(std::move(organ.mesh));
+    scene.motions.push_back([=](const Vector3d& rest, double time) -> Vector3d {
+      constexpr double kWave = 15;  // mm
+      const double beat = 2 * pi * 3 * time + static_cast<double>(b);
+      const Vector3d ripple(std::sin(rest.y() / kWave + beat), std::sin(rest.z() / kWave + beat),
+                            std::sin(rest.x() / kWave + beat));
+      return rest + kRipples[b] * ripple -
+             kFalls[b] * (1 - std::cos(2 * pi * time)) / 2 * Vector3d::UnitZ();
+    });
+    for (std::size_t a = 0; a < b; ++a) scene.pairs.emplace_back(a, b);
+  }
+  scene.thickness = 1;
+  return scene;
+}
+
 SceneMesh liver(int frequency) {
-  OrganShape shape = kOrganShapes[0];
+  RoundShape shape = kRoundShapes[0];
   shape.frequency = frequency;
   return shaped(shape);
 }
@@ -101,9 +127,9 @@ std::string organObj(const Organ& organ) {
 
 Scene organs() {
   std::vector<SceneMesh> meshes;
-  for (Organ& organ : organMeshes()) meshes.push_back(std::move(organ.mesh));
+  for (const RoundShape& shape : kRoundShapes) meshes.push_back(shaped(shape));
   return glidingScene("organs", std::move(meshes), 1.45,
-                      std::vector<double>(kOrganShapes.size(), 1.0));
+                      std::vector<double>(kRoundShapes.size(), 1.0));
 }
 
 Scene glidingMeshes(std::vector<SceneMesh> meshes) {

@@ -26,20 +26,23 @@ struct Scene {
   std::size_t triangleCount() const;
 };
 
-/// Five closed deforming organs, 10,840 triangles, that glide through their common centre and back.
+/// Five closed deforming bodies, round and bumpy, 10,840 triangles, that glide through their common
+/// centre and back. Figures of benchmarks are measured on them.
 Scene organs();
+SceneMesh liver(int frequency);  ///< the first of them, with 20 frequency² triangles; there 11
 
-/// The organs at rest, as in Data/Organs: closed, outward winding, coordinates multiples of 1e-6.
+/// Organs at rest in their places, as in Data/Organs: mm, closed, outward winding, coordinates
+/// multiples of 0.001.
 struct Organ {
   std::string name;
   SceneMesh mesh;
 };
 std::vector<Organ> organMeshes();
-SceneMesh liver(int frequency);  ///< finer or coarser than its file's 11: 20 frequency² triangles
+Scene breathingOrgans();                   ///< slide along and into each other; thickness 1 mm
 std::string organObj(const Organ& organ);  ///< the text of its file in Data/Organs
 
-/// Any meshes, centred, that glide through each other as the organs do. At least one; a single mesh
-/// meets its copy.
+/// Any meshes, centred, that glide through each other as the bodies of organs() do. At least one; a
+/// single mesh meets its copy.
 Scene glidingMeshes(std::vector<SceneMesh> meshes);
 
 /// A sheet of 112,338 triangles that settles on a ball and hangs down around it in folds.

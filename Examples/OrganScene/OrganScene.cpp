@@ -1,4 +1,4 @@
-// Five deforming organs, or the user's own meshes, glide through each other: contacts of each
+// Five organs breathe, or the user's own meshes glide through each other: contacts of each
 // frame, what each stage of it cost, and a picture.
 #include "CommandLine.h"
 #include "SceneProgram.h"
@@ -27,7 +27,7 @@ struct Options {
 };
 
 Scene sceneOf(const Options& options) {
-  if (options.meshes.empty()) return organs();
+  if (options.meshes.empty()) return breathingOrgans();
   std::vector<SceneMesh> meshes;
   for (const std::string& path : options.meshes) meshes.push_back(readMesh(path));
   return glidingMeshes(std::move(meshes));
@@ -36,13 +36,15 @@ Scene sceneOf(const Options& options) {
 class OrganScene : public LiveScene {
  public:
   OrganScene(const Options& options, int threads)
-      : m_scene(sceneOf(options)), m_method(options.method), m_world(threads) {
+      : m_isOfOrgans(options.meshes.empty()),
+        m_scene(sceneOf(options)),
+        m_method(options.method),
+        m_world(threads) {
     const bool touching = m_method == Method::Intersection || m_method == Method::Continuous;
     m_thickness = options.thickness.value_or(touching ? 0.0 : m_scene.thickness);
     const std::vector<Organ> organs = organMeshes();
     for (std::size_t m = 0; m < m_scene.meshes.size(); ++m) {
-      const std::string name =
-          options.meshes.empty() ? organs[m].name : "Mesh " + std::to_string(m + 1);
+      const std::string name = m_isOfOrgans ? organs[m].name : "Mesh " + std::to_string(m + 1);
       m_world.addMesh(name, m_scene.meshes[m], 0.0);
     }
     for (const auto& [a, b] : m_scene.pairs)
@@ -63,12 +65,15 @@ class OrganScene : public LiveScene {
 
   std::vector<BodyLook> looks() override {
     constexpr std::array kColours{kLiverColour, kStomachColour, kKidneyColour, kSpleenColour,
-                                  kGallbladderColour};
+                                  Colour{0.45, 0.56, 0.30}};
     std::vector<BodyLook> looks;
     for (World::BodyId m = 0; m < m_scene.meshes.size(); ++m)
       looks.push_back({m, m_world.bodies()[m].name, kColours[m % kColours.size()]});
+    if (m_isOfOrgans) looks.front().opacity = 0.45;  // the contacts are behind the liver
     return looks;
   }
+
+  PictureView view() override { return {.from = {0.1, -1, -0.2}}; }
 
   void computeFrame(int frame) override {
     m_world.predict(1.0, Eigen::Vector3d::Zero(), 0.0);
@@ -108,6 +113,7 @@ class OrganScene : public LiveScene {
   }
 
  private:
+  bool m_isOfOrgans;
   Scene m_scene;
   Method m_method;
   double m_thickness;
@@ -124,12 +130,11 @@ int main(int count, char** arguments) {
   Options options;
   return runScene(
       {.name = "OrganScene",
-       .description = "Deforming organs glide through each other.",
+       .description = "Organs breathe, slide along each other and overlap.",
        .frames = 120,
        .frameMilliseconds = 1000.0 / 60,
        .collisionMilliseconds = 1,
-       .keys = "on",
-       .unit = "L",
+       .keys = "n",
        .isUnitFree = true,
        .addOptions =
            [&](CLI::App& app) {
@@ -142,9 +147,9 @@ int main(int count, char** arguments) {
                  ->type_name("METHOD")
                  ->check(oneOf({"auto", "intersection", "proximity", "continuous"}));
              app.add_option("--thickness", options.thickness,
-                            "distance under which two features touch, in the meshes' unit; a "
-                            "twentieth of the mean edge if absent, and 0 for intersection and "
-                            "continuous")
+                            "distance under which two features touch; if absent 1 mm for the "
+                            "organs, a twentieth of the mean edge for meshes, and 0 for "
+                            "intersection and continuous")
                  ->check(between(0.0, 1e9));
            },
        .make = [&](int threads) { return std::make_unique<OrganScene>(options, threads); }},

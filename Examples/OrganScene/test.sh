@@ -7,7 +7,7 @@ for stage in frame collision boxes octree pairs "narrow phase" order; do
 done
 grep -qE "^untrusted pairs +[0-9.]+! .* 0\.000$" "$folder/text" || fail "no mark above the budget: $(cat "$folder/text")"
 grep -q "^zero in all frames .*hold ms" "$folder/text" || fail "series of zeros are listed: $(cat "$folder/text")"
-grep -q "5 meshes, 10840 triangles, 10 pairs, proximity" "$folder/run/report.html" || fail "report.html has not the settings"
+grep -q "5 meshes, 11100 triangles, 10 pairs, proximity" "$folder/run/report.html" || fail "report.html has not the settings"
 [[ ! -s $folder/messages ]] || fail "a short run writes to a log: $(cat "$folder/messages")"
 script -qec "'$program' --frames 3 --out '$folder/run'" /dev/null >"$folder/terminal" || fail "no terminal"
 grep -q '\[#*\] OrganScene: frame 3 of 3, ' "$folder/terminal" || fail "no bar on a terminal: $(cat "$folder/terminal")"
@@ -27,7 +27,7 @@ refused --mesh "$folder/missing.obj"
 if [[ $hasVtk == 1 ]]; then
   organs=$(dirname "$test")/../../Data/Organs
   run --mesh "$organs/Liver.obj" "$organs/Kidney.obj"
-  grep -q " 2 meshes, 4420 triangles, 1 pairs" "$folder/text" || fail "other meshes: $(head -1 "$folder/text")"
+  grep -q " 2 meshes, 5048 triangles, 1 pairs" "$folder/text" || fail "other meshes: $(head -1 "$folder/text")"
   column contacts | grep -qvx 0 || fail "meshes without contacts"
   echo "not a mesh" >"$folder/bad.obj"
   refused --mesh "$folder/bad.obj" "$organs/Liver.obj"

@@ -26,19 +26,16 @@ Vector3d meanOf(std::span<const Vector3d> positions) {
   return sum / static_cast<double>(positions.size());
 }
 
-/// An organ whose lowest (highest) point is at this height.
-SceneMesh organAt(const char* name, double height, bool standing) {
-  for (Organ& organ : organMeshes()) {
-    if (organ.name != name) continue;
-    Eigen::AlignedBox3d box;
-    for (const Vector3d& p : organ.mesh.positions) box.extend(p);
-    const double edge = standing ? box.min().z() : box.max().z();
-    for (Vector3d& p : organ.mesh.positions)
-      p = kScale * (p - Vector3d(box.center().x(), box.center().y(), edge)) +
-          height * Vector3d::UnitZ();
-    return std::move(organ.mesh);
-  }
-  return {};
+/// A body of organs() whose lowest (highest) point is at this height.
+SceneMesh organAt(std::size_t index, double height, bool standing) {
+  SceneMesh organ = organs().meshes[index];
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : organ.positions) box.extend(p);
+  const double edge = standing ? box.min().z() : box.max().z();
+  for (Vector3d& p : organ.positions)
+    p = kScale * (p - Vector3d(box.center().x(), box.center().y(), edge)) +
+        height * Vector3d::UnitZ();
+  return organ;
 }
 
 class Retraction : public LiveScene {
@@ -46,8 +43,8 @@ class Retraction : public LiveScene {
   explicit Retraction(int threads) : m_world(threads), m_check(Settings{.threads = threads}) {
     SceneMesh membrane = sheet(36);  // with a flap of 40 mm beside the organs
     for (Vector3d& p : membrane.positions) p = {90 * p.x() - 20, kHalfMembrane * p.y(), 0};
-    m_bodies = {m_world.addMesh("liver", organAt("Liver", 3, true), 1000),
-                m_world.addMesh("stomach", organAt("Stomach", -3, false), 1000),
+    m_bodies = {m_world.addMesh("liver", organAt(0, 3, true), 1000),
+                m_world.addMesh("stomach", organAt(1, -3, false), 1000),
                 m_world.addMesh("membrane", membrane, 10000)};
     const auto [liver, stomach, sheetBody] = m_bodies;
     m_world.pin(liver, [](const Vector3d& p) { return p.z() > 0.8 * 1.5 * kScale; });

@@ -5,6 +5,7 @@
 #include "Scenes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -39,9 +40,9 @@ class RobotArms : public LiveScene {
   explicit RobotArms(int threads) : m_world(threads), m_check(Settings{.threads = threads}) {
     addMesh("cavity", sphere(16), {110, 88, 78}, Vector3d::Zero());
     const std::vector<Vector3d> places{{-44, 16, -14}, {38, 16, -22}, {0, -30, -30}};
-    for (int i = 0; i < 3; ++i)  // liver, stomach, kidney
-      addMesh(organMeshes()[i].name, organMeshes()[i].mesh, Vector3d::Constant(34 - 4 * i),
-              places[i]);
+    constexpr std::array kNames{"liver", "stomach", "kidney"};
+    for (int i = 0; i < 3; ++i)
+      addMesh(kNames[i], organs().meshes[i], Vector3d::Constant(34 - 4 * i), places[i]);
     for (const double side : {-1.0, 1.0}) {
       Eigen::Isometry3d port = Eigen::Isometry3d::Identity();
       port.translation() = Vector3d(58 * side, -25, 60);

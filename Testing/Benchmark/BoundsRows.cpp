@@ -160,7 +160,7 @@ Scene robotArms() {
   scene.thickness = 2;
   const std::array<Vector3d, kOrgans> places{{{-44, 16, -14}, {38, 16, -22}, {0, -30, -30}}};
   for (std::size_t i = 0; i < kOrgans; ++i) {
-    scene.bodies.push_back(scenes::organMeshes()[i].mesh);
+    scene.bodies.push_back(scenes::organs().meshes[i]);
     for (Vector3d& p : scene.bodies.back().positions)
       p = (34.0 - 4.0 * static_cast<double>(i)) * p + places[i];
   }

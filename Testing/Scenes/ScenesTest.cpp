@@ -90,11 +90,27 @@ TEST(Meshes, GradedSphereSpansItsRangeOfSizes) {
 }
 
 TEST(Organs, AreClosedWoundOutwardAndOfTheirSize) {
+  std::map<std::string, double> millilitres;
+  std::size_t triangles = 0;
   for (const auto& [name, mesh] : organMeshes()) {
     EXPECT_TRUE(closedAndConsistentlyWound(mesh)) << name;
-    EXPECT_GT(volume(mesh), 1.0) << name;
+    millilitres[name] = volume(mesh) / 1000;
+    triangles += mesh.triangles.size();
   }
+  EXPECT_EQ(triangles, 11'100u);
+  EXPECT_NEAR(millilitres["Liver"], 900, 50);
+  EXPECT_NEAR(millilitres["Stomach"], 280, 30);
+  EXPECT_NEAR(millilitres["Spleen"], 165, 20);
+  EXPECT_NEAR(millilitres["Kidney"], 120, 20);
+  EXPECT_LT(millilitres["Gallbladder"], 30);
   EXPECT_EQ(organs().triangleCount(), 10840u);
+}
+
+TEST(Organs, BreatheAlongEachOther) {
+  const Scene scene = breathingOrgans();
+  std::size_t touching = 0;
+  for (const auto& [a, b] : scene.pairs) touching += candidates(scene, 30, a, b) > 0;
+  EXPECT_GE(touching, 4u);  // the liver with three organs, the stomach with the spleen
 }
 
 TEST(Organs, FilesMatchTheGenerator) {
