@@ -1,6 +1,7 @@
-// A spherical burr in the hollow that it has drilled into a large bone, under flowing water: debris
-// and blood sink over the bone. The bone does not move, so only the particles' octree changes. The
-// particles meet the bone by planes in an octree's leaves, built before the first frame.
+// A spherical burr in the hollow that it has drilled into a skull, under flowing water: debris and
+// blood sink over the bone. The picture is a section through the hollow. The bone does not move, so
+// only the particles' octree changes. The particles meet the bone by planes in an octree's leaves,
+// built before the first frame.
 #include "CommandLine.h"
 #include "SceneProgram.h"
 #include "Scenes.h"
@@ -9,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -24,30 +26,62 @@ using Eigen::Vector3d, std::numbers::pi;
 constexpr double kFrame = 1.0 / 60, kReach = 0.4, kSpeed = 48, kParticle = 0.1, kBurr = 4,
                  kGap = 0.02, kBrick = 5;
 constexpr double kBone = 120, kFloor = -180;
-constexpr double kHollow = 7;  // its depth, and the width at which the depth is 0.6 of that
-const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);  // less what water carries
+constexpr double kHollow = 7, kFloorWidth = 2, kRim = 11;  // its depth and two radii
+const Vector3d kMiddle(0, 0, 0), kGravity(0, 0, -600);     // less what water carries
 const Vector3d kDrilled = Vector3d(0, -0.3, 1).normalized();
+/// From the whole bone's surface: of the outer table, spongy bone, inner table and brain.
+constexpr std::array kDepths{0.0, 2.5, 9.0, 11.5, 26.0};
+const Vector3d kBehind = kDrilled.cross(Vector3d::UnitX());  // the section, from its normal
 
 struct Size {
   int particles = 100'000, triangles = 500'000;
 };
 /// Of the bone, which is seen whole from its middle, along a unit vector.
-double boneRadius(const Vector3d& d) {
-  const double away = kBone * (d - kDrilled).norm() / kHollow;
+double wholeRadius(const Vector3d& d) {
   return kBone * (1 + 0.06 * std::sin(5 * d.x() + 1) * std::cos(4 * d.y()) - 0.1 * d.y() * d.y() +
-                  0.01 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z())) -
-         kHollow * std::exp(-away * away / 2);
+                  0.003 * std::sin(23 * d.x()) * std::sin(19 * d.y() + 7 * d.z()));
+}
+double boneRadius(const Vector3d& d) {
+  const double away = kBone * (d - kDrilled).norm(),
+               up = std::clamp((away - kFloorWidth) / (kRim - kFloorWidth), 0.0, 1.0);
+  return wholeRadius(d) - kHollow * (1 + std::cos(pi * up)) / 2;
+}
+
+/// Directions nearer to the hollow, where the bone's triangles are smaller.
+Vector3d closer(const Vector3d& d) {
+  const Vector3d across = d - d.dot(kDrilled) * kDrilled;
+  const double angle = std::atan2(across.norm(), d.dot(kDrilled)),
+               to = angle * (1 - 0.7 * std::exp(-2 * angle * angle));
+  return std::cos(to) * kDrilled + std::sin(to) * across.stableNormalized();
+}
+
+/// A layer of the section, between two depths below the whole bone's surface.
+SceneMesh layer(double from, double to) {
+  constexpr double kSide = 0.4;
+  SceneMesh face = sheet(120);
+  for (Vector3d& p : face.positions) {
+    const double x = kSide * p.x();
+    const Vector3d d = std::cos(x) * kDrilled + std::sin(x) * Vector3d::UnitX();
+    const double depth = (from + to) / 2 - p.y() * (to - from) / 2;
+    p = std::min(boneRadius(d), wholeRadius(d) - depth) * d;
+  }
+  return face;
 }
 
 class BoneDrilling : public LiveScene {
  public:
-  BoneDrilling(const Size& size, int threads) : m_sag(12'000.0 / size.triangles), m_world(threads) {
+  BoneDrilling(const Size& size, int threads) : m_sag(16'000.0 / size.triangles), m_world(threads) {
     SceneMesh bone = cubeSphere(static_cast<int>(std::ceil(std::sqrt(size.triangles / 12.0))));
-    for (Vector3d& p : bone.positions) p = (boneRadius(p) * p).eval();
+    for (Vector3d& p : bone.positions) {
+      const Vector3d d = closer(p);
+      p = boneRadius(d) * d;
+    }
     m_bone = m_world.addRigidMesh("bone", bone);
     m_burrAt = burrTarget(0) + 5 * Vector3d::UnitZ();
     m_burr = m_world.addShape("burr", Sphere{kMiddle, kBurr}, capsule(kMiddle, kMiddle, kBurr, 8));
-    m_shaft = m_world.addRigidMesh("shaft", capsule(kMiddle, {12, 0, 40}, 1.5, 8));  // shown only
+    m_shaft = m_world.addRigidMesh("shaft", capsule(kMiddle, {10, 6, 40}, 1.5, 8));  // shown only
+    for (std::size_t i = 0; i < m_layers.size(); ++i)
+      m_layers[i] = m_world.addRigidMesh("layer", layer(kDepths[i], kDepths[i + 1]));  // shown only
     placeBurr();
     std::vector<Vector3d> positions(size.particles);
     for (std::size_t i = 0; i < positions.size(); ++i) {  // sinking already; an eighth at the burr
@@ -77,13 +111,32 @@ class BoneDrilling : public LiveScene {
   World& world() override { return m_world; }
 
   std::vector<BodyLook> looks() override {
-    return {{m_bone, "Bone", kBoneColour, 1, true, 0, 0.7},
-            {m_burr, "", kSteelColour, 1, true, 0, 0.3, 1},
-            {m_shaft, "Burr", kSteelColour, 1, true, 0, 0.3, 1},
+    return {{m_bone, "", kBoneColour, 1, true, 0, 0.7},
+            {m_layers[0], "", {1, 0.95, 0.82}, 1, true, 0, 0.7, 0, false},
+            {m_layers[1], "", {0.85, 0.52, 0.40}, 1, true, 0, 0.9, 0, false},
+            {m_layers[2], "", {1, 0.95, 0.82}, 1, true, 0, 0.7, 0, false},
+            {m_layers[3], "", {1, 0.80, 0.78}, 1, true, 0, 0.5, 0, false},
+            {m_burr, "Burr", kSteelColour, 1, true, 0, 0.3, 1, false},
+            {m_shaft, "", kSteelColour, 1, true, 0, 0.3, 1, false},
             {m_particles, "", kBloodColour}};
   }
   PictureView view() override {
-    return {.from = {0.3, -1, 0.35}, .centre = kBone * kDrilled + Vector3d(2, 0, 1), .height = 44};
+    return {.from = {0.15, -1, 0.12},
+            .centre = kBone * kDrilled + Vector3d(1, 0, -1),
+            .height = 36,
+            .section = Plane{.normal = -kBehind}};
+  }
+  std::vector<PictureNote> notes() override {
+    std::vector<PictureNote> notes;
+    for (const auto& [text, depth] : {std::pair("outer table", kDepths[1] / 2),
+                                      {"spongy bone", (kDepths[1] + kDepths[2]) / 2},
+                                      {"inner table", (kDepths[2] + kDepths[3]) / 2},
+                                      {"brain", kDepths[3] + 3}}) {
+      constexpr double kAngle = 0.17;
+      const Vector3d d = std::cos(kAngle) * kDrilled + std::sin(kAngle) * Vector3d::UnitX();
+      notes.push_back({text, (wholeRadius(d) - depth) * d});
+    }
+    return notes;
   }
   void computeFrame(int frame) override {
     double fastest = 0;
@@ -129,7 +182,7 @@ class BoneDrilling : public LiveScene {
   /// The hand presses 1 mm deep, along an eight.
   static Vector3d burrTarget(double frame) {
     const double phase = 2 * pi * frame / 60;
-    const Vector3d way(0.05 * std::sin(phase), 0.03 * std::sin(2 * phase), 0);
+    const Vector3d way(0.02 * std::sin(phase), 0.012 * std::sin(2 * phase), 0);
     const Vector3d d = (kDrilled + way).normalized();
     return (boneRadius(d) + kBurr - 1) * d;
   }
@@ -184,7 +237,7 @@ class BoneDrilling : public LiveScene {
     Xpbd& solver = m_world.solver();  // which has the particles last
     for (std::size_t i = m_world.bodies()[m_particles].first; i < solver.now.size(); ++i) {
       if (solver.now[i].z() > kFloor) continue;
-      const Vector3d vessel(-20, -30, boneRadius(Vector3d(-20, -30, 90).normalized()) + 6);
+      const Vector3d vessel(-14, -25, boneRadius(Vector3d(-14, -25, 110).normalized()) + 4);
       const Vector3d away(between(-2, 2), between(-2, 2), between(-2, 2));
       solver.now[i] = solver.before[i] = (i % 2 == 0 ? m_burrAt : vessel) + away;
       solver.velocities[i] = 40 * away;
@@ -199,6 +252,7 @@ class BoneDrilling : public LiveScene {
   World m_world;
   std::minstd_rand m_random;
   World::BodyId m_bone = 0, m_burr = 0, m_shaft = 0, m_particles = 0;
+  std::array<World::BodyId, 4> m_layers{};
   Vector3d m_burrAt;
   int m_touching = 0, m_fallen = 0, m_rebuilt = 0;
 };
@@ -215,7 +269,7 @@ int main(int count, char** arguments) {
            "A burr in a hollow of a bone of half a million triangles, under debris and blood.",
        .frames = 300,
        .frameMilliseconds = 1000.0 / 60,
-       .keys = "n",
+       .keys = "cn",
        .addOptions =
            [&](CLI::App& app) {
              app.add_option("--particles", size.particles, "of debris and blood")
