@@ -1,9 +1,11 @@
-// A thread of 1,000 segments goes through two sheets and around itself, and is pulled tight.
+// A thread of 1,000 segments goes through two sheets and around itself, and is pulled tight. Beside
+// it is a stitch that is tied already.
 #include "SceneProgram.h"
 #include "SelfImpacts.h"
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -56,16 +58,35 @@ Vector3d tailAt(double time, const Vector3d& start) {
                      (Vector3d(-kArc * 0.8, 0.21, 14) - start);
 }
 
-/// The needle, then the thread in a coil.
+/// The needle, then the thread, which leads to a coil.
 std::vector<Vector3d> atRest() {
   std::vector<Vector3d> line = needleAt(0);
+  constexpr std::uint32_t kStraight = 200;
   constexpr double kCoil = 2, kRise = 0.5;  // radius, and way along the axis a turn
-  const Vector3d start = line.back(), axis = start + kCoil * Vector3d(0.5, 0, std::sqrt(0.75));
+  const Vector3d along = Vector3d(0.35, 0, 1).normalized(), needleEnd = line.back();
+  for (std::uint32_t i = 1; i <= kStraight; ++i) line.push_back(needleEnd + kSegment * i * along);
+  const Vector3d start = line.back(), axis = start + kCoil * along.cross(Vector3d::UnitY());
   const double turn = kSegment / std::hypot(kCoil, kRise / (2 * pi));
-  for (std::uint32_t i = 1; i <= kSegments; ++i)
+  for (std::uint32_t i = 1; i <= kSegments - kStraight; ++i)
     line.push_back(axis - Eigen::AngleAxisd(-turn * i, Vector3d::UnitY()) * (axis - start) -
                    Vector3d(0, kRise * turn * i / (2 * pi), 0));
   return line;
+}
+
+/// Half of a stitch that an overhand knot closes: from below the wound up through the left edge,
+/// one and a half times half around the other half, which is this one turned by 180 degrees.
+std::vector<Vector3d> halfStitch() {
+  constexpr double kKnot = 0.45, kTwist = 0.06, kHeight = 0.13;  // half its length; radius; height
+  constexpr int kPoints = 12;
+  std::vector<Vector3d> line{{-0.06, 0, -0.9}, {-0.9, 0, -0.8}, {-1.45, 0, -0.35},
+                             {-1.55, 0, 0.05}, {-1.25, 0, 0.2}, {-0.85, -0.03, 0.15}};
+  for (int i = 0; i <= kPoints; ++i) {
+    const double along = 2.0 * i / kPoints - 1, angle = pi * (1 + 1.5 * along);
+    line.emplace_back(kKnot * along, kTwist * std::cos(angle), kHeight + kTwist * std::sin(angle));
+  }
+  line.emplace_back(kKnot + 0.3, 0.05, kHeight + kTwist + 0.12);
+  line.emplace_back(kKnot + 0.8, 0.2, kHeight + 0.7);
+  return curve(line);
 }
 
 class Suturing : public LiveScene {
@@ -88,9 +109,16 @@ class Suturing : public LiveScene {
     m_world.addGuard(m_thread, m_thread);
     for (const double side : {-1.0, 1.0}) addSheet(side, touching);
     m_world.addPair(m_sheets[0], m_sheets[1], touching, kGap);
+    for (const double side : {-1.0, 1.0}) {
+      std::vector<Vector3d> half = halfStitch();
+      for (Vector3d& p : half) p = Vector3d(-side * p.x(), -side * p.y(), p.z()) + kStitch;
+      m_stitch[side > 0] = m_world.addThread("stitch", half, kRadius, 0.0);
+    }
+    m_world.addPair(m_stitch[0], m_stitch[1],
+                    {.method = Method::Proximity, .thickness = kTied, .contacts = Contacts::All},
+                    0);
     SceneMesh bed = sheet(24);  // shown only
-    for (Vector3d& p : bed.positions)
-      p = {2.5 * p.x(), 5 * p.y(), -0.5 - 1.5 * (1 - p.x() * p.x())};
+    for (Vector3d& p : bed.positions) p = {2.5 * p.x(), 2.7 + 4.8 * p.y(), -2};
     m_bed = m_world.addRigidMesh("wound", bed);
     m_world.addGuard(m_sheets[0], m_sheets[1]);
   }
@@ -100,14 +128,24 @@ class Suturing : public LiveScene {
   std::vector<BodyLook> looks() override {
     return {{m_thread, "Needle", kSteelColour, 1, true, 0, 0.3, 1},
             {.body = m_thread, .label = "Thread", .colour = kThreadColour, .firstElement = kNeedle},
+            {m_stitch[0], "", kThreadColour},
+            {m_stitch[1], "", kThreadColour},
             {m_sheets[0], "", kTissueColour, 1, true, 0, 0.5},
             {m_sheets[1], "", kTissueColour, 1, true, 0, 0.5},
             {m_bed, "Wound", {0.45, 0.05, 0.05}, 1, true, 0, 0.25}};
   }
 
   PictureView view() override {
-    return {.from = {0.35, -1, 0.75}, .centre = {0, 0, 0.8}, .height = 10};
+    return {.from = {0.35, -1, 0.75},
+            .centre = {-1.1, 1, 0.9},
+            .height = 8,
+            .inset = kStitch + Vector3d(0, 0, 0.2),
+            .insetHeight = 1.6,
+            .insetLeft = true,
+            .insetTop = false};
   }
+
+  std::vector<PictureNote> notes() override { return {{"Knot", kStitch + Vector3d(0, 0, 0.8)}}; }
 
   void computeFrame(int) override {
     m_steps.clear();
@@ -131,6 +169,7 @@ class Suturing : public LiveScene {
     return {{"substeps", m_time},
             {"stretch", stretch()},
             {"holes", m_holes[0] + m_holes[1]},
+            {"knot gap mm", knotGap()},
             {"touches itself", m_world.contacts(m_thread, m_thread).edgeEdge().size()},
             {"wound mm", m_world.positions(m_sheets[1])[kMiddle].x() -
                              m_world.positions(m_sheets[0])[kMiddle + kCells].x()}};
@@ -140,18 +179,33 @@ class Suturing : public LiveScene {
     std::size_t impacts = 0;
     for (std::size_t i = 0; i + 1 < m_steps.size(); ++i)
       impacts += countSelfImpacts(m_steps[i], m_steps[i + 1]);
+    if (knotGap() <= 0) return "the knot's thread is in itself.";
     return impacts == 0
                ? ""
                : "the thread passes through itself in " + std::to_string(impacts) + " places.";
   }
 
  private:
+  static constexpr double kTied = 0.03;  // mm: nearer parts of the knot touch
+  inline static const Vector3d kStitch{0, 2, 0};
+
+  /// Between the surfaces of the knot's two parts.
+  double knotGap() {
+    double least = kTied;
+    for (const EdgeEdgeContact& c : m_world.contacts(m_stitch[0], m_stitch[1]).edgeEdge())
+      least = std::min(least, c.distance);
+    return least;
+  }
+
   static constexpr int kCells = 20, kMiddle = kCells / 2 * (kCells + 1);  // a row's first vertex
 
   void addSheet(double side, const PairSettings& settings) {
     SceneMesh mesh = sheet(kCells);
     constexpr double kHalf = 5;
-    for (Vector3d& p : mesh.positions) p = kHalf * p + Vector3d(side * (kHalf + 0.4), 0, 0);
+    for (Vector3d& p : mesh.positions) {  // the wound narrows towards its ends
+      const double width = 0.02 + 0.38 * (1 - p.y() * p.y());
+      p = kHalf * p + Vector3d(side * (kHalf + width), 0, 0);
+    }
     const World::BodyId body = m_world.addMesh(side < 0 ? "left" : "right", mesh, 0.05);
     // Clamped on three sides, as by the tissue around: only the wound's edges are free.
     m_world.pin(body, [](const Vector3d& p) {
@@ -201,7 +255,7 @@ class Suturing : public LiveScene {
 
   World m_world;
   World::BodyId m_thread = 0, m_bed = 0;
-  std::array<World::BodyId, 2> m_sheets{};
+  std::array<World::BodyId, 2> m_sheets{}, m_stitch{};
   std::array<bool, 2> m_holes{};
   std::vector<std::vector<Vector3d>> m_steps;  // the frame's, committed
   double m_time = 0, m_next = 0;               // substeps of the story
