@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <map>
 #include <numbers>
 
 namespace palpate::scenes {
@@ -174,18 +175,29 @@ class Palpation : public LiveScene {
       m_world.positions(m_tool)[i] = m_tip + m_toolRest.positions[i];
   }
 
-  /// Constraints are met one after another, and the solver may leave a vertex inside: from the
-  /// probe it goes out by the shortest way; what the tool would pass through, and the tool, stay.
+  /// Constraints are met one after another, and the solver may leave elements inside: from the
+  /// probe they go out by the shortest way; what the tool would pass through, and the tool, stay.
   void leaveTool() {
     if (!m_toolRest.positions.empty()) {
       m_world.hold();
       m_tip = m_world.positions(m_tool)[0] - m_toolRest.positions[0];
       return;
     }
-    m_world.detect();
-    for (const ShapeContact& c : m_world.contacts(m_organ, m_tool).shape())
-      if (c.element == ShapeElement::Vertex && c.distance < m_gap / 2)
-        m_world.positions(m_organ)[c.id] += (m_gap / 2 - c.distance) * c.normal;
+    constexpr int kMostRounds = 4;
+    for (int round = 0; round < kMostRounds; ++round) {
+      m_world.detectOnly();
+      std::map<std::uint32_t, Vector3d> ways;  // the longest of each vertex
+      for (const ShapeContact& c : m_world.contacts(m_organ, m_tool).shape()) {
+        if (c.distance >= 0) continue;
+        const Vector3d way = (m_gap / 4 - c.distance) * c.normal;
+        for (const std::uint32_t v : c.vertices) {
+          Vector3d& longest = ways.try_emplace(v, Vector3d::Zero()).first->second;
+          if (way.norm() > longest.norm()) longest = way;
+        }
+      }
+      for (const auto& [v, way] : ways) m_world.positions(m_organ)[v] += way;
+      if (ways.empty()) break;
+    }
   }
 
   World m_world;
