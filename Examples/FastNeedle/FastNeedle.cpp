@@ -85,7 +85,7 @@ class FastNeedle : public LiveScene {
     for (const Lane& lane : m_lanes) {
       const Vector3d tip = m_world.positions(lane.needle).front(), start(tip.x(), tip.y(), kAbove),
                      end(tip.x(), tip.y(), tip.z() + kNeedleLength);
-      const bool found = m_world.force(lane.needle).norm() > 0;
+      const bool found = contacts(lane) > 0;
       const Colour colour = found ? Colour{0, 0.45, 0.35} : Colour{0.75, 0.25, 0};
       notes.push_back({"", end, start});
       notes.push_back({m_world.bodies()[lane.needle].name, {tip.x(), tip.y(), kAbove + 1.2}});
@@ -117,8 +117,7 @@ class FastNeedle : public LiveScene {
     std::vector<std::pair<std::string, double>> values;
     for (const Lane& lane : m_lanes) {
       values.emplace_back(m_world.bodies()[lane.needle].name + " passed", lane.passed);
-      values.emplace_back(m_world.bodies()[lane.needle].name + " force mN",
-                          m_world.force(lane.needle).norm());
+      values.emplace_back(m_world.bodies()[lane.needle].name + " contacts", contacts(lane));
     }
     return values;
   }
@@ -163,6 +162,11 @@ class FastNeedle : public LiveScene {
     m_lanes.push_back(lane);
   }
 
+  std::size_t contacts(const Lane& lane) const {
+    const CollisionData& data = m_world.contacts(lane.needle, lane.membrane);
+    return data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
+  }
+
   /// As far towards a height of the tip as the speed allows.
   void drive(const Lane& lane, double height) {
     const double way = height - m_world.before(lane.needle).front().z();
@@ -170,24 +174,26 @@ class FastNeedle : public LiveScene {
     for (Vector3d& p : m_world.positions(lane.needle)) p += step;
   }
 
-  /// The tip is below the membrane's vertex that is nearest to it in plan, all of the needle under
-  /// the rim's plane: nothing holds it.
+  /// The tip is below the triangle of the membrane that it is in, in plan, or the two intersect.
   bool isThrough(const Lane& lane) {
     const auto view = [&](World::BodyId id) {
       return TriangleMeshView{m_world.positions(id), m_world.bodies()[id].triangles};
     };
     const Vector3d tip = m_world.positions(lane.needle).front();
-    const Vector3d* below = nullptr;
-    double nearest = kHalfWidth;
-    for (const Vector3d& p : m_world.positions(lane.membrane)) {
-      const double distance = (p - tip).head<2>().norm();
-      if (distance < nearest) nearest = distance, below = &p;
+    bool isBelow = false;
+    for (const auto& [a, b, c] : m_world.bodies()[lane.membrane].triangles) {
+      const std::span<const Vector3d> p = m_world.positions(lane.membrane);
+      const Vector3d normal = (p[b] - p[a]).cross(p[c] - p[a]);
+      const auto isLeft = [&](const Vector3d& from, const Vector3d& to) {
+        return (to - from).cross(tip - from).z() >= 0;
+      };
+      isBelow |= isLeft(p[a], p[b]) && isLeft(p[b], p[c]) && isLeft(p[c], p[a]) &&
+                 normal.dot(tip - p[a]) < 0;
     }
-    return tip.z() < below->z() - kThickness ||
-           !palpate::detectCollision(view(lane.needle), view(lane.membrane),
-                                     {.method = Method::Intersection})
-                .intersectingTriangles()
-                .empty();
+    return isBelow || !palpate::detectCollision(view(lane.needle), view(lane.membrane),
+                                                {.method = Method::Intersection})
+                           .intersectingTriangles()
+                           .empty();
   }
 
   World m_world;
