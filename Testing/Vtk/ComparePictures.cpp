@@ -1,5 +1,5 @@
-// ComparePictures REFERENCE PICTURE [--write]: whether a picture of 1600 x 1000 looks as it did.
-// The reference is the picture in squares of 20 pixels, each its mean; so lines a pixel beside or
+// ComparePictures REFERENCE PICTURE [--write]: whether a picture of 800 x 500 looks as it did.
+// The reference is the picture in squares of 10 pixels, each its mean; so lines a pixel beside or
 // smoother, as another Mesa draws them, are the same, and a body, contact or normal that is not
 // there is not. Returns 1 where they differ.
 #include <vtkImageData.h>
@@ -14,7 +14,7 @@
 
 namespace {
 
-constexpr int kSquare = 20, kWidth = 80, kHeight = 50;
+constexpr int kSquare = 10, kWidth = 80, kHeight = 50;
 // Of 255. kMostOfOne: a line in a square has a sixteenth of it, and may be in the next.
 constexpr double kMostOfOne = 32, kMostOnAverage = 0.5;
 

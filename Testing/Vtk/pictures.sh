@@ -8,7 +8,7 @@ name=$(basename "$program")
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $*"; exit 1; }
-"$xvfb" -a "$program" "$@" --threads 1 --out "$folder" >"$folder/text" 2>&1 || fail "$(cat "$folder/text")"
+"$xvfb" -a "$program" "$@" --size 800 500 --threads 1 --out "$folder" >"$folder/text" 2>&1 || fail "$(cat "$folder/text")"
 if [[ ${WRITE:-0} == 1 ]]; then
   cp "$folder/scene.png" "$pictures/$name.large.png"
   "$compare" "$pictures/$name.png" "$folder/scene.png" --write
