@@ -57,13 +57,17 @@ Vector3d closer(const Vector3d& d) {
 
 /// A layer of the section, between two depths below the whole bone's surface.
 SceneMesh layer(double from, double to) {
-  constexpr double kSide = 0.4;
-  SceneMesh face = sheet(120);
-  for (Vector3d& p : face.positions) {
-    const double x = kSide * p.x();
+  constexpr std::uint32_t kSteps = 120;
+  constexpr double kSide = 0.4;  // radians
+  SceneMesh face;
+  for (std::uint32_t i = 0; i <= kSteps; ++i) {
+    const double x = kSide * (2.0 * i / kSteps - 1);
     const Vector3d d = std::cos(x) * kDrilled + std::sin(x) * Vector3d::UnitX();
-    const double depth = (from + to) / 2 - p.y() * (to - from) / 2;
-    p = std::min(boneRadius(d), wholeRadius(d) - depth) * d;
+    for (const double depth : {to, from})
+      face.positions.push_back(std::min(boneRadius(d), wholeRadius(d) - depth) * d);
+    const std::uint32_t v = 2 * i;
+    if (i < kSteps)
+      face.triangles.insert(face.triangles.end(), {{v, v + 2, v + 1}, {v + 1, v + 2, v + 3}});
   }
   return face;
 }
