@@ -89,14 +89,14 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Returns call(prepare), which changes the topology of a geometry.
+  /// Returns call(prepare), which changes the topology of a geometry. isCut: only a part of it.
   template <class F>
-  auto changeTopology(GeometryId geometry, F&& call) {
+  auto changeTopology(GeometryId geometry, bool isCut, F&& call) {
     return withinLimit([&] {
       countCandidates();
       IndexLists near;
       auto result = call([&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
-        near = pairs.nearAtRest(geometry, topology, rest, threads);
+        near = pairs.nearAtRest(geometry, topology, rest, isCut, threads);
       });
       pairs.setNearAtRest(geometry, std::move(near));
       return result;

@@ -261,11 +261,15 @@ void checkPredicate(const PairRecord& record, const SupportedPairs& support) {
 }  // namespace
 
 IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
-                                 std::span<const Eigen::Vector3d> rest,
+                                 std::span<const Eigen::Vector3d> rest, bool isCut,
                                  const Threads& threads) const {
   const auto found = m_byIds.find(keyOf(id, id));
   const double distance = found == m_byIds.end() ? 0.0 : found->second->pair.settings.restDistance;
-  return distance > 0.0 ? verticesWithin(topology, rest, distance, threads) : IndexLists();
+  if (!(distance > 0.0)) return {};
+  const PairRecord& record = *found->second;
+  return isCut ? verticesWithin(topology, rest, distance, record.nearAtRest,
+                                record.a->body.mesh.topology, threads)
+               : verticesWithin(topology, rest, distance, threads);
 }
 
 void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {

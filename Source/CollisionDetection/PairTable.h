@@ -172,9 +172,10 @@ class PairTable {
   void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
   /// PairSettings::restDistance: the vertices that are near at rest, in a new topology of a
-  /// geometry. Empty if no pair needs them. Throws TooLarge.
+  /// geometry. Empty if no pair needs them. isCut: it differs from the topology now in a part, and
+  /// vertices that stay are at rest where they were. Throws TooLarge.
   IndexLists nearAtRest(GeometryId, const MeshTopology&, std::span<const Eigen::Vector3d> rest,
-                        const Threads&) const;
+                        bool isCut, const Threads&) const;
   void setNearAtRest(GeometryId, IndexLists) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.

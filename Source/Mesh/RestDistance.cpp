@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <optional>
 
 namespace palpate {
 
@@ -92,12 +94,22 @@ class ShortestPaths {
         if (v > from) out.push_back(v);
       std::sort(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
     }
+    reset();
+  }
+  /// Calls f(vertex) for all that are within the distance, in any order.
+  template <class F>
+  void forEachReached(std::uint32_t from, F&& f) {
+    search(from);
+    for (const std::uint32_t v : m_reached) f(v);
+    reset();
+  }
+
+ private:
+  void reset() {
     PALPATE_ASSERT(m_waiting == 0);
     for (const std::uint32_t v : m_reached) m_pathLength[v] = kUnreached;
     m_reached.clear();
   }
-
- private:
   void search(std::uint32_t from) {
     relax(from, 0.0);
     for (std::size_t ring = 0; m_waiting > 0; ++ring) {
@@ -133,10 +145,29 @@ class ShortestPaths {
   std::size_t m_waiting = 0;  ///< entries of all rings
 };
 
-}  // namespace
+/// The vertices that an edge of one mesh, and not of the other, may bring within the distance of
+/// another vertex. Sums from the other end of a path are rounded otherwise.
+void markReached(const MeshTopology& mesh, const MeshTopology& other,
+                 std::span<const Eigen::Vector3d> rest, double distance,
+                 CountedVector<std::uint8_t>& isReached) {
+  const double reach = distance * (1.0 + 0x1p-30);
+  const EdgeLists edges(mesh, rest, reach);
+  ShortestPaths paths(edges, reach);
+  CountedVector<Segment> changed;
+  std::set_difference(mesh.edges.begin(), mesh.edges.end(), other.edges.begin(), other.edges.end(),
+                      std::back_inserter(changed));
+  CountedVector<std::uint32_t> ends;
+  for (const Segment& edge : changed) ends.insert(ends.end(), edge.begin(), edge.end());
+  std::sort(ends.begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  for (const std::uint32_t end : ends)
+    paths.forEachReached(end, [&](std::uint32_t v) { isReached[v] = 1; });
+}
 
-IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                          double distance, const Threads& threads) {
+/// kept(vertex): its list, or null where it must be searched.
+template <class Kept>
+IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
+                   double distance, const Threads& threads, const Kept& kept) {
   PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
   const EdgeLists edges(topology, rest, distance);
   const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
@@ -150,7 +181,10 @@ IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::V
       const std::size_t end = std::min(count, (task + 1) * kGrain);
       for (std::size_t v = task * kGrain; v < end; ++v) {
         const std::size_t before = found[task].size();
-        paths.addReached(static_cast<std::uint32_t>(v), found[task]);
+        if (const std::optional<std::span<const std::uint32_t>> list = kept(v))
+          found[task].insert(found[task].end(), list->begin(), list->end());
+        else
+          paths.addReached(static_cast<std::uint32_t>(v), found[task]);
         lists.offsets[v + 1] = static_cast<std::uint32_t>(found[task].size() - before);
       }
       pairs += found[task].size();
@@ -167,6 +201,26 @@ IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::V
     part = {};
   }
   return lists;
+}
+
+}  // namespace
+
+IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
+                          double distance, const Threads& threads) {
+  return listsOf(topology, rest, distance, threads, [](std::size_t) { return std::nullopt; });
+}
+
+IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
+                          double distance, const IndexLists& before, const MeshTopology& old,
+                          const Threads& threads) {
+  PALPATE_ASSERT(before.offsets.size() == old.vertexCount + 1);
+  CountedVector<std::uint8_t> isReached(topology.vertexCount, 0);
+  markReached(old, topology, rest.first(old.vertexCount), distance, isReached);
+  markReached(topology, old, rest, distance, isReached);
+  using List = std::optional<std::span<const std::uint32_t>>;
+  return listsOf(topology, rest, distance, threads, [&](std::size_t v) {
+    return v < old.vertexCount && !isReached[v] ? List(before[v]) : List();
+  });
 }
 
 }  // namespace palpate

@@ -16,4 +16,11 @@ namespace palpate {
 IndexLists verticesWithin(const MeshTopology&, std::span<const Eigen::Vector3d> rest,
                           double distance, const Threads&);
 
+/// The same after a cut. before, old: the lists of the topology that was cut.
+/// Cost     searches from the vertices within the distance of edges that are gone or new, and what
+///          is linear in the mesh: lengths of edges, and copies of the other lists.
+IndexLists verticesWithin(const MeshTopology&, std::span<const Eigen::Vector3d> rest,
+                          double distance, const IndexLists& before, const MeshTopology& old,
+                          const Threads&);
+
 }  // namespace palpate

@@ -1,9 +1,11 @@
 #include "Mesh/RestDistance.h"
+#include "Mesh/TopologyCut.h"
 
 #include "Common/RandomMeshes.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -107,6 +109,42 @@ TEST(RestDistance, TakesMeshesWithoutEdges) {
   EXPECT_EQ(compare(mesh, 1.0), 0u);
   mesh.triangles = {{0, 1, 2}, {2, 2, 2}};
   EXPECT_EQ(compare(mesh, 0x1p-1074), 3u);
+}
+
+TEST(RestDistance, AfterACutIsThatOfTheNewMesh) {
+  std::size_t kept = 0;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    Random random(seed);
+    Mesh mesh = testing::sheet(9, 0.3, 0);
+    for (Eigen::Vector3d& p : mesh.positions) p += testing::randomPoint(random, -0.02, 0.02);
+    MeshTopology topology(mesh.positions.size(), mesh.triangles);
+    const double distance = testing::uniform(random, 0.05, 0.5);
+    IndexLists lists = verticesWithin(topology, mesh.positions, distance, Threads(1));
+    for (int cut = 0; cut < 4; ++cut) {
+      const auto first = static_cast<std::uint32_t>(topology.elements.size());
+      std::vector<std::uint32_t> removed;
+      for (std::uint32_t t = 0; t < first; ++t)
+        if (!topology.isRemoved(t) && random() % 40 == 0) removed.push_back(t);
+      std::vector<Triangle> added;
+      for (const std::uint32_t t : removed) {
+        const auto [a, b, c] = topology.elements[t];
+        if (random() % 2) continue;
+        const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
+        mesh.positions.push_back((mesh.positions[a] + mesh.positions[b] + mesh.positions[c]) / 3.0);
+        added.insert(added.end(), {{a, b, middle}, {b, c, middle}});
+      }
+      const MeshTopology next = cutTopology(topology, removed, added, mesh.positions.size());
+      const IndexLists truth = verticesWithin(next, mesh.positions, distance, Threads(1));
+      for (std::size_t v = 0; v < topology.vertexCount; ++v)
+        kept += std::ranges::equal(lists[v], truth[v]);
+      lists = verticesWithin(next, mesh.positions, distance, lists, topology,
+                             Threads(1 + static_cast<int>(seed % 3)));
+      EXPECT_EQ(lists.offsets, truth.offsets);
+      EXPECT_EQ(lists.items, truth.items);
+      topology = next;
+    }
+  }
+  EXPECT_GT(kept, 1000u);
 }
 
 }  // namespace
