@@ -348,6 +348,18 @@ struct type_caster<T, std::enable_if_t<std::is_class_v<T> && palpate::python::Ha
 };
 
 template <>
+struct type_caster<palpate::GeometryId> {
+  PYBIND11_TYPE_CASTER(palpate::GeometryId, const_name("int"));
+  bool load(handle source, bool) {
+    value = palpate::python::geometryId(source);
+    return true;
+  }
+  static handle cast(palpate::GeometryId id, return_value_policy, handle) {
+    return int_(static_cast<std::uint32_t>(id)).release();
+  }
+};
+
+template <>
 struct type_caster<std::filesystem::path> {
   PYBIND11_TYPE_CASTER(std::filesystem::path, const_name("str"));
   bool load(handle source, bool) {
