@@ -293,6 +293,8 @@ static unsafe class Native {
   [DllImport(Library)] public static extern int palpate_set_pair_settings(IntPtr cd, uint a, uint b, ref PairSettings settings);
   [DllImport(Library)] public static extern int palpate_remove_pair(IntPtr cd, uint a, uint b);
   [DllImport(Library)] public static extern int palpate_detect(IntPtr cd);
+  [DllImport(Library)] public static extern int palpate_detect_within(IntPtr cd, long microseconds, out byte complete);
+  [DllImport(Library)] public static extern int palpate_cancel_detection(IntPtr cd);
   [DllImport(Library)] public static extern int palpate_advance(IntPtr cd);
   [DllImport(Library)] public static extern int palpate_get_contacts(IntPtr cd, uint a, uint b, ref ContactViews contacts);
   [DllImport(Library)] public static extern int palpate_get_validity(IntPtr cd, uint a, uint b, ref Validity validity);
