@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <map>
 #include <numeric>
 #include <set>
@@ -447,6 +448,37 @@ TEST_F(OnePoint, RemembersPositionsAtTheStepsEnd) {
   m_collisions.advance();
   EXPECT_EQ(remembered(), 0u);
   EXPECT_TRUE(stepTo({0.43, 0.47, 0.2}).vertexTriangle().empty());
+}
+
+TEST_F(OnePoint, ABudgetWithoutTimeForgetsNothing) {
+  const auto stepWithoutTime = [&](const Vector3d& p) {
+    moveTo(p);
+    EXPECT_FALSE(m_collisions.detectCollision(std::chrono::microseconds(0)));
+    m_collisions.advance();
+  };
+  stepTo({0.43, 0.47, 0.1});
+  stepWithoutTime({0.43, 0.47, -0.1});
+  EXPECT_EQ(remembered(), 1u);
+  stepWithoutTime({0.43, 0.47, -0.2});
+  EXPECT_EQ(remembered(), 1u);
+  EXPECT_EQ(stepTo({0.43, 0.47, -0.2}).vertexTriangle().at(0).normal, Vector3d(0, 0, 1));
+  stepWithoutTime({0.43, 0.47, 0.1});
+  EXPECT_EQ(remembered(), 0u);
+}
+
+TEST_F(OnePoint, ACutElsewhereLeavesTheMemoryAndOneOfTheTriangleEndsIt) {
+  pass();
+  const std::uint32_t triangle = m_collisions.problem().pairs.at(0).sides.at(0).ids.at(1);
+  const auto cut = [&](std::uint32_t removed) {
+    m_collisions.replaceTriangles(m_sheet, std::vector<std::uint32_t>{removed}, {}, {});
+    stepTo({0.43, 0.47, -0.1});
+    return remembered();
+  };
+  EXPECT_EQ(cut(triangle == 0 ? 71 : 0), 1u);
+  const std::vector<Crossing> side{m_collisions.problem().pairs.at(0).sides};
+  EXPECT_EQ(cut(triangle), 0u);
+  testing::expectRefused(ErrorCode::IndexOutOfRange, "triangle " + std::to_string(triangle),
+                         [&] { m_collisions.setRememberedSides(m_tip, m_sheet, side); });
 }
 
 /// An answer that nothing changed is kept, unless another step has other sides.
