@@ -270,7 +270,7 @@ int main(int count, char** arguments) {
   return runScene(
       {.name = "Suturing",
        .description = "A thread of 1,000 segments through two sheets and around itself.",
-       .frames = 300,
+       .frames = 400,
        .frameMilliseconds = 1000.0 / 60,
        .keys = "n",
        .make = [](int threads) { return std::make_unique<Suturing>(threads); }},
