@@ -14,7 +14,7 @@ PACKAGE = ADAPTER / "palpate"
 STRING = re.compile(r'R"\((.*?)\)"|"((?:[^"\\\n]|\\.)*)"', re.DOTALL)
 # A class with its variable, or a call that adds a name to one.
 CLASS = r"(?:py::class_<[^;()]*?>|\w+Class)\s*(?P<variable>\w*)\(\s*module,"
-CALL = r"(?P<owner>\w+|\))\s*\.def(?:_property_readonly|_static)?\(|\badd(?:Property|List|Tracked)\((?P<first>\w+),"
+CALL = r"(?P<owner>\w+|\))\s*\.def(?:_property_readonly|_static)?\(|\badd(?:Property|List|Tracked|Normals)\((?P<first>\w+),"
 ALIASES = {"_Floats": "ndarray[float64]", "_Indices": "ndarray[uint32]", "_Bools": "ndarray[bool]", "_Records": "recarray",
            "_Record": "record", "_Path": "str | PathLike", "_Array": "ArrayLike", "_Progress": "Callable[[float], bool | None]"}
 

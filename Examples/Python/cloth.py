@@ -37,7 +37,7 @@ def read_organ() -> tuple[Floats, Indices]:
     lines = [line.split() for line in ORGAN.read_text().splitlines()]
     positions = np.array([line[1:] for line in lines if line[0] == "v"], dtype=np.float64)
     triangles = np.array([line[1:] for line in lines if line[0] == "f"], dtype=np.int64)
-    return 60 * positions, triangles - 1
+    return positions - positions.mean(axis=0), triangles - 1
 
 
 class Cloth:
@@ -242,10 +242,10 @@ def draw(simulation: Simulation, stages: list[tuple[str, Floats]], file: str) ->
         text.SetPosition(20, 14)
         renderer.AddActor2D(text)
         camera = renderer.GetActiveCamera()
-        camera.SetFocalPoint(0, 0, 11)
+        camera.SetFocalPoint(18, 0, 4)
         camera.SetPosition(150, -400, 260)
         camera.SetViewUp(0, 0, 1)
-        camera.SetViewAngle(19)
+        camera.SetViewAngle(24)
         renderer.ResetCameraClippingRange()
         for place, strength in ((200, -250, 500), 0.75), ((-400, -300, 100), 0.45):
             light = vtk.vtkLight()

@@ -1,7 +1,7 @@
 #include "CollisionDetection/Frame.h"
 
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "NarrowPhase/SmoothNormals.h"
+#include "Tracking/SmoothNormals.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Spin.h"

@@ -2,7 +2,7 @@
 
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Proximity.h"
-#include "NarrowPhase/SmoothNormals.h"
+#include "Tracking/SmoothNormals.h"
 #include "Math/ClosestPoint.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"

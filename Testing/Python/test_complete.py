@@ -55,6 +55,9 @@ CLASSES = {
     "ContinuousSettings": "keyword arguments of PairSettings",
     "AutoSettings": "keyword arguments of PairSettings",
     "LeafSettings": "keyword arguments of PairSettings",
+    "ThreadTopology": "not in Python yet",
+    "ThreadEvent": "not in Python yet",
+    "VertexPath": "not in Python yet",
 }
 FIELDS = {
     "PairSettings.continuous": "time_tolerance",

@@ -1,4 +1,4 @@
-#include "NarrowPhase/SmoothNormals.h"
+#include "Tracking/SmoothNormals.h"
 
 #include "Mesh/FaceAtCorner.h"
 #include "Math/StableLength.h"
