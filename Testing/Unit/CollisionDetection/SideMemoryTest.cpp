@@ -461,7 +461,7 @@ TEST_F(OnePoint, ABudgetWithoutTimeForgetsNothing) {
   EXPECT_EQ(remembered(), 1u);
   stepWithoutTime({0.43, 0.47, -0.2});
   EXPECT_EQ(remembered(), 1u);
-  EXPECT_EQ(stepTo({0.43, 0.47, -0.2}).vertexTriangle().at(0).normal, Vector3d(0, 0, 1));
+  EXPECT_EQ(stepTo({0.43, 0.47, -0.2}).vertexTriangle()[0].normal, Vector3d(0, 0, 1));
   stepWithoutTime({0.43, 0.47, 0.1});
   EXPECT_EQ(remembered(), 0u);
 }

@@ -1,5 +1,6 @@
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 #include "Unit/Math/ImpactOracle.h"
 
 #include <palpate/OctreeBasedCD.h>
@@ -152,11 +153,12 @@ Positions moved(Random& random, Positions positions, double by) {
 
 TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps) {
   Random random(1);
-  std::size_t changes = 0, steps = 0;
+  constexpr int kRepeats = 20, kSteps = 5000 / kShareOfCases;
+  std::size_t changes = 0;
   int largest = 0;
-  for (int repeat = 0; repeat < 20; ++repeat) {
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
     Watched all(polygon(random, 7), polygon(random, 6), true);
-    for (int i = 0; i < 5000; ++i, ++steps) {
+    for (int i = 0; i < kSteps; ++i) {
       const int before = all.count();
       // They are drawn back, so that they do not drift apart.
       const auto next = [&](Positions p) {
@@ -171,8 +173,7 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
       largest = std::max(largest, std::abs(all.count()));
     }
   }
-  EXPECT_EQ(steps, 100000u);
-  EXPECT_GT(changes, 1000u);
+  EXPECT_GT(changes, 1000u / kShareOfCases);
   EXPECT_GT(largest, 1);
 }
 
@@ -205,7 +206,7 @@ TEST(ThreadTopology, IsConsistentWhereFeaturesOnlyTouch) {
     return positions;
   };
   std::size_t changes = 0;
-  for (int repeat = 0; repeat < 300; ++repeat) {
+  for (int repeat = 0; repeat < 60; ++repeat) {
     const bool isClosed = repeat % 2 == 0;
     Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), isClosed);
     for (int i = 0; i < 20; ++i) {
@@ -218,7 +219,7 @@ TEST(ThreadTopology, IsConsistentWhereFeaturesOnlyTouch) {
       ASSERT_EQ(fresh.count(), all.count());
     }
   }
-  EXPECT_GT(changes, 500u);
+  EXPECT_GT(changes, 100u);
 }
 
 /// A thread along z through a square hole.

@@ -111,8 +111,7 @@ TEST(Validate, FindsFaultsOfTheLinks) {
 TEST(Validate, FindsFaultsOfTheElements) {
   expectFailure("nodes instead of 1", [](Tree& tree) { ++tree.begin(tree.leaf); });
   expectFailure("in 2 nodes instead of 1", [](Tree& tree) { --tree.begin(tree.leaf); });
-  expectFailure("is repeated in the order",
-                [](Tree& tree) { tree.element(0) = tree.element(1); });
+  expectFailure("is repeated in the order", [](Tree& tree) { tree.element(0) = tree.element(1); });
 }
 
 TEST(Validate, FindsFaultsOfTheBoxes) {
