@@ -12,13 +12,13 @@ namespace palpate {
 
 namespace {
 
-using Bounds = Eigen::AlignedBox3d;
+using AlignedBox = Eigen::AlignedBox3d;
 
 constexpr double kTimeTolerance = 0x1p-40;
 
 template <class Vertices>
-Bounds boxOf(const Vertices& vertices, std::initializer_list<int> ends) {
-  Bounds box;
+AlignedBox boxOf(const Vertices& vertices, std::initializer_list<int> ends) {
+  AlignedBox box;
   for (const PathVertex& vertex : vertices)
     for (const int end : ends) box.extend(vertex.at[static_cast<std::size_t>(end)]);
   return box;
@@ -49,14 +49,14 @@ int countPassages(std::span<const PathVertex> thread, std::span<const PathVertex
   const auto point = [&](const PathVertex& v) {
     return NumberedPoint{v.number, v.at[static_cast<std::size_t>(end)]};
   };
-  const Bounds surface = boxOf(loop, {end});
+  const AlignedBox surface = boxOf(loop, {end});
   int count = 0;
   for (std::size_t i = 0; i + 1 < thread.size(); ++i) {
-    const Bounds edge = boxOf(thread.subspan(i, 2), {end});
+    const AlignedBox edge = boxOf(thread.subspan(i, 2), {end});
     if (!edge.intersects(surface)) continue;
     const NumberedPoint p = point(thread[i]), q = point(thread[i + 1]), a = point(loop[0]);
     for (std::size_t k = 1; k + 1 < loop.size(); ++k) {
-      Bounds triangle = boxOf(loop.subspan(k, 2), {end});
+      AlignedBox triangle = boxOf(loop.subspan(k, 2), {end});
       if (triangle.extend(a.position).intersects(edge))
         count += passageOf(p, q, a, point(loop[k]), point(loop[k + 1]));
     }
@@ -67,13 +67,13 @@ int countPassages(std::span<const PathVertex> thread, std::span<const PathVertex
 void appendPassages(std::span<const PathVertex> thread, std::span<const PathVertex> loop,
                     std::vector<LoopPassage>& passages) {
   const std::size_t first = passages.size();
-  const Bounds surface = boxOf(loop, {0, 1});
+  const AlignedBox surface = boxOf(loop, {0, 1});
   for (std::size_t i = 0; i + 1 < thread.size(); ++i) {
-    const Bounds edge = boxOf(thread.subspan(i, 2), {0, 1});
+    const AlignedBox edge = boxOf(thread.subspan(i, 2), {0, 1});
     if (!edge.intersects(surface)) continue;
     for (std::size_t k = 0; k < loop.size(); ++k) {
       const std::size_t next = k + 1 < loop.size() ? k + 1 : 0;
-      Bounds side;
+      AlignedBox side;
       for (const PathVertex& v : {loop[k], loop[next]}) side.extend(v.at[0]).extend(v.at[1]);
       if (!side.intersects(edge)) continue;
       // Forward: through a side into the loop, if the edge points to the side of the normal.

@@ -24,16 +24,16 @@ bool isEdges(const Crossing& passage) { return passage.kind == ContactKind::Edge
 Segment edgeA(const Crossing& passage) { return {passage.ids[0], passage.ids[1]}; }
 Segment edgeB(const Crossing& passage) { return {passage.ids[2], passage.ids[3]}; }
 
-bool precedes(const Side& l, const Side& r) {
+bool comesBefore(const Side& l, const Side& r) {
   return std::tie(l.passage.kind, l.passage.ids) < std::tie(r.passage.kind, r.passage.ids);
 }
 bool areEqual(const Side& l, const Side& r) {
   return l.passage == r.passage && l.corners == r.corners;
 }
 void sortUnique(Buffer<Side>& sides) {
-  std::sort(sides.begin(), sides.end(), precedes);
+  std::sort(sides.begin(), sides.end(), comesBefore);
   sides.erase(std::unique(sides.begin(), sides.end(),
-                          [](const Side& l, const Side& r) { return !precedes(l, r); }),
+                          [](const Side& l, const Side& r) { return !comesBefore(l, r); }),
               sides.end());
 }
 
