@@ -43,7 +43,7 @@ run >"$folder/text" 2>"$folder/messages" || fail "the second run: $(cat "$folder
 [[ $(wc -l <"$folder/rigid/rigid-bodies.csv") -eq 20 ]] || fail "rows are missing: $(cat "$folder/text")"
 
 # Contacts that are missed within a budget: shares, which depend on the clock.
-"$program" --out "$folder/budgets" --scenes bone --bone 5000 --methods Proxy --budget-frames 1 >"$folder/text" 2>"$folder/messages" ||
+"$program" --out "$folder/budgets" --scenes bone --bone 5000 --particles 500 --methods Proxy --budget-frames 1 >"$folder/text" 2>"$folder/messages" ||
   fail "budgets: $(cat "$folder/messages")"
 awk -F, 'NR > 1 { for (i = 2; i <= 6; ++i) if (!($i >= 0 && $i <= 120)) bad = 1 } END { exit bad || NR != 25 }' \
   "$folder/budgets/budgets.csv" || fail "figures of budgets: $(cat "$folder/budgets/budgets.csv")"
