@@ -88,8 +88,9 @@ void measureBudgets(int frames, report::Figures& figures) {
       Organs exact(hasPriority), limited(hasPriority);
       std::array<std::size_t, 2> touching{}, missed{};  // of the first pair, and of all
       std::size_t reported = 0, outdated = 0, unfinished = 0;
-      for (int i = 0; i < frames; ++i) {
-        const int frame = exact.frames() * i / frames;
+      exact.move(0), limited.move(0);
+      for (int i = 1; i <= frames; ++i) {
+        const int frame = (exact.frames() - 1) * i / frames;
         exact.move(frame), limited.move(frame);
         const Clock::time_point start = Clock::now();
         exact.detection().detectCollision();
