@@ -145,7 +145,7 @@ Positions polygon(Random& random, std::size_t size) {
   return positions;
 }
 
-Positions moved(Random& random, Positions positions, double by) {
+Positions shaken(Random& random, Positions positions, double by) {
   for (Vector3d& p : positions)
     if (random() % 4 != 0) p += randomPoint(random, -by, by);
   return positions;
@@ -163,7 +163,7 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
       // They are drawn back, so that they do not drift apart.
       const auto next = [&](Positions p) {
         for (Vector3d& q : p) q *= 0.99;
-        return moved(random, p, 0.2);
+        return shaken(random, p, 0.2);
       };
       const auto events = all.step(next(all.thread), next(all.loop));
       ASSERT_EQ(before + sumOf(events), all.count());
@@ -183,7 +183,8 @@ TEST(ThreadTopology, EventsAreThePassagesOfRationalArithmetic) {
   for (int repeat = 0; repeat < 90; ++repeat) {
     Watched all(polygon(random, 5), polygon(random, 5), repeat % 3 == 0);
     for (int i = 0; i < 10; ++i) {
-      const Positions thread = moved(random, all.thread, 0.3), loop = moved(random, all.loop, 0.3);
+      const Positions thread = shaken(random, all.thread, 0.3),
+                      loop = shaken(random, all.loop, 0.3);
       const std::vector<Row> truth = passageTruth(all, thread, loop);
       const auto events = all.step(thread, loop);
       ASSERT_EQ(rowsOf(events), truth) << repeat << ' ' << i;
