@@ -25,12 +25,11 @@ struct Watch {
 
 constexpr std::array<std::uint32_t, 2> kNone{kNoElement, kNoElement};
 
-/// The places of consecutive vertices, also of the last and the first of a loop.
+/// Calls f for the vertices of each edge of a thread.
 template <class F>
-void forEachSide(const VertexPath& path, bool isLoop, F&& f) {
-  for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
-    f(path.vertices[i], path.vertices[i + 1]);
-  if (isLoop) f(path.vertices.back(), path.vertices.front());
+void forEachEdge(const VertexPath& thread, F&& f) {
+  for (std::size_t i = 0; i + 1 < thread.vertices.size(); ++i)
+    f(thread.vertices[i], thread.vertices[i + 1]);
 }
 
 std::uint32_t edgeOf(const MeshTopology& topology, std::uint32_t p, std::uint32_t q) {
@@ -51,7 +50,7 @@ std::optional<Cause> lossOf(const VertexPath& path, const Geometry* geometry, bo
     else if (topology.vertexTriangles[v].empty())
       add(Cause::Disabled);
   if (isLoop || loss == Cause::Cut) return loss;
-  forEachSide(path, false, [&](std::uint32_t p, std::uint32_t q) {
+  forEachEdge(path, [&](std::uint32_t p, std::uint32_t q) {
     const std::uint32_t edge = edgeOf(topology, p, q);
     if (edge == kNoEdge)
       add(Cause::Cut);
@@ -81,7 +80,7 @@ void check(const Geometry& geometry, const VertexPath& path, bool isLoop) {
            *twice);
   if (isLoop) return;
   const MeshTopology& topology = body.mesh.topology;
-  forEachSide(path, false, [&](std::uint32_t p, std::uint32_t q) {
+  forEachEdge(path, [&](std::uint32_t p, std::uint32_t q) {
     const std::uint32_t edge = edgeOf(topology, p, q);
     if (edge == kNoEdge || topology.edgeTriangles[edge].empty())
       refuse(ErrorCode::InvalidSettings,
