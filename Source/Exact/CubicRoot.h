@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace palpate {
 
@@ -37,11 +38,10 @@ inline double approximateRoot(const CubicBernstein& b, double low, double high, 
     const double value = blossom(b, t, t, t);
     if (value == 0.0) return t;
     ((value > 0.0) == (rising > 0) ? high : low) = t;
-    double next = t - value / blossom(slope, t, t);
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double step = next - t;
-    t = next;
-    if (step < kRootStep && step > -kRootStep) break;
+    const double next = t - value / blossom(slope, t, t);
+    // At a root, rounding may lead out of the interval, where bisection would begin anew.
+    if (std::abs(next - t) < kRootStep) return std::clamp(next, low, high);
+    t = next > low && next < high ? next : 0.5 * (low + high);
   }
   return t;
 }

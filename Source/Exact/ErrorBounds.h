@@ -39,9 +39,9 @@ constexpr double kAreaError = 6 * 0x1p-53;
 
 // ---- Roots of cubic polynomials (CubicRoot.h, AlgebraicTime.cpp) ----
 
-/// Share of the step: Newton's iteration for a root ends with steps this short, two units in the
+/// Share of the step: Newton's iteration for a root ends with steps this short, four units in the
 /// last place of a time.
-constexpr double kRootStep = 0x1p-53;
+constexpr double kRootStep = 0x1p-51;
 /// Share of the step: brackets of roots start this wide to either side.
 constexpr double kNarrowestBracket = 0x1p-50;
 /// Share of the step: brackets grow to at most this width. If a root is in none of them, it is
