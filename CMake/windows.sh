@@ -56,7 +56,9 @@ if [[ ! -e $root/complete ]]; then packages; fi
 
 export WINEPREFIX=$PWD/build/wine WINEDEBUG=-all
 mkdir -p "$WINEPREFIX"
-/usr/lib/wine/wineserver64 -p # holds no pipe of a test that would start it
+# Started here, Wine's server and services hold no pipe of a test, which would never end.
+/usr/lib/wine/wineserver64 -p
+/usr/lib/wine/wine64 wineboot --init >/dev/null 2>&1
 trap '/usr/lib/wine/wineserver64 -k' EXIT
 cmake --preset windows
 cmake --build --preset windows --parallel
