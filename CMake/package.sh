@@ -7,7 +7,7 @@ CMake/packages.sh build python package
 folder=build/package
 cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_INSTALL_PREFIX=/usr \
   -DCMAKE_INSTALL_LIBDIR="lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)" -DCMAKE_SKIP_RPATH=ON -DPALPATE_PACKAGES=ON \
-  -DPALPATE_BUILD_TESTING=OFF -DPALPATE_WITH_FCL=OFF -DPALPATE_PRECOMPILED_HEADERS=ON \
+  -DPALPATE_BUILD_TESTING=OFF -DPALPATE_WITH_FCL=OFF -DPALPATE_PRECOMPILED_HEADERS=ON -DPALPATE_UNITY=ON \
   -DCMAKE_SHARED_LINKER_FLAGS=-Wl,-z,relro,-z,now -DCMAKE_EXE_LINKER_FLAGS="-s -pie -Wl,-z,relro,-z,now"
 cmake --build $folder --parallel
 rm -f $folder/*.deb
