@@ -182,7 +182,7 @@ void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
           findFreeMotion(c.pair, c.searchDistance, part, c.motions);
         });
       },
-      &context);
+      &context, deadline);
   traverse(work.trees, std::span(m_nodePairs).subspan(work.first + begin, size), scratch.stack,
            scratch.sink);
   scratch.sink.flush();

@@ -18,10 +18,11 @@ namespace palpate {
 
 namespace {
 
-/// Node pairs and jobs for each collision pair, where there is more than one thread.
+/// Node pairs and jobs for each collision pair, where there is a deadline or more than one thread.
 constexpr std::size_t kNodePairsWanted = 256, kJobsPerPair = 32;
-/// Below this many elements, splitting a pair among threads costs more than it saves.
-constexpr std::size_t kSharedSize = 8192;
+/// Below this many elements, splitting a pair among threads costs more than it saves. With a
+/// deadline it is split into so many node pairs, as the search from each looks at no clock.
+constexpr std::size_t kSharedSize = 8192, kFewNodePairs = 8;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.
@@ -145,7 +146,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
                     searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
   const bool shared = frame.divides() && elements >= kSharedSize;
-  startPairs(m_trees, shared ? kNodePairsWanted : 1, frame.stack);
+  startPairs(m_trees, shared ? kNodePairsWanted : frame.deadline ? kFewNodePairs : 1, frame.stack);
   m_nodePairs = &frame.nodePairs;
   m_first = frame.nodePairs.size(), m_count = frame.stack.pairs.size();
   frame.nodePairs.insert(frame.nodePairs.end(), frame.stack.pairs.begin(), frame.stack.pairs.end());

@@ -47,7 +47,7 @@ class MeshWork {
           const std::span<const ElementPair> candidates = c.work.candidatesAmong(pairs, c.scratch);
           if (!candidates.empty()) c.use(candidates);
         },
-        &context);
+        &context, scratch.deadline);
     traverseJob(job, scratch);
   }
   /// Passes the traversal of a job to its sink, which was started.

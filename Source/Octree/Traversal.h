@@ -29,15 +29,18 @@ struct NodePair {
 class PairSink {
  public:
   using Function = void (*)(void* context, std::span<const ElementPair>);
-  static constexpr std::size_t kBatch = 4096;
+  static constexpr std::size_t kBatch = 4096, kSmallBatch = 512;
   static constexpr std::size_t kMaxAtOnce = 16;  ///< pairs for which reserveSpace() reserves space
 
-  void start(Function function, void* context) {
+  /// smallBatches: so that the function is called often, as a deadline needs.
+  void start(Function function, void* context, bool smallBatches = false) {
     m_function = function;
     m_context = context;
     m_size = 0;
     m_total = 0;
-    m_pairs.resize(std::max(m_pairs.capacity(), kBatch));
+    m_pairs.resize(!function      ? std::max(m_pairs.capacity(), kBatch)
+                   : smallBatches ? kSmallBatch
+                                  : kBatch);
   }
   /// Returns space for kMaxAtOnce pairs. Call advance() with the number of pairs written there.
   ElementPair* reserveSpace() {
