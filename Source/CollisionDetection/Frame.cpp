@@ -149,9 +149,10 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
     record.statistics.candidatePairs += job->candidateCount;
     record.statistics.featurePairs += features;
   }
-  std::sort(crossings.begin(), crossings.end(), [](const Crossing& l, const Crossing& r) {
-    return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
-  });
+  sortUntil(join.deadline, crossings.begin(), crossings.end(),
+            [](const Crossing& l, const Crossing& r) {
+              return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
+            });
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
   record.followSides();
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
