@@ -25,6 +25,6 @@ trap 'rm -rf "$folder"' EXIT
 for scene in "$@"; do
   # shellcheck disable=SC2086
   xvfb-run -a "build/demo/Examples/$scene/$scene" ${options[$scene]} --out "$folder"
-  [[ -e $folder/scene.png ]] || python3 -c "from PIL import Image; Image.open('$folder/scene.pgm').save('$folder/scene.png')"
+  [[ -e $folder/scene.png ]] || /usr/bin/python3 -c "from PIL import Image; Image.open('$folder/scene.pgm').save('$folder/scene.png')"
   pngquant --speed 1 --strip --force --output "Docs/Pictures/$scene.png" "$folder/scene.png"  # 256 colours
 done

@@ -269,4 +269,13 @@ void World::commit() {
 
 Vector3d World::force(BodyId body) const { return m_forces[body]; }
 
+bool World::intersect(BodyId a, BodyId b) {
+  const auto view = [&](BodyId id) {
+    return TriangleMeshView{positions(id), m_bodies[id].triangles};
+  };
+  return !palpate::detectCollision(view(a), view(b), {.method = Method::Intersection})
+              .intersectingTriangles()
+              .empty();
+}
+
 }  // namespace palpate::scenes

@@ -96,6 +96,8 @@ class World {
   double fraction(BodyId, std::uint32_t vertex) const;
   /// Forces on a body in the last step, along the normals of its contacts.
   Eigen::Vector3d force(BodyId) const;
+  /// Whether these meshes intersect now, decided exactly and apart from the pairs.
+  bool intersect(BodyId a, BodyId b);
 
   const std::vector<Body>& bodies() const { return m_bodies; }
   const CollisionData& contacts(BodyId a, BodyId b) const {

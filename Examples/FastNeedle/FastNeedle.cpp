@@ -176,9 +176,6 @@ class FastNeedle : public LiveScene {
 
   /// The tip is below the triangle of the membrane that it is in, in plan, or the two intersect.
   bool isThrough(const Lane& lane) {
-    const auto view = [&](World::BodyId id) {
-      return TriangleMeshView{m_world.positions(id), m_world.bodies()[id].triangles};
-    };
     const Vector3d tip = m_world.positions(lane.needle).front();
     bool isBelow = false;
     for (const auto& [a, b, c] : m_world.bodies()[lane.membrane].triangles) {
@@ -190,10 +187,7 @@ class FastNeedle : public LiveScene {
       isBelow |= isLeft(p[a], p[b]) && isLeft(p[b], p[c]) && isLeft(p[c], p[a]) &&
                  normal.dot(tip - p[a]) < 0;
     }
-    return isBelow || !palpate::detectCollision(view(lane.needle), view(lane.membrane),
-                                                {.method = Method::Intersection})
-                           .intersectingTriangles()
-                           .empty();
+    return isBelow || m_world.intersect(lane.needle, lane.membrane);
   }
 
   World m_world;

@@ -130,15 +130,9 @@ class LiverLift : public LiveScene {
   }
 
   std::string fault() override {
-    for (const World::BodyId other : {m_jaws[0], m_jaws[1], m_gallbladder}) {
-      const auto view = [&](World::BodyId id) {
-        return TriangleMeshView{m_world.positions(id), m_world.bodies()[id].triangles};
-      };
-      if (!palpate::detectCollision(view(m_liver), view(other), {.method = Method::Intersection})
-               .intersectingTriangles()
-               .empty())
+    for (const World::BodyId other : {m_jaws[0], m_jaws[1], m_gallbladder})
+      if (m_world.intersect(m_liver, other))
         return "the liver and the " + m_world.bodies()[other].name + " intersect.";
-    }
     return "";
   }
 

@@ -1,8 +1,8 @@
-// Two instrument arms of five rigid links each in one cavity, among three organs that breathe:
+// Two instrument arms of five rigid links each at a gallbladder, among organs that breathe:
 // transforms only, and contacts become corrections of the arms' joints.
+#include "Anatomy.h"
 #include "InstrumentArm.h"
 #include "SceneProgram.h"
-#include "Scenes.h"
 
 #include <algorithm>
 #include <array>
@@ -20,6 +20,7 @@ using BothJoints = Eigen::Matrix<double, 12, 1>;
 constexpr double kGap = 1, kSight = 2 * kGap, kStep = 1;
 constexpr int kRounds = 6, kIterations = 12, kPeriod = 240, kLinks = InstrumentArm::kLinks,
               kJoints = 3;
+const Vector3d kWork(-22, -58, -44);  // where the arms meet, at the gallbladder
 constexpr World::BodyId kCavity = 0, kLiver = 1, kFirstArm = 4, kSecondArm = kFirstArm + kLinks;
 
 struct Row {
@@ -30,7 +31,7 @@ struct Row {
 /// Where the hand leads an arm; side: -1, 1.
 Joints targetOf(double side, double phase) {
   const double s = std::sin(phase), c = std::cos(phase), twice = std::sin(2 * phase + side);
-  return (Joints() << 0.35 * s, 0.35 * side * c, 42 + 20 * twice, 0.8 * c - 0.3, 0.7 * s * side,
+  return (Joints() << 0.35 * s, 0.35 * side * c, 56 + 20 * twice, 0.8 * c - 0.3, 0.7 * s * side,
           0.25 - 0.35 * twice)
       .finished();
 }
@@ -38,16 +39,18 @@ Joints targetOf(double side, double phase) {
 class RobotArms : public LiveScene {
  public:
   explicit RobotArms(int threads) : m_world(threads), m_check(Settings{.threads = threads}) {
-    addMesh("cavity", sphere(16), {110, 88, 78}, Vector3d::Zero());
-    const std::vector<Vector3d> places{{-44, 16, -14}, {38, 16, -22}, {0, -30, -30}};
-    constexpr std::array kNames{"liver", "stomach", "kidney"};
-    for (int i = 0; i < 3; ++i)
-      addMesh(kNames[i], organs().meshes[i], Vector3d::Constant(34 - 4 * i), places[i]);
+    SceneMesh cavity = sphere(16);
+    for (Vector3d& p : cavity.positions) p = Vector3d(0, -30, -10) + 140 * p;
+    addMesh("cavity", cavity);
+    addMesh("liver", anatomicalLiver(5));
+    addMesh("gallbladder", anatomicalGallbladder(2.15));
+    addMesh("stomach", anatomicalStomach(5));
     for (const double side : {-1.0, 1.0}) {
       Eigen::Isometry3d port = Eigen::Isometry3d::Identity();
-      port.translation() = Vector3d(58 * side, -25, 60);
-      const Vector3d in = (Vector3d(-14 * side, 6, -16) - port.translation()).normalized();
-      port.linear() = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), in).matrix();
+      port.translation() = kWork + Vector3d(80 * side, -43, -30);
+      port.linear() =
+          Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), kWork - port.translation())
+              .matrix();
       m_arms.emplace_back(port, targetOf(side, 0));
       for (const auto& [name, shape, drawn] : InstrumentArm::makeLinks()) {
         addToCheck(drawn);
@@ -55,7 +58,11 @@ class RobotArms : public LiveScene {
       }
     }
     addPairs();
-    for (int joint = 0; joint < 2 * kJoints; ++joint) {  // shown only
+    m_duct = m_world.addRigidMesh("bile duct", bileDuct(1.4));  // this and what follows: shown only
+    const std::array outside{Vector3d(0, 0, -300), Vector3d(0, 0, -70)};
+    for (World::BodyId& shaft : m_shafts)
+      shaft = m_world.addRigidMesh("shaft", tubeAround(outside, 3, 32));
+    for (int joint = 0; joint < 2 * kJoints; ++joint) {
       SceneMesh ball = sphere(8);
       for (Vector3d& p : ball.positions) p *= 3.5 - 0.2 * (joint % kJoints);
       m_joints.push_back(m_world.addRigidMesh("joint", ball));
@@ -68,19 +75,25 @@ class RobotArms : public LiveScene {
   std::vector<BodyLook> looks() override {
     std::vector<BodyLook> looks{
         {.body = kCavity, .label = "", .colour = kTissueColour, .frontFaces = false},
-        {kLiver, "Liver", kLiverColour},
-        {kLiver + 1, "Stomach", kStomachColour},
-        {kLiver + 2, "Kidney", kKidneyColour}};
+        {kLiver, "Liver", kLiverColour, 1, true, 0, 0.28},
+        {kLiver + 1, "", {0.45, 0.56, 0.30}, 1, true, 0, 0.28},
+        {m_duct, "", {0.52, 0.60, 0.28}, 1, true, 0, 0.28},
+        {kLiver + 2, "Stomach", kStomachColour, 1, true, 0, 0.28}};
     for (World::BodyId link = kFirstArm; link < kFirstArm + 2 * kLinks; ++link) {
       const char* label = link == kFirstArm ? "Left arm" : link == kSecondArm ? "Right arm" : "";
       looks.push_back({link, label, kSteelColour, 1, true, 0, 0.3, 1});
     }
+    for (const World::BodyId shaft : m_shafts)
+      looks.push_back({shaft, "", kSteelColour, 1, true, 0, 0.3, 1});
     for (const World::BodyId joint : m_joints)
       looks.push_back({joint, "", {0.15, 0.16, 0.18}, 1, true, 0, 0.4, 0.5});
     return looks;
   }
   PictureView view() override {
-    return {.from = {-0.1, -1, 1.0}, .centre = {0, 2, 0}, .height = 120};
+    return {.from = {0.1, -1, -0.35}, .centre = kWork + Vector3d(6, 0, 9), .height = 100};
+  }
+  std::vector<PictureNote> notes() override {
+    return {{"Gallbladder", m_world.bodies()[kLiver + 1].translation + Vector3d(-30, -66, -62)}};
   }
   void computeFrame(int frame) override {
     const std::vector<InstrumentArm> arms = m_arms;
@@ -130,8 +143,7 @@ class RobotArms : public LiveScene {
     m_meshes.push_back(m_check.addTriangleMesh(mesh.positions, mesh.triangles));
     m_firsts.push_back(m_check.addPointSet({mesh.positions.data(), 1}));
   }
-  void addMesh(const std::string& name, SceneMesh mesh, const Vector3d& scale, const Vector3d& at) {
-    for (Vector3d& p : mesh.positions) p = scale.cwiseProduct(p) + at;
+  void addMesh(const std::string& name, const SceneMesh& mesh) {
     addToCheck(mesh);
     m_world.addRigidMesh(name, mesh);
   }
@@ -151,13 +163,13 @@ class RobotArms : public LiveScene {
 
   /// Places everything and finds what is near. Returns the least distance, at most kSight.
   double move() {
-    for (World::BodyId organ = kLiver; organ < kFirstArm; ++organ)
-      m_world.place(
-          organ, Eigen::AngleAxisd(0.06 * std::sin(m_breath + organ), Vector3d::UnitY()).matrix(),
-          {0, 0, 3 * std::sin(m_breath)});
+    for (const World::BodyId organ : {kLiver, kLiver + 1, kLiver + 2, m_duct})
+      m_world.place(organ, Eigen::AngleAxisd(0.03 * std::sin(m_breath), Vector3d::UnitX()).matrix(),
+                    {0, 0, 5 * std::sin(m_breath)});
     for (int i = 0; i < 2 * kLinks; ++i) {
       const Eigen::Isometry3d& at = m_arms[i / kLinks].link(i % kLinks);
       m_world.place(kFirstArm + i, at.linear(), at.translation());
+      if (i % kLinks == 0) m_world.place(m_shafts[i / kLinks], at.linear(), at.translation());
       const int joint = i % kLinks - 1;
       if (joint >= 0 && joint < kJoints)
         m_world.place(m_joints[kJoints * (i / kLinks) + joint], at.linear(), at.translation());
@@ -212,6 +224,8 @@ class RobotArms : public LiveScene {
   std::vector<GeometryId> m_meshes, m_firsts;  // of m_check, by body: tessellation, its vertex 0
   std::vector<InstrumentArm> m_arms;
   std::vector<Row> m_rows;
+  World::BodyId m_duct = 0;
+  std::array<World::BodyId, 2> m_shafts{};
   std::vector<World::BodyId> m_joints;
   double m_breath = 0, m_nearest = kSight;
   int m_armsTouch = 0, m_organsTouch = 0, m_held = 0;
@@ -222,11 +236,12 @@ class RobotArms : public LiveScene {
 
 int main(int count, char** arguments) {
   using namespace palpate::scenes;
-  return runScene({.name = "RobotArms",
-                   .description = "Two arms of rigid links in a cavity, among organs that breathe.",
-                   .frames = 480,
-                   .frameMilliseconds = 1000.0 / 60,
-                   .keys = "n",
-                   .make = [](int threads) { return std::make_unique<RobotArms>(threads); }},
-                  count, arguments);
+  return runScene(
+      {.name = "RobotArms",
+       .description = "Two arms of rigid links at a gallbladder, among organs that breathe.",
+       .frames = 480,
+       .frameMilliseconds = 1000.0 / 60,
+       .keys = "n",
+       .make = [](int threads) { return std::make_unique<RobotArms>(threads); }},
+      count, arguments);
 }

@@ -1,5 +1,5 @@
-// An X-ray image of five deforming organs in each frame, from the lengths of the rays' ways through
-// each organ.
+// An X-ray image of five organs that breathe in each frame, from the lengths of the rays' ways
+// through each organ.
 #include "CommandLine.h"
 #include "Scenes.h"
 #include "WriteFile.h"
@@ -23,9 +23,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kBudget = 1000.0 / 30;                           // ms per image
-constexpr double kWidth = 6.4;                                    // L, of the image
-constexpr std::array kAttenuation{0.42, 0.25, 0.55, 0.38, 0.16};  // per L, of each organ
+constexpr double kBudget = 1000.0 / 30;  // ms per image
+constexpr double kWidth = 280;           // mm, of the image
+const Vector3d kCentre(12, -kWidth, -4);
+/// Per mm, of each organ: so that all are seen, as after a contrast agent.
+constexpr std::array kAttenuation{0.01, 0.012, 0.024, 0.018, 0.045};
 
 struct Options {
   int frames = 120, pixels = 256, threads = 0;
@@ -53,7 +55,7 @@ double lengthInside(std::span<const RayHit> hits) {
 
 class XRay {
  public:
-  explicit XRay(const Options& options) : m_pixels(options.pixels), m_scene(organs()) {
+  explicit XRay(const Options& options) : m_pixels(options.pixels), m_scene(breathingOrgans()) {
     Settings settings;
     settings.threads = options.threads;
     m_detection = std::make_unique<OctreeBasedCD>(settings);
@@ -62,9 +64,9 @@ class XRay {
     // Parallel rays, from the front. Neighbours in the image are neighbours in the batch.
     for (int y = 0; y < m_pixels; ++y)
       for (int x = 0; x < m_pixels; ++x)
-        m_rays.push_back({{kWidth * ((x + 0.5) / m_pixels - 0.5), -kWidth,
-                           kWidth * (0.5 - (y + 0.5) / m_pixels)},
-                          {0, 1, 0}});
+        m_rays.push_back(
+            {kCentre + kWidth * Vector3d((x + 0.5) / m_pixels - 0.5, 0, 0.5 - (y + 0.5) / m_pixels),
+             {0, 1, 0}});
   }
 
   /// Moves the organs and updates their octrees.
@@ -97,11 +99,12 @@ class XRay {
   void check(int frame) {
     for (std::size_t m = 0; m < m_ids.size(); ++m) {
       m_scene.positions(frame, m, m_positions);
-      const double volume = volumeOf(m_positions, m_scene.meshes[m].triangles);
-      if (!(std::abs(m_volumes[m] - volume) <= 100.0 / (m_pixels * m_pixels) * volume))
+      const double volume = volumeOf(m_positions, m_scene.meshes[m].triangles),
+                   across = std::cbrt(volume) * m_pixels / kWidth;  // pixels
+      if (!(std::abs(m_volumes[m] - volume) <= 6 * volume / (across * across)))
         throw BrokenPromise("Frame " + std::to_string(frame) + ": the image of organ " +
                             std::to_string(m) + " has the volume " + std::to_string(m_volumes[m]) +
-                            ", the organ " + std::to_string(volume) + ".");
+                            " mm³, the organ " + std::to_string(volume) + " mm³.");
     }
   }
   /// As PGM. The less light arrives, the brighter is a pixel.
@@ -124,7 +127,7 @@ class XRay {
   std::vector<RayHit> m_hits;
   std::vector<std::size_t> m_begins;
   std::vector<double> m_depth;    ///< the attenuation along each ray
-  std::vector<double> m_volumes;  ///< L³, of each organ in the image
+  std::vector<double> m_volumes;  ///< mm³, of each organ in the image
 };
 
 template <class F>
@@ -163,7 +166,7 @@ void run(const Options& options) {
 int main(int count, char** arguments) {
   using namespace palpate::scenes;
   Options options;
-  CLI::App app("X-ray images of deforming organs.", "XRay");
+  CLI::App app("X-ray images of organs that breathe.", "XRay");
   app.add_option("--frames", options.frames, "images to compute")->check(CLI::PositiveNumber);
   app.add_option("--pixels", options.pixels, "width and height")->check(between(16, 4096));
   app.add_option("--threads", options.threads, "0: all cores")->check(CLI::NonNegativeNumber);
