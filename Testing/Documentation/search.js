@@ -9,6 +9,9 @@ const kExpected = {
   "export": "Docs/HowTo/ParaView", "ParaView": "Docs/HowTo/ParaView", "friction": "Docs/HowTo/Solvers",
   "knot": "Docs/HowTo/Sutures", "units": "Docs/Concepts", "Python": "Docs/Python", "float": "Docs/Concepts",
   "force": "Docs/HowTo/Solvers", "profile": "Docs/HowTo/Profile", "crash": "Docs/HowTo/Debugging",
+  "haptic rendering": "Docs/HowTo/Haptics", "soft body": "Docs/HowTo/Organs", "deformable": "Docs/HowTo/Organs",
+  "continuous collision detection": "Docs/Concepts", "real time": "Docs/HowTo/Deadlines", "GPU": "Docs/Start",
+  "multithreading": "Docs/Guarantees", "needle insertion": "Docs/HowTo/Paths", "signed distance": "Docs/HowTo/Queries",
   "licence": "Docs/Versioning", "license": "Docs/Versioning", "closestPoints": "reference/SpatialQueries",
 };
 
