@@ -17,7 +17,7 @@ def main(source, picture):
     figure, axes = plt.subplots(figsize=(8.3, 3.1))
     figure.subplots_adjust(left=0.11, right=0.97, top=0.86, bottom=0.18)
     axes.set_xscale("log")
-    axes.set_xlim(0.01, 2)
+    axes.set_xlim(0.01, 4)
     axes.set_ylim(-10, 125)
     axes.set_xticks([0.01, 0.1, 1], ["0.01", "0.1", "1"])
     axes.set_yticks([0, 50, 100], ["0 %", "50 %", "100 %"])
