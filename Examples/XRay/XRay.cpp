@@ -153,8 +153,8 @@ void run(const Options& options) {
   makeFolder(options.out);
   const std::filesystem::path file = options.out / "scene.pgm";
   writeWhole(file, image.picture());
-  std::printf("%d x %d pixels, 5 organs of %zu triangles, %d images\n", options.pixels,
-              options.pixels, image.triangles(), options.frames);
+  std::printf("%d x %d pixels of %.2g mm, 5 organs of %zu triangles, %d images\n", options.pixels,
+              options.pixels, kWidth / options.pixels, image.triangles(), options.frames);
   std::printf("image ms %.2f, organs moved ms %.2f, budget ms %.1f\n", median(exposures),
               median(updates), kBudget);
   std::printf("written: %s\n", file.string().c_str());
