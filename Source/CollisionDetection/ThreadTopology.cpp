@@ -18,26 +18,38 @@ namespace {
 using Cause = ThreadEvent::Cause;
 
 struct Watch {
-  VertexPath thread, loop;
+  VertexPath thread, loop;  ///< or two parts of threads
+  bool isOfParts;
+  std::vector<Segment> threadEdges, loopEdges;  ///< whose loss is that of the paths
   int count = 0, countBefore = 0;  ///< after the last update(); at the start of its step
   bool isLost = false, wasLost = false;
+  /// Of parts: their positions after the last update(); at the start of its step.
+  std::vector<Eigen::Vector3d> end{}, start{};
 };
 
 constexpr std::array<std::uint32_t, 2> kNone{kNoElement, kNoElement};
 
-/// Calls f for the vertices of each edge of a thread.
-template <class F>
-void forEachEdge(const VertexPath& thread, F&& f) {
-  for (std::size_t i = 0; i + 1 < thread.vertices.size(); ++i)
-    f(thread.vertices[i], thread.vertices[i + 1]);
+bool hasEdge(const MeshTopology& topology, const Segment& ends) {
+  const std::uint32_t edge =
+      topology.edgeOf({std::min(ends[0], ends[1]), std::max(ends[0], ends[1])});
+  return edge != kNoEdge && !topology.edgeTriangles[edge].empty();
 }
 
-std::uint32_t edgeOf(const MeshTopology& topology, std::uint32_t p, std::uint32_t q) {
-  return topology.edgeOf({std::min(p, q), std::max(p, q)});
+/// The edges of a path that exist, from each vertex to the next one. isClosed: and back to the
+/// first.
+std::vector<Segment> edgesOf(const MeshTopology& topology, const VertexPath& path, bool isClosed) {
+  std::vector<Segment> edges;
+  const std::size_t size = path.vertices.size();
+  for (std::size_t i = 0; i + (isClosed ? 0 : 1) < size; ++i) {
+    const Segment ends{path.vertices[i], path.vertices[(i + 1) % size]};
+    if (hasEdge(topology, ends)) edges.push_back(ends);
+  }
+  return edges;
 }
 
-/// Why the path is no longer there, if it is not.
-std::optional<Cause> lossOf(const VertexPath& path, const Geometry* geometry, bool isLoop) {
+/// Why a path is no longer there, if it is not.
+std::optional<Cause> lossOf(const VertexPath& path, const std::vector<Segment>& edges,
+                            const Geometry* geometry) {
   if (!geometry) return Cause::Cut;
   const MeshTopology& topology = geometry->body.mesh.topology;
   std::optional<Cause> loss;
@@ -49,20 +61,20 @@ std::optional<Cause> lossOf(const VertexPath& path, const Geometry* geometry, bo
       add(Cause::Cut);
     else if (topology.vertexTriangles[v].empty())
       add(Cause::Disabled);
-  if (isLoop || loss == Cause::Cut) return loss;
-  forEachEdge(path, [&](std::uint32_t p, std::uint32_t q) {
-    const std::uint32_t edge = edgeOf(topology, p, q);
-    if (edge == kNoEdge)
+  if (loss == Cause::Cut) return loss;
+  for (const auto& [p, q] : edges)
+    if (const std::uint32_t edge = topology.edgeOf({std::min(p, q), std::max(p, q)});
+        edge == kNoEdge)
       add(Cause::Cut);
     else if (topology.edgeTriangles[edge].empty())
       add(Cause::Disabled);
-  });
   return loss;
 }
 
 void check(const Geometry& geometry, const VertexPath& path, bool isLoop) {
   const Body& body = geometry.body;
   const char* const what = isLoop ? "the loop" : "the thread";
+  const MeshTopology& topology = body.mesh.topology;
   const auto refuse = [&](ErrorCode code, const std::string& reason,
                           std::optional<std::uint32_t> vertex = {}) {
     throw Error(code, nameOf(body) + ": " + what + reason, body.id, vertex);
@@ -78,16 +90,20 @@ void check(const Geometry& geometry, const VertexPath& path, bool isLoop) {
   if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
     refuse(ErrorCode::IndexOutOfRange, " names vertex " + std::to_string(*twice) + " twice",
            *twice);
-  if (isLoop) return;
-  const MeshTopology& topology = body.mesh.topology;
-  forEachEdge(path, [&](std::uint32_t p, std::uint32_t q) {
-    const std::uint32_t edge = edgeOf(topology, p, q);
-    if (edge == kNoEdge || topology.edgeTriangles[edge].empty())
+  if (isLoop) {
+    for (const std::uint32_t v : path.vertices)
+      if (!topology.isUsed[v] || topology.vertexTriangles[v].empty())
+        refuse(ErrorCode::InvalidSettings,
+               " names vertex " + std::to_string(v) + ", which no enabled element has", v);
+    return;
+  }
+  for (std::size_t i = 0; i + 1 < path.vertices.size(); ++i)
+    if (const std::uint32_t p = path.vertices[i], q = path.vertices[i + 1];
+        !hasEdge(topology, {p, q}))
       refuse(ErrorCode::InvalidSettings,
              " has no edge from vertex " + std::to_string(p) + " to " + std::to_string(q) +
                  " in an enabled element",
              p);
-  });
 }
 
 void copyVertices(const Geometry& geometry, const VertexPath& path,
@@ -128,16 +144,61 @@ struct ThreadTopology::Implementation {
     copyVertices(geometries.at(watch.thread.geometry), watch.thread, thread);
     copyVertices(geometries.at(watch.loop.geometry), watch.loop, loop);
   }
-  /// Appends the events of a step that starts with this count, and returns the count at its end.
-  int follow(std::size_t index, int count, std::uint64_t now);
+  /// Calls f for each copied vertex.
+  template <class F>
+  void forEachVertex(F&& f) const {
+    for (const std::vector<PathVertex>* path : {&thread, &loop})
+      for (const PathVertex& vertex : *path) f(vertex);
+  }
+  bool startsAt(const std::vector<Eigen::Vector3d>& positions) const {
+    std::size_t i = 0;
+    bool isEqual = true;
+    forEachVertex([&](const PathVertex& vertex) { isEqual &= vertex.at[0] == positions[i++]; });
+    return isEqual;
+  }
+  std::size_t add(const VertexPath& thread, const VertexPath& loop, bool isOfParts);
+  /// Appends the events of a step that starts with this count, and of parts at these positions.
+  /// Returns the count at its end.
+  int follow(std::size_t index, int count, const std::vector<Eigen::Vector3d>& start,
+             std::uint64_t now);
 };
 
-int ThreadTopology::Implementation::follow(std::size_t index, int count, std::uint64_t now) {
+std::size_t ThreadTopology::Implementation::add(const VertexPath& ofThread,
+                                                const VertexPath& ofLoop, bool isOfParts) {
+  const GeometryTable& geometries = source->geometries();
+  check(geometries.at(ofThread.geometry), ofThread, false);
+  check(geometries.at(ofLoop.geometry), ofLoop, !isOfParts);
+  if (ofThread.geometry == ofLoop.geometry)
+    for (const std::uint32_t v : ofLoop.vertices)
+      if (std::find(ofThread.vertices.begin(), ofThread.vertices.end(), v) !=
+          ofThread.vertices.end())
+        throw Error(ErrorCode::IndexOutOfRange,
+                    nameOf(geometries.at(ofLoop.geometry).body) + ": vertex " + std::to_string(v) +
+                        (isOfParts ? " is in both threads" : " is in the thread and in the loop"),
+                    ofLoop.geometry, v);
+  const auto edges = [&](const VertexPath& path, bool isClosed) {
+    return edgesOf(geometries.at(path.geometry).body.mesh.topology, path, isClosed);
+  };
+  Watch watch{ofThread, ofLoop, isOfParts, edges(ofThread, false), edges(ofLoop, !isOfParts)};
+  copy(watch);
+  if (isOfParts) {
+    forEachVertex([&](const PathVertex& vertex) { watch.end.push_back(vertex.at[0]); });
+    watch.start = watch.end;
+  } else {
+    watch.count = watch.countBefore = countPassages(thread, loop, 0);
+  }
+  watches.push_back(std::move(watch));
+  return watches.size() - 1;
+}
+
+int ThreadTopology::Implementation::follow(std::size_t index, int count,
+                                           const std::vector<Eigen::Vector3d>& start,
+                                           std::uint64_t now) {
   const Watch& watch = watches[index];
   const GeometryTable& geometries = source->geometries();
   const std::optional<Cause> losses[] = {
-      lossOf(watch.thread, geometries.find(watch.thread.geometry), false),
-      lossOf(watch.loop, geometries.find(watch.loop.geometry), true)};
+      lossOf(watch.thread, watch.threadEdges, geometries.find(watch.thread.geometry)),
+      lossOf(watch.loop, watch.loopEdges, geometries.find(watch.loop.geometry))};
   if (losses[0] || losses[1]) {
     const bool isCut = losses[0] == Cause::Cut || losses[1] == Cause::Cut;
     nextEvents.push_back(
@@ -146,20 +207,27 @@ int ThreadTopology::Implementation::follow(std::size_t index, int count, std::ui
     return 0;
   }
   copy(watch);
-  if (const int start = countPassages(thread, loop, 0); start != count) {
-    nextEvents.push_back({index, now, Cause::Set, start - count, kNone, kNone, 0.0});
-    count = start;
-  }
-  const int end = countPassages(thread, loop, 1);
   passages.clear();
-  appendPassages(thread, loop, passages);
-  int sum = 0;
-  for (const LoopPassage& passage : passages) sum += passage.change;
-  if (sum != end - count) {
-    // Vertices passed exactly through edges. The first passage stands for all.
-    if (passages.empty()) passages.push_back({0.0, 0, {0, 0}, {0, 0}, true});
-    passages.resize(1);
-    passages[0].change = end - count;
+  int end = count;
+  if (watch.isOfParts) {
+    if (!startsAt(start)) nextEvents.push_back({index, now, Cause::Set, 0, kNone, kNone, 0.0});
+    appendEdgePassages(thread, loop, passages);
+    for (const LoopPassage& passage : passages) end += passage.change;
+  } else {
+    if (const int atStart = countPassages(thread, loop, 0); atStart != count) {
+      nextEvents.push_back({index, now, Cause::Set, atStart - count, kNone, kNone, 0.0});
+      count = atStart;
+    }
+    end = countPassages(thread, loop, 1);
+    appendPassages(thread, loop, passages);
+    int sum = 0;
+    for (const LoopPassage& passage : passages) sum += passage.change;
+    if (sum != end - count) {
+      // Vertices passed exactly through edges. The first passage stands for all.
+      if (passages.empty()) passages.push_back({0.0, 0, {0, 0}, {0, 0}, true});
+      passages.resize(1);
+      passages[0].change = end - count;
+    }
   }
   const auto vertices = [](const VertexPath& path, const std::array<std::size_t, 2>& places) {
     return std::array{path.vertices[places[0]], path.vertices[places[1]]};
@@ -186,22 +254,10 @@ ThreadTopology& ThreadTopology::operator=(ThreadTopology&&) noexcept = default;
 ThreadTopology::~ThreadTopology() = default;
 
 std::size_t ThreadTopology::add(const VertexPath& thread, const VertexPath& loop) {
-  Implementation& own = all();
-  const GeometryTable& geometries = own.source->geometries();
-  check(geometries.at(thread.geometry), thread, false);
-  check(geometries.at(loop.geometry), loop, true);
-  if (thread.geometry == loop.geometry)
-    for (const std::uint32_t v : loop.vertices)
-      if (std::find(thread.vertices.begin(), thread.vertices.end(), v) != thread.vertices.end())
-        throw Error(ErrorCode::IndexOutOfRange,
-                    nameOf(geometries.at(loop.geometry).body) + ": vertex " + std::to_string(v) +
-                        " is in the thread and in the loop",
-                    loop.geometry, v);
-  Watch watch{thread, loop};
-  own.copy(watch);
-  watch.count = watch.countBefore = countPassages(own.thread, own.loop, 0);
-  own.watches.push_back(std::move(watch));
-  return own.watches.size() - 1;
+  return all().add(thread, loop, false);
+}
+std::size_t ThreadTopology::addParts(const VertexPath& first, const VertexPath& second) {
+  return all().add(first, second, true);
 }
 
 void ThreadTopology::update() {
@@ -217,7 +273,8 @@ void ThreadTopology::update() {
     const Watch& watch = own.watches[i];
     own.nextLost[i] = isRepeated ? watch.wasLost : watch.isLost;
     if (!own.nextLost[i])
-      own.nextCounts[i] = own.follow(i, isRepeated ? watch.countBefore : watch.count, now);
+      own.nextCounts[i] = own.follow(i, isRepeated ? watch.countBefore : watch.count,
+                                     isRepeated ? watch.start : watch.end, now);
   }
   own.events.reserve(kept + own.nextEvents.size());
   // Nothing below throws.
@@ -226,8 +283,15 @@ void ThreadTopology::update() {
   own.eventsBefore = kept;
   for (std::size_t i = 0; i < size; ++i) {
     Watch& watch = own.watches[i];
-    if (!isRepeated) watch.countBefore = watch.count, watch.wasLost = watch.isLost;
+    if (!isRepeated) {
+      watch.countBefore = watch.count, watch.wasLost = watch.isLost;
+      watch.start.swap(watch.end);
+    }
     watch.count = own.nextCounts[i], watch.isLost = own.nextLost[i];
+    if (watch.end.empty() || watch.isLost) continue;
+    own.copy(watch);
+    std::size_t k = 0;
+    own.forEachVertex([&](const PathVertex& vertex) { watch.end[k++] = vertex.at[1]; });
   }
   own.step = now;
 }

@@ -43,6 +43,33 @@ void forEachPassage(ImpactQuery::Kind kind, const PathVertex& a, const PathVerte
   for (int i = 0; i < passages.count; ++i) f(passages.all[static_cast<std::size_t>(i)]);
 }
 
+/// The passages of the thread's edges through the first sides of a polygon.
+void appendOfEdges(std::span<const PathVertex> thread, std::span<const PathVertex> polygon,
+                   std::size_t sides, std::vector<LoopPassage>& passages) {
+  const AlignedBox all = boxOf(polygon, {0, 1});
+  for (std::size_t i = 0; i + 1 < thread.size(); ++i) {
+    const AlignedBox edge = boxOf(thread.subspan(i, 2), {0, 1});
+    if (!edge.intersects(all)) continue;
+    for (std::size_t k = 0; k < sides; ++k) {
+      const std::size_t next = k + 1 < polygon.size() ? k + 1 : 0;
+      AlignedBox side;
+      for (const PathVertex& v : {polygon[k], polygon[next]}) side.extend(v.at[0]).extend(v.at[1]);
+      if (!side.intersects(edge)) continue;
+      // Forward: through a side into the loop, if the edge points to the side of the normal.
+      forEachPassage(ImpactQuery::Kind::EdgeEdge, thread[i], thread[i + 1], polygon[k],
+                     polygon[next], [&](const Passages::Passage& passage) {
+                       passages.push_back(
+                           {passage.time, passage.forward ? 1 : -1, {i, i + 1}, {k, next}, false});
+                     });
+    }
+  }
+}
+
+void sortByTime(std::span<LoopPassage> passages) {
+  std::stable_sort(passages.begin(), passages.end(),
+                   [](const LoopPassage& l, const LoopPassage& r) { return l.time < r.time; });
+}
+
 }  // namespace
 
 int countPassages(std::span<const PathVertex> thread, std::span<const PathVertex> loop, int end) {
@@ -68,22 +95,7 @@ void appendPassages(std::span<const PathVertex> thread, std::span<const PathVert
                     std::vector<LoopPassage>& passages) {
   const std::size_t first = passages.size();
   const AlignedBox surface = boxOf(loop, {0, 1});
-  for (std::size_t i = 0; i + 1 < thread.size(); ++i) {
-    const AlignedBox edge = boxOf(thread.subspan(i, 2), {0, 1});
-    if (!edge.intersects(surface)) continue;
-    for (std::size_t k = 0; k < loop.size(); ++k) {
-      const std::size_t next = k + 1 < loop.size() ? k + 1 : 0;
-      AlignedBox side;
-      for (const PathVertex& v : {loop[k], loop[next]}) side.extend(v.at[0]).extend(v.at[1]);
-      if (!side.intersects(edge)) continue;
-      // Forward: through a side into the loop, if the edge points to the side of the normal.
-      forEachPassage(ImpactQuery::Kind::EdgeEdge, thread[i], thread[i + 1], loop[k], loop[next],
-                     [&](const Passages::Passage& passage) {
-                       passages.push_back(
-                           {passage.time, passage.forward ? 1 : -1, {i, i + 1}, {k, next}, false});
-                     });
-    }
-  }
+  appendOfEdges(thread, loop, loop.size(), passages);
   const bool isClosed = thread.front().number == thread.back().number;
   for (const std::size_t place : {std::size_t{0}, thread.size() - 1}) {
     if (isClosed || !boxOf(thread.subspan(place, 1), {0, 1}).intersects(surface)) continue;
@@ -98,8 +110,14 @@ void appendPassages(std::span<const PathVertex> thread, std::span<const PathVert
                                            true});
                      });
   }
-  std::stable_sort(passages.begin() + static_cast<std::ptrdiff_t>(first), passages.end(),
-                   [](const LoopPassage& l, const LoopPassage& r) { return l.time < r.time; });
+  sortByTime(std::span(passages).subspan(first));
+}
+
+void appendEdgePassages(std::span<const PathVertex> thread, std::span<const PathVertex> other,
+                        std::vector<LoopPassage>& passages) {
+  const std::size_t first = passages.size();
+  appendOfEdges(thread, other, other.size() - 1, passages);
+  sortByTime(std::span(passages).subspan(first));
 }
 
 }  // namespace palpate

@@ -32,5 +32,9 @@ struct LoopPassage {
 /// changes may not sum to that of the counts.
 void appendPassages(std::span<const PathVertex> thread, std::span<const PathVertex> loop,
                     std::vector<LoopPassage>&);
+/// Appends the passages of edges of one thread through edges of another, by time. A passage counts
+/// 1 where the volume of (p, q, a, b) becomes positive, p q and a b the edges; else -1.
+void appendEdgePassages(std::span<const PathVertex> thread, std::span<const PathVertex> other,
+                        std::vector<LoopPassage>&);
 
 }  // namespace palpate

@@ -3,6 +3,7 @@
 #include <palpate/Capture.h>
 #include <palpate/ConstraintRows.h>
 #include <palpate/StepGuard.h>
+#include <palpate/ThreadTopology.h>
 
 #include "Common/QueryCalls.h"
 #include "Common/FailingAllocation.h"
@@ -377,6 +378,61 @@ TEST_P(AllocationFailure, LeavesTheStepGuardUnchanged) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationFailure, ::testing::Values(1, 2));
+
+/// A failing add(), addParts() or update() leaves counts and events, and the next call finds all.
+TEST(AllocationFailureOfThreadTopology, LeavesItUnchanged) {
+  const Positions hole{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  const auto threadAt = [](double x) { return Positions{{x, 0.1, -1}, {x, 0.1, 1}}; };
+  const std::vector<std::uint32_t> rim{0, 1, 2, 3}, ends{0, 1};
+  using Words = std::vector<std::int64_t>;
+  std::size_t failures = 0;
+  const auto run = [&](std::size_t n) {
+    OctreeBasedCD collisions;
+    const std::vector<Segment> square{{0, 1}, {1, 2}, {2, 3}, {3, 0}};
+    const GeometryId loop = collisions.addLineMesh(hole, square, 0.0),
+                     thread = collisions.addLineMesh(threadAt(0), std::vector<Segment>{{0, 1}});
+    ThreadTopology topology(collisions);
+    std::size_t watches = 0;
+    const auto state = [&] {
+      Words words;
+      for (std::size_t i = 0; i < watches; ++i)
+        words.insert(words.end(), {topology.count(i), topology.isLost(i)});
+      for (const ThreadEvent& e : topology.events())
+        words.insert(words.end(), {static_cast<int>(e.cause), e.change, e.thread[0], e.loop[0]});
+      return words;
+    };
+    const auto attempt = [&](auto&& call) {
+      const Words before = state();
+      if (FailingAllocation::throwsAt(n, call)) {
+        ++failures;
+        EXPECT_EQ(state(), before) << n;
+        call();
+      }
+    };
+    const VertexPath threadPath{thread, ends}, loopPath{loop, rim};
+    attempt([&] { EXPECT_EQ(topology.add(threadPath, loopPath), watches); });
+    ++watches;
+    attempt([&] { EXPECT_EQ(topology.addParts(threadPath, loopPath), watches); });
+    ++watches;
+    Words all;
+    for (const double x : {3.0, 0.5, -3.0}) {
+      collisions.advance();
+      collisions.setPositions(thread, threadAt(x));
+      attempt([&] { topology.update(); });
+      const Words words = state();
+      all.insert(all.end(), words.begin(), words.end());
+    }
+    return all;
+  };
+  const Words truth = run(1'000'000);
+  EXPECT_EQ(failures, 0u);
+  EXPECT_GT(truth.size(), 30u);
+  for (std::size_t n = 1, before = 1; failures != before; ++n) {
+    before = failures;
+    EXPECT_EQ(run(n), truth) << n;
+  }
+  EXPECT_GT(failures, 10u);
+}
 
 /// Vectors that appendRows() and appendMotions() extend keep their content.
 TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUnchanged) {

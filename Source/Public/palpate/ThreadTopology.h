@@ -21,21 +21,22 @@ struct VertexPath {
   std::vector<std::uint32_t> vertices;
 };
 
-/// A change of how often a thread passes through a loop.
+/// A change of a count of ThreadTopology.
 struct ThreadEvent {
   enum class Cause {
-    Passed,     ///< the thread through a side of the loop: what holds it gave way
+    Passed,     ///< an edge through a side of the loop or an edge of the other part
     EndPassed,  ///< an end of the thread through the loop's surface
-    Set,        ///< positions were set at both ends of a step, or no update() saw a step
+    Set,        ///< positions were set at both ends of a step, or no update() saw a step. The
+                ///< change of two parts is then 0, as positions alone do not show it
     Cut,        ///< the thread or the loop lost an edge, a vertex or its geometry
     Disabled    ///< no enabled element has one of its edges or vertices any more
   };
-  std::size_t index;   ///< ThreadTopology::add()
+  std::size_t index;   ///< of add() or addParts()
   std::uint64_t step;  ///< number of advance() calls of the OctreeBasedCD before it
   Cause cause;
   int change;                           ///< of the count
   std::array<std::uint32_t, 2> thread;  ///< the edge's vertices, twice the end, or kNoElement
-  std::array<std::uint32_t, 2> loop;    ///< the side's vertices, or kNoElement
+  std::array<std::uint32_t, 2> loop;    ///< the side's or second edge's vertices, or kNoElement
   double time;                          ///< [0, 1] within the step, as Crossing::time
   friend bool operator==(const ThreadEvent&, const ThreadEvent&) = default;
 };
@@ -45,12 +46,16 @@ PALPATE_EXPORT const char* toString(ThreadEvent::Cause) noexcept;  ///< its name
 /// step in which that changed. Docs/HowTo/Sutures.md has an example.
 /// Thread   consecutive vertices are joined by an edge of an enabled element. The first vertex may
 ///          be the last one, too: the thread is then closed.
-/// Loop     a closed polygon: the rim of a hole, or a part of a thread. Its sides need no edges.
+/// Loop     a closed polygon: the rim of a hole, or a part of a thread. Its sides need no edges. An
+///          edge that a side has in add() is a part of the loop, which is lost with it.
 ///          Its surface is the fan of triangles at its first vertex.
 /// Count    how often the thread passes through the surface to the side of its winding normal, less
 ///          how often to the other side. Of a closed thread it is the linking number.
 /// Exact    for the positions as they are, whatever detection and filters find. Where features only
 ///          touch, vertices count as moved by infinitesimal lengths that depend on ids alone.
+/// Parts    the count of two parts of threads is how often an edge of the first passed through an
+///          edge of the second since addParts(): 1 to the side of Crossing::forward, else -1. It
+///          stays 0 while the threads hold each other, whatever their ends do.
 /// Cost     linear in the thread; times the loop where their boxes overlap.
 class PALPATE_EXPORT ThreadTopology {
  public:
@@ -62,9 +67,13 @@ class PALPATE_EXPORT ThreadTopology {
 
   /// Watches a thread and a loop, which have no common vertex. Returns their index, from 0.
   /// Errors   UnknownGeometry; UnsupportedMethod for a shape or field; IndexOutOfRange, too, for a
-  ///          vertex that is named twice; InvalidSettings for vertices that no edge joins, and for
-  ///          fewer than two vertices of a thread or three of a loop.
+  ///          vertex that is named twice; InvalidSettings for vertices of a thread that no edge
+  ///          joins, of a loop that no enabled element has, and for fewer than two vertices of a
+  ///          thread or three of a loop.
   std::size_t add(const VertexPath& thread, const VertexPath& loop);
+  /// Watches two parts of threads, which have no common vertex. Returns their index, as add().
+  /// Errors   those of add().
+  std::size_t addParts(const VertexPath& first, const VertexPath& second);
   /// Looks at the present step, from `before` to `now`. Call it once the positions of the step are
   /// final, before advance(); a further call in the same step replaces what the last one found.
   /// Errors   InvalidCall after a move or the end of the OctreeBasedCD.

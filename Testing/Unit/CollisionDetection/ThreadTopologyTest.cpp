@@ -1,7 +1,7 @@
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
-#include "Unit/Math/ImpactOracle.h"
+#include "Common/ThreadTruth.h"
 
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/ThreadTopology.h>
@@ -17,7 +17,6 @@
 #include <numeric>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 namespace palpate {
@@ -27,27 +26,6 @@ using namespace testing;
 using Eigen::Vector3d;
 using Positions = std::vector<Vector3d>;
 using Cause = ThreadEvent::Cause;
-
-/// Gauss's linking integral of two closed polygons, a sum of solid angles (Klenin and Langowski,
-/// Biopolymers 54, 2000).
-double linkingIntegral(const Positions& a, const Positions& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    for (std::size_t k = 0; k < b.size(); ++k) {
-      const Vector3d p = a[i], q = a[(i + 1) % a.size()], r = b[k], s = b[(k + 1) % b.size()];
-      const auto normal = [](const Vector3d& u, const Vector3d& v) {
-        const Vector3d n = u.cross(v);
-        return Vector3d(n.norm() > 0 ? n.normalized() : n);
-      };
-      const Vector3d n[] = {normal(r - p, s - p), normal(s - p, s - q), normal(s - q, r - q),
-                            normal(r - q, r - p)};
-      double angle = 0;
-      for (int m = 0; m < 4; ++m)
-        angle += std::asin(std::clamp(n[m].dot(n[(m + 1) % 4]), -1.0, 1.0));
-      sum += std::copysign(angle, (s - r).cross(q - p).dot(r - p));
-    }
-  return sum / (4 * std::numbers::pi);
-}
 
 std::vector<Segment> segmentsOf(std::uint32_t count, bool isClosed) {
   std::vector<Segment> segments;
@@ -62,24 +40,33 @@ std::vector<std::uint32_t> placesOf(std::uint32_t first, std::uint32_t count) {
   return vertices;
 }
 
-/// A thread and a loop, lines of one detection.
+enum class WatchKind { Open, Closed, Parts };
+
+/// A thread and a loop, or two parts of threads, lines of one detection.
 struct Watched {
   OctreeBasedCD collisions;
   Positions thread, loop;
   GeometryId threadId, loopId;
   ThreadTopology topology{collisions};
   std::size_t index;
-  bool isClosed;
+  WatchKind kind;
+  std::vector<std::uint32_t> path, sides;
 
-  Watched(Positions threadAt, Positions loopAt, bool closed)
-      : thread(std::move(threadAt)), loop(std::move(loopAt)), isClosed(closed) {
+  Watched(Positions threadAt, Positions loopAt, WatchKind k)
+      : thread(std::move(threadAt)), loop(std::move(loopAt)), kind(k) {
     const auto count = [](const Positions& p) { return static_cast<std::uint32_t>(p.size()); };
-    threadId = collisions.addLineMesh(thread, segmentsOf(count(thread), closed), 0.0);
-    loopId = collisions.addLineMesh(loop, segmentsOf(count(loop), true), 0.0);
-    std::vector<std::uint32_t> path = placesOf(0, count(thread));
-    if (closed) path.push_back(0);
-    index = topology.add({threadId, path}, {loopId, placesOf(0, count(loop))});
+    path = placesOf(0, count(thread)), sides = placesOf(0, count(loop));
+    threadId =
+        collisions.addLineMesh(thread, segmentsOf(count(thread), k == WatchKind::Closed), 0.0);
+    loopId = collisions.addLineMesh(loop, segmentsOf(count(loop), k != WatchKind::Parts), 0.0);
+    if (k == WatchKind::Closed) path.push_back(0);
+    index = k == WatchKind::Parts ? topology.addParts({threadId, path}, {loopId, sides})
+                                  : topology.add({threadId, path}, {loopId, sides});
     collisions.advance();
+  }
+  std::vector<PassageRow> truth(const Positions& nextThread, const Positions& nextLoop) const {
+    return passageTruth({path, thread, nextThread}, {sides, loop, nextLoop},
+                        kind == WatchKind::Parts);
   }
   int count() const { return topology.count(index); }
   /// Moves to these positions and looks at the step. Returns its events.
@@ -93,45 +80,6 @@ struct Watched {
     return {topology.events().begin(), topology.events().end()};
   }
 };
-
-using Row = std::tuple<bool, std::array<std::uint32_t, 2>, std::array<std::uint32_t, 2>, int>;
-
-/// The passages in a step, by rational arithmetic alone.
-std::vector<Row> passageTruth(const Watched& all, const Positions& thread, const Positions& loop) {
-  std::vector<Row> rows;
-  const auto query = [&](bool edges, const auto& ofThread, const auto& ofLoop, auto&& add) {
-    impact::Positions p;
-    std::size_t i = 0;
-    for (const std::uint32_t v : ofThread) p[i] = all.thread[v], p[4 + i++] = thread[v];
-    for (const std::uint32_t v : ofLoop) p[i] = all.loop[v], p[4 + i++] = loop[v];
-    for (const auto& passage : impact::Query(edges, p).passages()) add(passage.forward ? 1 : -1);
-  };
-  const auto size = static_cast<std::uint32_t>(thread.size()),
-             sides = static_cast<std::uint32_t>(loop.size());
-  for (std::uint32_t v = 0; v + (all.isClosed ? 0 : 1) < size; ++v)
-    for (std::uint32_t s = 0; s < sides; ++s) {
-      const std::array edge{v, (v + 1) % size}, side{s, (s + 1) % sides};
-      query(true, edge, side, [&](int change) { rows.emplace_back(false, edge, side, change); });
-    }
-  constexpr std::array kNone{kNoElement, kNoElement};
-  for (const std::uint32_t v : {0u, size - 1})
-    for (std::uint32_t s = 1; !all.isClosed && s + 1 < sides; ++s)
-      query(false, std::array{v}, std::array{0u, s, s + 1}, [&](int change) {
-        rows.emplace_back(true, std::array{v, v}, kNone, v == 0 ? -change : change);
-      });
-  std::sort(rows.begin(), rows.end());
-  return rows;
-}
-
-std::vector<Row> rowsOf(const std::vector<ThreadEvent>& events) {
-  std::vector<Row> rows;
-  for (const ThreadEvent& e : events) {
-    EXPECT_TRUE(e.cause == Cause::Passed || e.cause == Cause::EndPassed) << toString(e.cause);
-    rows.emplace_back(e.cause == Cause::EndPassed, e.thread, e.loop, e.change);
-  }
-  std::sort(rows.begin(), rows.end());
-  return rows;
-}
 
 int sumOf(const std::vector<ThreadEvent>& events) {
   int sum = 0;
@@ -157,7 +105,7 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
   std::size_t changes = 0;
   int largest = 0;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    Watched all(polygon(random, 7), polygon(random, 6), true);
+    Watched all(polygon(random, 7), polygon(random, 6), WatchKind::Closed);
     for (int i = 0; i < kSteps; ++i) {
       const int before = all.count();
       // They are drawn back, so that they do not drift apart.
@@ -180,19 +128,19 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
 TEST(ThreadTopology, EventsAreThePassagesOfRationalArithmetic) {
   Random random(2);
   std::size_t passages = 0, ends = 0;
-  for (int repeat = 0; repeat < 90; ++repeat) {
-    Watched all(polygon(random, 5), polygon(random, 5), repeat % 3 == 0);
+  for (int repeat = 0; repeat < 150; ++repeat) {
+    Watched all(polygon(random, 5), polygon(random, 5), static_cast<WatchKind>(repeat % 3));
     for (int i = 0; i < 10; ++i) {
       const Positions thread = shaken(random, all.thread, 0.3),
                       loop = shaken(random, all.loop, 0.3);
-      const std::vector<Row> truth = passageTruth(all, thread, loop);
+      const std::vector<PassageRow> truth = all.truth(thread, loop);
       const auto events = all.step(thread, loop);
-      ASSERT_EQ(rowsOf(events), truth) << repeat << ' ' << i;
+      ASSERT_EQ(passageRows(events, 0), truth) << repeat << ' ' << i;
       ASSERT_TRUE(std::is_sorted(events.begin(), events.end(),
                                  [](const auto& l, const auto& r) { return l.time < r.time; }));
       passages += truth.size();
-      ends += static_cast<std::size_t>(
-          std::count_if(truth.begin(), truth.end(), [](const Row& r) { return std::get<0>(r); }));
+      ends += static_cast<std::size_t>(std::count_if(
+          truth.begin(), truth.end(), [](const PassageRow& r) { return std::get<0>(r); }));
     }
   }
   EXPECT_GT(passages, 300u);
@@ -208,19 +156,41 @@ TEST(ThreadTopology, IsConsistentWhereFeaturesOnlyTouch) {
   };
   std::size_t changes = 0;
   for (int repeat = 0; repeat < 60; ++repeat) {
-    const bool isClosed = repeat % 2 == 0;
-    Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), isClosed);
+    const WatchKind kind = repeat % 2 == 0 ? WatchKind::Closed : WatchKind::Open;
+    Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), kind);
     for (int i = 0; i < 20; ++i) {
       const int before = all.count();
       const auto events = all.step(snapped(polygon(random, 6)), snapped(polygon(random, 5)));
       ASSERT_EQ(before + sumOf(events), all.count());
       changes += all.count() != before;
       // The same positions count the same, however they were reached.
-      Watched fresh(all.thread, all.loop, isClosed);
+      Watched fresh(all.thread, all.loop, kind);
       ASSERT_EQ(fresh.count(), all.count());
     }
   }
   EXPECT_GT(changes, 100u);
+}
+
+TEST(ThreadTopology, PartsCountWhatRationalArithmeticFindsWhereFeaturesOnlyTouch) {
+  Random random(4);
+  const auto snapped = [](Positions positions) {
+    for (Vector3d& p : positions) p = (p * 2).array().round().matrix();
+    return positions;
+  };
+  std::size_t passages = 0;
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), WatchKind::Parts);
+    for (int i = 0; i < 20; ++i) {
+      const Positions thread = snapped(polygon(random, 6)), loop = snapped(polygon(random, 5));
+      const auto truth = all.truth(thread, loop);
+      const int before = all.count();
+      const auto events = all.step(thread, loop);
+      ASSERT_EQ(passageRows(events, 0), truth) << repeat << ' ' << i;
+      ASSERT_EQ(before + sumOf(events), all.count());
+      passages += truth.size();
+    }
+  }
+  EXPECT_GT(passages, 300u);
 }
 
 /// A thread along z through a square hole.
@@ -232,7 +202,7 @@ Positions threadAt(double x, double z) {
 const Positions kHole{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
 
 TEST(ThreadTopology, AStitchIsSewnSlipsOutAndTearsOut) {
-  Watched all(threadAt(0, -4), kHole, false);
+  Watched all(threadAt(0, -4), kHole, WatchKind::Open);
   EXPECT_EQ(all.count(), 0);
   auto events = all.step(threadAt(0, -2), kHole);
   ASSERT_EQ(events.size(), 1u);
@@ -263,6 +233,61 @@ TEST(ThreadTopology, AStitchIsSewnSlipsOutAndTearsOut) {
   EXPECT_EQ(all.count(), 0);
 }
 
+TEST(ThreadTopology, TwoPartsCountOnlyWhatPassesThroughThem) {
+  const auto along = [](double x, double y) {
+    return Positions{{x, y, -1}, {x, y, 0.1}, {x, y, 1}};
+  };
+  const Positions across{{-1, 0, 0}, {0.1, 0, 0}, {1, 0, 0}};
+  Watched all(along(0, 0.5), across, WatchKind::Parts);
+  // Around the end of the other thread, nothing passes.
+  for (const auto& [x, y] : {std::pair{2.0, 0.5}, {2.0, -0.5}, {0.0, -0.5}})
+    EXPECT_TRUE(all.step(along(x, y), across).empty());
+  auto events = all.step(along(0, 0.5), across);
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(all.count(), 1);  // (p1 - p0) x (q1 - q0) points along y
+  EXPECT_EQ(events[0].cause, Cause::Passed);
+  EXPECT_EQ(events[0].change, 1);
+  EXPECT_EQ(events[0].step, 4u);
+  EXPECT_EQ(events[0].thread, (std::array{0u, 1u}));
+  EXPECT_EQ(events[0].loop, (std::array{0u, 1u}));
+  EXPECT_NEAR(events[0].time, 0.5, 1e-9);
+
+  // A further update in the same step, with other positions.
+  all.topology.clear();
+  all.collisions.setPositions(all.threadId, along(0, -0.5));
+  all.topology.update();
+  EXPECT_EQ(all.count(), 0);
+  all.collisions.setPositions(all.threadId, along(0, 0.25));
+  all.topology.update();
+  EXPECT_EQ(all.count(), 1);
+  EXPECT_TRUE(all.topology.events().empty());
+  all.collisions.advance();
+
+  // Positions that are set at both ends of a step, and a step without update(), are named.
+  for (const bool isMissed : {false, true}) {
+    all.topology.clear();
+    all.collisions.setPositions(all.threadId, along(0, -0.5 - isMissed));
+    if (isMissed)
+      all.collisions.advance();
+    else
+      all.collisions.setPositions(all.threadId, along(0, -0.5), along(0, -0.5));
+    all.topology.update();
+    ASSERT_EQ(all.topology.events().size(), 1u) << isMissed;
+    EXPECT_EQ(all.topology.events()[0].cause, Cause::Set);
+    EXPECT_EQ(all.topology.events()[0].change, 0);
+    EXPECT_EQ(all.count(), 1);
+    all.topology.update();
+    EXPECT_EQ(all.topology.events().size(), 1u);
+    all.collisions.advance();
+  }
+  all.topology.clear();
+  all.collisions.setDisabledElements(all.loopId, std::vector<std::uint32_t>{1});
+  all.topology.update();
+  ASSERT_EQ(all.topology.events().size(), 1u);
+  EXPECT_EQ(all.topology.events()[0].cause, Cause::Disabled);
+  EXPECT_TRUE(all.topology.isLost(all.index));
+}
+
 /// A knot: the thread's end goes through a loop that the same thread forms.
 TEST(ThreadTopology, AThreadPassesThroughALoopOfItself) {
   OctreeBasedCD collisions;
@@ -287,7 +312,7 @@ TEST(ThreadTopology, AThreadPassesThroughALoopOfItself) {
 }
 
 TEST(ThreadTopology, AnUpdateReplacesThatOfTheSameStep) {
-  Watched all(threadAt(0, -4), kHole, false);
+  Watched all(threadAt(0, -4), kHole, WatchKind::Open);
   all.collisions.setPositions(all.threadId, threadAt(0, -2));
   all.topology.update();
   EXPECT_EQ(all.count(), 1);
@@ -306,7 +331,7 @@ TEST(ThreadTopology, AnUpdateReplacesThatOfTheSameStep) {
 }
 
 TEST(ThreadTopology, StepsThatNobodyLookedAtAreNamed) {
-  Watched all(threadAt(0, -4), kHole, false);
+  Watched all(threadAt(0, -4), kHole, WatchKind::Open);
   all.collisions.setPositions(all.threadId, threadAt(0, -2));
   all.collisions.advance();
   all.topology.update();
@@ -323,7 +348,7 @@ TEST(ThreadTopology, StepsThatNobodyLookedAtAreNamed) {
 
 TEST(ThreadTopology, CutAndDisabledThreadsAndLoopsAreLost) {
   const auto sewn = [] {
-    auto all = std::make_unique<Watched>(threadAt(0, -2), kHole, false);
+    auto all = std::make_unique<Watched>(threadAt(0, -2), kHole, WatchKind::Open);
     EXPECT_EQ(all->count(), 1);
     return all;
   };
@@ -345,6 +370,9 @@ TEST(ThreadTopology, CutAndDisabledThreadsAndLoopsAreLost) {
   expectLost(*all, Cause::Disabled);
   all = sewn();
   all->collisions.setDisabledElements(all->loopId, std::vector<std::uint32_t>{1, 2});
+  expectLost(*all, Cause::Disabled);
+  all = sewn();
+  all->collisions.setDisabledElements(all->loopId, std::vector<std::uint32_t>{1});  // one edge
   expectLost(*all, Cause::Disabled);
   all = sewn();
   all->collisions.removeGeometry(all->loopId);
@@ -371,6 +399,51 @@ TEST(ThreadTopology, CutAndDisabledThreadsAndLoopsAreLost) {
   EXPECT_EQ(topology.events()[0].cause, Cause::Cut);
 }
 
+TEST(ThreadTopology, FollowsPlacedLoops) {
+  OctreeBasedCD collisions;
+  const GeometryId hole = collisions.addLineMesh(kHole, segmentsOf(4, true), 0.0),
+                   thread = collisions.addLineMesh(threadAt(0, -2), segmentsOf(4, false), 0.0);
+  ThreadTopology topology(collisions);
+  const std::size_t stitch = topology.add({thread, placesOf(0, 4)}, {hole, placesOf(0, 4)});
+  EXPECT_EQ(topology.count(stitch), 1);
+  collisions.advance();
+  Pose pose;
+  pose.translation = {0, 0, 5};
+  collisions.setTransform(hole, pose);
+  topology.update();
+  EXPECT_EQ(topology.count(stitch), 0);
+  ASSERT_EQ(topology.events().size(), 1u);
+  EXPECT_EQ(topology.events()[0].cause, Cause::EndPassed);
+}
+
+TEST(ThreadTopology, GivesTheSameForEachNumberOfThreads) {
+  const auto run = [](int threads) {
+    OctreeBasedCD collisions(Settings{.threads = threads});
+    Random random(5);
+    std::vector<GeometryId> ids;
+    for (int i = 0; i < 6; ++i)
+      ids.push_back(collisions.addLineMesh(polygon(random, 6), segmentsOf(6, true), 0.01));
+    ThreadTopology topology(collisions);
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      for (std::size_t k = 0; k < ids.size(); ++k) {
+        if (i == k) continue;
+        if (i < k) collisions.addCollisionPair(ids[i], ids[k]);
+        topology.add({ids[i], placesOf(0, 6)}, {ids[k], placesOf(0, 6)});
+        topology.addParts({ids[i], placesOf(0, 6)}, {ids[k], placesOf(0, 6)});
+      }
+    for (int step = 0; step < 20; ++step) {
+      collisions.advance();
+      for (const GeometryId id : ids) collisions.setPositions(id, polygon(random, 6));
+      collisions.detectCollision();
+      topology.update();
+    }
+    return std::vector<ThreadEvent>(topology.events().begin(), topology.events().end());
+  };
+  const auto events = run(1);
+  EXPECT_GT(events.size(), 100u);
+  EXPECT_EQ(run(3), events);
+}
+
 TEST(ThreadTopology, RefusesPathsThatAreNone) {
   OctreeBasedCD collisions;
   const GeometryId thread = collisions.addLineMesh(threadAt(0, -2), segmentsOf(4, false), 0.0),
@@ -393,6 +466,16 @@ TEST(ThreadTopology, RefusesPathsThatAreNone) {
   refuse(Code::InvalidSettings, "has 2 vertices; it needs 3", goodThread, {hole, {1, 2}});
   refuse(Code::IndexOutOfRange, "vertex 2 is in the thread and in the loop", {thread, {0, 1, 2}},
          {thread, {2, 3, 1}});
+  expectRefused(Code::IndexOutOfRange, "vertex 1 is in both threads", [&] {
+    topology.addParts({thread, {0, 1}}, {thread, {1, 2}});
+  });
+  expectRefused(Code::InvalidSettings, "no edge from vertex 0 to 2", [&] {
+    topology.addParts(goodThread, {hole, {0, 2}});
+  });
+  collisions.setDisabledElements(hole, std::vector<std::uint32_t>{1, 2});
+  refuse(Code::InvalidSettings, "the loop names vertex 2, which no enabled element has", goodThread,
+         goodLoop);
+  collisions.setDisabledElements(hole, {});
   expectRefused(Code::IndexOutOfRange, "index 0", [&] { topology.count(0); });
   EXPECT_EQ(topology.add(goodThread, goodLoop), 0u);
   ThreadTopology other = std::move(topology);
