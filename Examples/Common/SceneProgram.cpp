@@ -138,7 +138,8 @@ std::string machine() {
 }
 
 std::string page(const RunReport& report, const RunLog& log, const SceneProgram& program,
-                 const Options& options, const std::string& settings, std::uint64_t hash) {
+                 const Options& options, const std::string& settings,
+                 const std::vector<std::string>& findings, std::uint64_t hash) {
   std::array<char, 32> hashText;
   std::snprintf(hashText.data(), hashText.size(), "%016" PRIx64, hash);
   const Series &slowest = log.column("frame ms"), &untrusted = log.column("untrusted pairs"),
@@ -150,16 +151,15 @@ std::string page(const RunReport& report, const RunLog& log, const SceneProgram&
   };
   for (int frame = 1; !isTrusted && frame < options.frames; ++frame)
     if (faults(frame) > faults(worst)) worst = frame;
-  return report.html(
-      {program.name,
-       {program.description, "Settings: " + std::to_string(options.frames) + " frames, threads " +
-                                 (options.threads == 0 ? "all" : std::to_string(options.threads)) +
-                                 (settings.empty() ? "" : ", " + settings) + ". Machine: " +
-                                 machine() + ". Hash of all contacts: " + hashText.data()},
-       options.unit,
-       worst,
-       isTrusted ? "slowest" : "most pairs not trusted"},
-      log.columns());
+  std::vector<std::string> paragraphs{program.description};
+  paragraphs.insert(paragraphs.end(), findings.begin(), findings.end());
+  paragraphs.push_back("Settings: " + std::to_string(options.frames) + " frames, threads " +
+                       (options.threads == 0 ? "all" : std::to_string(options.threads)) +
+                       (settings.empty() ? "" : ", " + settings) + ". Machine: " + machine() +
+                       ". Hash of all contacts: " + hashText.data());
+  return report.html({program.name, std::move(paragraphs), options.unit, worst,
+                      isTrusted ? "slowest" : "most pairs not trusted"},
+                     log.columns());
 }
 
 #ifdef PALPATE_HAS_VTK
@@ -320,6 +320,8 @@ void run(const SceneProgram& program, Options options) {
   std::printf("%s, %d frames, %s\n%s", program.name.c_str(), options.frames, settings.c_str(),
               summary(log).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
+  const std::vector<std::string> findings = scene->findings();
+  for (const std::string& finding : findings) std::printf("%s\n", finding.c_str());
   if (series) series->finish(program.name);
   std::unique_ptr<LiveScene> still;  // whose octrees are built for its very frame
   const std::optional<int> chosen = scene->frameToShow();
@@ -334,7 +336,8 @@ void run(const SceneProgram& program, Options options) {
     std::printf("%-20s %s\n", "picture", (options.out / "scene.png").c_str());
   }
   writeWhole(options.out / "frames.csv", log.csv());
-  writeWhole(options.out / "report.html", page(report, log, program, options, settings, hash));
+  writeWhole(options.out / "report.html",
+             page(report, log, program, options, settings, findings, hash));
   std::printf("%-20s %s\n", "report", (options.out / "report.html").c_str());
 }
 

@@ -74,6 +74,8 @@ class LiveScene {
   /// Columns and values of the last computed frame. The columns are the same in every frame. A name
   /// ends with its unit, as "force mN"; that of a number or a share has none.
   virtual std::vector<std::pair<std::string, double>> values() { return {}; }
+  /// Sentences about the whole run, which the program prints and the report shows.
+  virtual std::vector<std::string> findings() { return {}; }
   /// The promise of the scene that the last computed frame breaks, as a sentence, or an empty text.
   virtual std::string fault() { return ""; }
   /// The best frame for a picture, if it needs no earlier frame. Otherwise the picture shows the

@@ -1,14 +1,20 @@
 // A thread of 1,000 segments goes through two sheets and around itself, and is pulled tight. Beside
-// it is a stitch that is tied already.
+// it a guide sews a stitch and ties it by an overhand knot. ThreadTopology grades both.
+#include "CommandLine.h"
 #include "SceneProgram.h"
 #include "SelfImpacts.h"
+#include "Stitch.h"
+
+#include <palpate/ThreadTopology.h>
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
+#include <optional>
 
 namespace palpate::scenes {
 namespace {
@@ -22,6 +28,8 @@ constexpr std::uint32_t kNeedle = 60, kSegments = 1000;  // segments
 constexpr double kSegment = 0.07, kRadius = 0.05, kGap = 0.01, kArc = 4, kDepth = 2.4;
 constexpr double kNeedleSpeed = 0.1, kMostStretch = 1.08;
 // The story, in substeps: through both sheets, up, around the standing part, away.
+constexpr double kStitchSteps = 120;  // substeps of the stitch
+constexpr int kUntilFault = 1;        // substeps
 constexpr double kThrough = 300, kUp = 160, kAround = 400, kAway = 740;
 
 Vector3d onArc(double angle) {
@@ -73,25 +81,9 @@ std::vector<Vector3d> atRest() {
   return line;
 }
 
-/// Half of a stitch that an overhand knot closes: from below the wound up through the left edge,
-/// one and a half times half around the other half, which is this one turned by 180 degrees.
-std::vector<Vector3d> halfStitch() {
-  constexpr double kKnot = 0.45, kTwist = 0.06, kHeight = 0.13;  // half its length; radius; height
-  constexpr int kPoints = 12;
-  std::vector<Vector3d> line{{-0.06, 0, -0.9}, {-0.9, 0, -0.8}, {-1.45, 0, -0.35},
-                             {-1.55, 0, 0.05}, {-1.25, 0, 0.2}, {-0.85, -0.03, 0.15}};
-  for (int i = 0; i <= kPoints; ++i) {
-    const double along = 2.0 * i / kPoints - 1, angle = pi * (1 + 1.5 * along);
-    line.emplace_back(kKnot * along, kTwist * std::cos(angle), kHeight + kTwist * std::sin(angle));
-  }
-  line.emplace_back(kKnot + 0.3, 0.05, kHeight + kTwist + 0.12);
-  line.emplace_back(kKnot + 0.8, 0.2, kHeight + 0.7);
-  return curve(line);
-}
-
 class Suturing : public LiveScene {
  public:
-  explicit Suturing(int threads) : m_world(threads) {
+  Suturing(int threads, const std::string& fault) : m_world(threads), m_fault(fault) {
     m_thread = m_world.addThread("thread", atRest(), kRadius, 1.0);
     std::vector<double>& mobility = m_world.solver().inverseMasses;
     std::fill_n(mobility.begin(), kNeedle + 1, 0.0);
@@ -109,18 +101,19 @@ class Suturing : public LiveScene {
     m_world.addGuard(m_thread, m_thread);
     for (const double side : {-1.0, 1.0}) addSheet(side, touching);
     m_world.addPair(m_sheets[0], m_sheets[1], touching, kGap);
-    for (const double side : {-1.0, 1.0}) {
-      std::vector<Vector3d> half = halfStitch();
-      for (Vector3d& p : half) p = Vector3d(-side * p.x(), -side * p.y(), p.z()) + kStitch;
-      m_stitch[side > 0] = m_world.addThread("stitch", half, kRadius, 0.0);
-    }
-    m_world.addPair(m_stitch[0], m_stitch[1],
-                    {.method = Method::Proximity, .thickness = kTied, .contacts = Contacts::All},
+    m_stitch = m_world.addThread("stitch", stitch(), kRadius, 0.0);
+    m_world.addPair(m_stitch, m_stitch,
+                    {.method = Method::Continuous,
+                     .thickness = kTied,
+                     .contacts = Contacts::All,
+                     .restDistance = 4 * kRadius},
                     0);
     SceneMesh bed = sheet(24);  // shown only
     for (Vector3d& p : bed.positions) p = {2.5 * p.x(), 2.7 + 4.8 * p.y(), -2};
     m_bed = m_world.addRigidMesh("wound", bed);
     m_world.addGuard(m_sheets[0], m_sheets[1]);
+    for (const std::size_t side : {0u, 1u})
+      m_edges[side] = watch(m_stitch, m_sheets[side], rimAt(m_sheets[side], kStitchHoles[side]));
   }
 
   World& world() override { return m_world; }
@@ -128,8 +121,7 @@ class Suturing : public LiveScene {
   std::vector<BodyLook> looks() override {
     return {{m_thread, "Needle", kSteelColour, 1, true, 0, 0.3, 1},
             {.body = m_thread, .label = "Thread", .colour = kThreadColour, .firstElement = kNeedle},
-            {m_stitch[0], "", kThreadColour},
-            {m_stitch[1], "", kThreadColour},
+            {m_stitch, "", kThreadColour},
             {m_sheets[0], "", kTissueColour, 1, true, 0, 0.5},
             {m_sheets[1], "", kTissueColour, 1, true, 0, 0.5},
             {m_bed, "Wound", {0.45, 0.05, 0.05}, 1, true, 0, 0.25}};
@@ -153,6 +145,7 @@ class Suturing : public LiveScene {
       m_steps.push_back(line());
       m_world.predict(kStep, Vector3d::Zero(), 0.03);
       drive();
+      sew();
       for (int round = 0; round < kRounds; ++round) {
         m_world.detect();
         pierce();
@@ -160,6 +153,7 @@ class Suturing : public LiveScene {
       }
       m_world.hold();
       m_time += m_world.fraction(m_thread, 0) * (m_next - m_time);  // the hand waits
+      m_topology.update();
       m_world.commit();
     }
     m_steps.push_back(line());
@@ -169,17 +163,36 @@ class Suturing : public LiveScene {
     return {{"substeps", m_time},
             {"stretch", stretch()},
             {"holes", m_holes[0] + m_holes[1]},
+            {"stitched edges", passed(m_edges[0]) + passed(m_edges[1])},
+            {"knot", m_knot ? m_topology.count(*m_knot) : 0},
             {"knot gap mm", knotGap()},
             {"touches itself", m_world.contacts(m_thread, m_thread).edgeEdge().size()},
             {"wound mm", m_world.positions(m_sheets[1])[kMiddle].x() -
                              m_world.positions(m_sheets[0])[kMiddle + kCells].x()}};
   }
 
+  std::vector<std::string> findings() override {
+    std::vector<std::string> lines;
+    const auto add = [&](const std::string& subject, std::optional<std::size_t> watch,
+                         const std::string& done) {
+      lines.push_back(subject + ": " + (watch ? grade(*watch, done) : "not yet"));
+    };
+    for (const std::size_t side : {0u, 1u}) {
+      const std::string edge = side == 0 ? "left edge" : "right edge";
+      add("needle, " + edge, m_pierced[side], "through");
+      add("stitch, " + edge, m_edges[side], "through");
+    }
+    add("knot", m_knot, "tied");
+    return lines;
+  }
+
+  std::string settings() override { return m_fault.empty() ? "" : "fault " + m_fault; }
+
   std::string fault() override {
     std::size_t impacts = 0;
     for (std::size_t i = 0; i + 1 < m_steps.size(); ++i)
       impacts += countSelfImpacts(m_steps[i], m_steps[i + 1]);
-    if (knotGap() <= 0) return "the knot's thread is in itself.";
+    if (m_fault.empty() && knotGap() <= 0) return "the knot's thread is in itself.";
     return impacts == 0
                ? ""
                : "the thread passes through itself in " + std::to_string(impacts) + " places.";
@@ -187,14 +200,70 @@ class Suturing : public LiveScene {
 
  private:
   static constexpr double kTied = 0.03;  // mm: nearer parts of the knot touch
-  inline static const Vector3d kStitch{0, 2, 0};
+  inline static const Vector3d kStitch{0, 2.1, 0};
 
-  /// Between the surfaces of the knot's two parts.
+  /// Between surfaces of the stitch.
   double knotGap() {
     double least = kTied;
-    for (const EdgeEdgeContact& c : m_world.contacts(m_stitch[0], m_stitch[1]).edgeEdge())
+    for (const EdgeEdgeContact& c : m_world.contacts(m_stitch, m_stitch).edgeEdge())
       least = std::min(least, c.distance);
     return least;
+  }
+
+  std::vector<Vector3d> stitch() {
+    std::vector<Vector3d> thread = stitchAt(m_sewn);
+    for (Vector3d& p : thread) p += kStitch;
+    return thread;
+  }
+
+  /// The guide's next step on the stitch, or the fault's.
+  void sew() {
+    const std::string fault = m_afterKnot > kUntilFault ? m_fault : "";
+    m_sewn = std::clamp(m_sewn + (fault == "end" ? -3 : 1) / kStitchSteps, 0.0, 1.0);
+    if (m_sewn == 1) ++m_afterKnot;
+    std::vector<Vector3d> thread = stitch();
+    if (fault == "wall")
+      for (const std::uint32_t v : knotEnd()) thread[v] -= Vector3d(0, 1.5, 0);
+    if (fault == "disabled")
+      m_world.detection().setDisabledElements(m_world.bodies()[m_stitch].id,
+                                              std::array{knotLoop().front()});
+    std::copy(thread.begin(), thread.end(), m_world.positions(m_stitch).begin());
+    if (!m_knot && m_sewn >= kKnotBegins) {
+      const GeometryId id = m_world.bodies()[m_stitch].id;
+      m_knot = m_topology.add({id, knotEnd()}, {id, knotLoop()});
+    }
+  }
+
+  /// The vertices of the triangle of a sheet below a hole of the stitch.
+  std::array<std::uint32_t, 3> rimAt(World::BodyId sheet, const Vector3d& hole) {
+    const Ray ray{kStitch + hole + Vector3d::UnitZ(), -Vector3d::UnitZ()};
+    return m_world.detection().queries().firstHit(m_world.bodies()[sheet].id, ray)->vertices;
+  }
+
+  /// Counts how often the whole thread goes through a hole.
+  std::size_t watch(World::BodyId thread, World::BodyId sheet,
+                    const std::array<std::uint32_t, 3>& rim) {
+    const World::Body& line = m_world.bodies()[thread];
+    return m_topology.add({line.id, stitchPart(0, line.count - 1)},
+                          {m_world.bodies()[sheet].id, {rim[0], rim[1], rim[2]}});
+  }
+
+  int passed(std::size_t watch) { return std::abs(m_topology.count(watch)); }
+
+  /// Whether a passage was made and still holds, with the event that says so.
+  std::string grade(std::size_t watch, const std::string& done) {
+    const ThreadEvent* last = nullptr;
+    for (const ThreadEvent& event : m_topology.events())
+      if (event.index == watch) last = &event;
+    if (!last) return "not yet";
+    const auto edge = [](const char* what, const std::array<std::uint32_t, 2>& vertices) {
+      if (vertices[0] == kNoElement) return std::string();
+      return std::string(", ") + what + ' ' + std::to_string(vertices[0]) + '-' +
+             std::to_string(vertices[1]);
+    };
+    return (m_topology.count(watch) != 0 ? done : "lost") + " in step " +
+           std::to_string(last->step) + " (" + toString(last->cause) +
+           edge("thread", last->thread) + edge("loop", last->loop) + ')';
   }
 
   static constexpr int kCells = 20, kMiddle = kCells / 2 * (kCells + 1);  // a row's first vertex
@@ -238,6 +307,8 @@ class Suturing : public LiveScene {
            m_world.contacts(m_thread, m_sheets[side]).vertexTriangle()) {
         if (c.vertex != 0) continue;
         m_world.disable(m_sheets[side], std::array{c.triangle});
+        m_pierced[side] =
+            watch(m_thread, m_sheets[side], m_world.bodies()[m_sheets[side]].triangles[c.triangle]);
         m_holes[side] = true;
         m_world.detect();
         break;
@@ -254,8 +325,15 @@ class Suturing : public LiveScene {
   }
 
   World m_world;
-  World::BodyId m_thread = 0, m_bed = 0;
-  std::array<World::BodyId, 2> m_sheets{}, m_stitch{};
+  ThreadTopology m_topology{m_world.detection()};
+  std::array<std::optional<std::size_t>, 2> m_pierced{};  // by the needle's thread
+  std::array<std::size_t, 2> m_edges{};                   // of the stitch
+  std::optional<std::size_t> m_knot;
+  double m_sewn = 0;  // of the stitch's story
+  int m_afterKnot = 0;
+  std::string m_fault;
+  World::BodyId m_thread = 0, m_bed = 0, m_stitch = 0;
+  std::array<World::BodyId, 2> m_sheets{};
   std::array<bool, 2> m_holes{};
   std::vector<std::vector<Vector3d>> m_steps;  // the frame's, committed
   double m_time = 0, m_next = 0;               // substeps of the story
@@ -267,12 +345,21 @@ class Suturing : public LiveScene {
 
 int main(int count, char** arguments) {
   using namespace palpate::scenes;
+  std::string fault;
   return runScene(
       {.name = "Suturing",
-       .description = "A thread of 1,000 segments through two sheets and around itself.",
+       .description =
+           "A thread of 1,000 segments through two sheets and around itself, and a stitch "
+           "that a guide ties.",
        .frames = 400,
        .frameMilliseconds = 1000.0 / 60,
        .keys = "n",
-       .make = [](int threads) { return std::make_unique<Suturing>(threads); }},
+       .addOptions =
+           [&](CLI::App& app) {
+             app.add_option("--fault", fault, "by which the tied stitch loses its knot")
+                 ->type_name("FAULT")
+                 ->check(oneOf({"wall", "end", "disabled"}));
+           },
+       .make = [&](int threads) { return std::make_unique<Suturing>(threads, fault); }},
       count, arguments);
 }

@@ -1,11 +1,25 @@
 # That the thread never passes through itself the program itself checks for each committed step.
-frames=16
+frames=35
 long=400
 [[ $(column holes | tail -1) -ge 1 ]] || fail "the needle pierced nothing"
 column stretch | awk '$1 > 1.1 { exit 1 }' || fail "the thread is stretched"
-column "knot gap mm" | awk '$1 <= 0 || $1 >= 0.02 { exit 1 }' || fail "the knot is not tied"
+column "knot gap mm" | tail -1 | awk '$1 <= 0 || $1 >= 0.02 { exit 1 }' || fail "the knot is not tight"
+[[ $(column "stitched edges" | tail -1) == 2 ]] || fail "the stitch does not hold both edges"
+[[ $(column knot | tail -1) == 1 ]] || fail "the knot is not tied"
+for text in "$folder/text" "$folder/run/report.html"; do
+  grep -q "knot: tied in step [89][0-9] (EndPassed, thread 0-0)" "$text" || fail "$text does not grade the knot"
+done
 if [[ $length == long ]]; then
   [[ $(column holes | tail -1) == 2 ]] || fail "the needle pierced one sheet only"
+  grep -q "needle, right edge: through in step " "$folder/text" || fail "the thread is not through the second edge"
   [[ $(column substeps | tail -1) -ge 1000 ]] || fail "the needle was held for good"
   [[ $(column "touches itself" | tail -1) -ge 3 ]] || fail "the thread does not hold itself"
 fi
+frames=35
+refused --fault rain
+declare -A events=([wall]="Passed, thread [0-9]+-[0-9]+, loop [0-9]+-[0-9]+" [end]="EndPassed, thread 0-0" [disabled]=Disabled)
+for fault in wall end disabled; do
+  run --fault $fault
+  grep -qE "^knot: lost in step 1[23][0-9] \(${events[$fault]}\)$" "$folder/text" ||
+    fail "the fault $fault is not graded: $(grep knot: "$folder/text")"
+done
