@@ -44,6 +44,7 @@ int main(void) {
   SIZE(palpate_statistics);
   SIZE(palpate_surface_point);
   SIZE(palpate_tetrahedron_point);
+  SIZE(palpate_thread_event);
   SIZE(palpate_tracked_contact);
   SIZE(palpate_unfinished_pair);
   SIZE(palpate_validity);

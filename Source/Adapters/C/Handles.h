@@ -7,6 +7,7 @@
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Snapshot.h>
 #include <palpate/SpatialQueries.h>
+#include <palpate/ThreadTopology.h>
 
 #include <memory>
 
@@ -22,6 +23,9 @@ struct palpate_snapshot {
 struct palpate_field {
   std::shared_ptr<const palpate::DistanceField> field;
 };
+struct palpate_topology {
+  palpate::ThreadTopology topology;
+};
 
 namespace palpate::c {
 
@@ -29,6 +33,12 @@ inline OctreeBasedCD& of(palpate_cd* cd) { return given(cd, "cd").cd; }
 inline const OctreeBasedCD& of(const palpate_cd* cd) { return given(cd, "cd").cd; }
 inline const SpatialQueries& of(const palpate_queries* queries) {
   return given(queries, "queries").queries;
+}
+inline ThreadTopology& of(palpate_topology* topology) {
+  return given(topology, "topology").topology;
+}
+inline const ThreadTopology& of(const palpate_topology* topology) {
+  return given(topology, "topology").topology;
 }
 inline const Snapshot& of(const palpate_snapshot* snapshot) {
   return *given(snapshot, "snapshot").snapshot;

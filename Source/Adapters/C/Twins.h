@@ -8,6 +8,7 @@
 #include <palpate/Meshes.h>
 #include <palpate/Settings.h>
 #include <palpate/SpatialQueries.h>
+#include <palpate/ThreadTopology.h>
 
 #include <algorithm>
 
@@ -93,6 +94,15 @@ PALPATE_SAME(palpate_crossing, kind, Crossing, kind);
 PALPATE_SAME(palpate_crossing, ids, Crossing, ids);
 PALPATE_SAME(palpate_crossing, time, Crossing, time);
 PALPATE_SAME(palpate_crossing, forward, Crossing, forward);
+
+PALPATE_TWIN(palpate_thread_event, ThreadEvent);
+PALPATE_SAME(palpate_thread_event, index, ThreadEvent, index);
+PALPATE_SAME(palpate_thread_event, step, ThreadEvent, step);
+PALPATE_SAME(palpate_thread_event, cause, ThreadEvent, cause);
+PALPATE_SAME(palpate_thread_event, change, ThreadEvent, change);
+PALPATE_SAME(palpate_thread_event, thread, ThreadEvent, thread);
+PALPATE_SAME(palpate_thread_event, loop, ThreadEvent, loop);
+PALPATE_SAME(palpate_thread_event, time, ThreadEvent, time);
 
 PALPATE_TWIN(palpate_unfinished_pair, UnfinishedPair);
 PALPATE_SAME(palpate_unfinished_pair, a, UnfinishedPair, a);

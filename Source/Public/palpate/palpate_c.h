@@ -74,6 +74,7 @@ typedef struct palpate_cd palpate_cd;              ///< OctreeBasedCD
 typedef struct palpate_queries palpate_queries;    ///< SpatialQueries
 typedef struct palpate_snapshot palpate_snapshot;  ///< a reference to a Snapshot
 typedef struct palpate_field palpate_field;        ///< a reference to a DistanceField
+typedef struct palpate_topology palpate_topology;  ///< ThreadTopology
 
 // Settings
 
@@ -533,6 +534,51 @@ PALPATE_EXPORT palpate_status palpate_set_remembered_sides(palpate_cd* cd, palpa
                                                            palpate_id b,
                                                            const palpate_crossing* sides,
                                                            size_t count);
+
+// Stitches and knots. <palpate/ThreadTopology.h>
+
+enum {
+  PALPATE_PASSED,
+  PALPATE_END_PASSED,
+  PALPATE_SET,
+  PALPATE_CUT,
+  PALPATE_DISABLED
+};  ///< ThreadEvent::Cause
+
+typedef struct palpate_thread_event {
+  size_t index;
+  uint64_t step;
+  int cause;           ///< PALPATE_PASSED and following
+  int change;          ///< of the count
+  uint32_t thread[2];  ///< an edge, twice an end, or PALPATE_NO_ELEMENT
+  uint32_t loop[2];    ///< a side or the second edge, or PALPATE_NO_ELEMENT
+  double time;         ///< [0, 1] of the step
+} palpate_thread_event;
+
+/// Destroy it with palpate_destroy_topology(), before or after the palpate_cd. Calls without const
+/// change it, and read the palpate_cd.
+PALPATE_EXPORT palpate_status palpate_create_topology(palpate_cd* cd, palpate_topology** topology);
+PALPATE_EXPORT void palpate_destroy_topology(palpate_topology* topology);  ///< null: does nothing
+/// ThreadTopology::add().
+PALPATE_EXPORT palpate_status palpate_watch_loop(palpate_topology* topology, palpate_id thread,
+                                                 const uint32_t* vertices, size_t count,
+                                                 palpate_id loop, const uint32_t* loop_vertices,
+                                                 size_t loop_count, size_t* index);
+/// ThreadTopology::addParts().
+PALPATE_EXPORT palpate_status palpate_watch_parts(palpate_topology* topology, palpate_id first,
+                                                  const uint32_t* vertices, size_t count,
+                                                  palpate_id second,
+                                                  const uint32_t* second_vertices,
+                                                  size_t second_count, size_t* index);
+PALPATE_EXPORT palpate_status palpate_update_topology(palpate_topology* topology);
+/// is_lost: may be null.
+PALPATE_EXPORT palpate_status palpate_get_thread_count(const palpate_topology* topology,
+                                                       size_t index, int* count, uint8_t* is_lost);
+/// A view, until the topology is updated, cleared or destroyed.
+PALPATE_EXPORT palpate_status palpate_get_thread_events(const palpate_topology* topology,
+                                                        const palpate_thread_event** events,
+                                                        size_t* count);
+PALPATE_EXPORT palpate_status palpate_clear_thread_events(palpate_topology* topology);
 
 /// Bytes.
 typedef struct palpate_memory {

@@ -4,6 +4,7 @@
 
 #include <palpate/Meshes.h>
 #include <palpate/Snapshot.h>
+#include <palpate/ThreadTopology.h>
 #include <palpate/palpate_c.h>
 
 #include <gtest/gtest.h>
@@ -19,6 +20,7 @@ namespace palpate::testing {
 namespace {
 
 #define EXPECT_OK(call) EXPECT_EQ(call, PALPATE_OK) << palpate_last_error()
+#define ASSERT_OK(call) ASSERT_EQ(call, PALPATE_OK) << palpate_last_error()
 
 const double* flat(const std::vector<Vector3d>& positions) { return positions[0].data(); }
 template <std::size_t N>
@@ -879,6 +881,76 @@ TEST_F(CScene, FieldsAreThoseOfCpp) {
   EXPECT_OK(palpate_remove(m_cd, field));
   EXPECT_OK(palpate_capture(m_cd, (folder.path / "Frame.txt").string().c_str()));
   EXPECT_EQ(folder.fileCount(), 2u);
+}
+
+TEST(CTopology, CountsAndEventsAreThoseOfCpp) {
+  constexpr double kHole[] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+  constexpr std::uint32_t kSides[] = {0, 1, 1, 2, 2, 3, 3, 0}, kVertices[] = {0, 1, 2, 3};
+  const auto threadAt = [](double x) { return std::array{x, 0.1, -1.0, x, 0.1, 1.0}; };
+  palpate_cd* cd = nullptr;
+  palpate_id hole, thread;
+  ASSERT_OK(palpate_create(nullptr, &cd));
+  ASSERT_OK(palpate_add_line_mesh(cd, kHole, 4, kSides, 4, nullptr, 0, &hole));
+  ASSERT_OK(palpate_add_line_mesh(cd, threadAt(3).data(), 2, kSides, 1, nullptr, 0, &thread));
+  palpate_topology* topology = nullptr;
+  std::size_t loop, parts;
+  ASSERT_OK(palpate_create_topology(cd, &topology));
+  ASSERT_OK(palpate_watch_loop(topology, thread, kVertices, 2, hole, kVertices, 4, &loop));
+  ASSERT_OK(palpate_watch_parts(topology, thread, kVertices, 2, hole, kVertices, 4, &parts));
+
+  OctreeBasedCD ofCpp;
+  const auto positionsOf = [](const auto& numbers) {
+    std::vector<Vector3d> positions;
+    for (std::size_t i = 0; i < std::size(numbers); i += 3)
+      positions.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+    return positions;
+  };
+  const GeometryId holeId = ofCpp.addLineMesh(positionsOf(kHole),
+                                              std::vector<Segment>{{0, 1}, {1, 2}, {2, 3}, {3, 0}}),
+                   threadId =
+                       ofCpp.addLineMesh(positionsOf(threadAt(3)), std::vector<Segment>{{0, 1}});
+  ThreadTopology same(ofCpp);
+  EXPECT_EQ(same.add({threadId, {0, 1}}, {holeId, {0, 1, 2, 3}}), loop);
+  EXPECT_EQ(same.addParts({threadId, {0, 1}}, {holeId, {0, 1, 2, 3}}), parts);
+
+  for (const double x : {0.0, -3.0, 0.5}) {
+    ASSERT_OK(palpate_advance(cd));
+    ASSERT_OK(palpate_set_positions(cd, thread, threadAt(x).data(), 2));
+    ASSERT_OK(palpate_update_topology(topology));
+    ofCpp.advance();
+    ofCpp.setPositions(threadId, positionsOf(threadAt(x)));
+    same.update();
+    for (const std::size_t index : {loop, parts}) {
+      int count;
+      std::uint8_t isLost;
+      ASSERT_OK(palpate_get_thread_count(topology, index, &count, &isLost));
+      EXPECT_EQ(count, same.count(index));
+      EXPECT_EQ(isLost, 0);
+    }
+  }
+  const palpate_thread_event* events;
+  std::size_t count;
+  ASSERT_OK(palpate_get_thread_events(topology, &events, &count));
+  ASSERT_EQ(count, same.events().size());
+  EXPECT_GT(count, 4u);
+  EXPECT_EQ(std::memcmp(events, same.events().data(), count * sizeof *events), 0);
+  int none;
+  EXPECT_EQ(palpate_get_thread_count(topology, 9, &none, nullptr), PALPATE_INDEX_OUT_OF_RANGE);
+  ASSERT_OK(palpate_clear_thread_events(topology));
+  ASSERT_OK(palpate_get_thread_events(topology, &events, &count));
+  EXPECT_EQ(count, 0u);
+  ASSERT_OK(palpate_set_disabled_elements(cd, thread, kVertices, 1));
+  ASSERT_OK(palpate_update_topology(topology));
+  int counted;
+  std::uint8_t isLost;
+  ASSERT_OK(palpate_get_thread_count(topology, loop, &counted, &isLost));
+  EXPECT_EQ(isLost, 1);
+  ASSERT_OK(palpate_get_thread_events(topology, &events, &count));
+  ASSERT_EQ(count, 2u);
+  EXPECT_EQ(events[0].cause, PALPATE_DISABLED);
+  palpate_destroy(cd);
+  EXPECT_EQ(palpate_update_topology(topology), PALPATE_INVALID_CALL);
+  palpate_destroy_topology(topology);
 }
 
 TEST(CMeshes, WeldedMeshesAndDefectsAreThoseOfCpp) {

@@ -236,6 +236,11 @@ TEST_F(CMisuse, NullIsRefused) {
   const palpate_side* side = &sideValue;
   const palpate_contact_key key{};
   const palpate_crossing* crossings = nullptr;
+  palpate_topology* t = nullptr;
+  const palpate_thread_event* events = nullptr;
+  int number = 0;
+  ASSERT_EQ(palpate_create_topology(cd, &t), PALPATE_OK);
+  ASSERT_EQ(palpate_watch_loop(t, a, e, 3, b, e, 3, count), PALPATE_OK);
   const std::vector<std::function<palpate_status()>> calls{
       [&] { return palpate_create(nullptr, nullptr); },
       [&] { return palpate_init_settings(nullptr, sizeof(palpate_settings)); },
@@ -341,6 +346,23 @@ TEST_F(CMisuse, NullIsRefused) {
       [&] { return palpate_get_crossings(nullptr, a, b, &crossings, count); },
       [&] { return palpate_get_crossings(cd, a, b, nullptr, count); },
       [&] { return palpate_get_crossings(cd, a, b, &crossings, nullptr); },
+      [&] { return palpate_create_topology(nullptr, &t); },
+      [&] { return palpate_create_topology(cd, nullptr); },
+      [&] { return palpate_watch_loop(nullptr, a, e, 3, b, e, 3, count); },
+      [&] { return palpate_watch_loop(t, a, nullptr, 3, b, e, 3, count); },
+      [&] { return palpate_watch_loop(t, a, e, 3, b, nullptr, 3, count); },
+      [&] { return palpate_watch_loop(t, a, e, 3, b, e, 3, nullptr); },
+      [&] { return palpate_watch_parts(nullptr, a, e, 3, b, e, 3, count); },
+      [&] { return palpate_watch_parts(t, a, nullptr, 3, b, e, 3, count); },
+      [&] { return palpate_watch_parts(t, a, e, 3, b, nullptr, 3, count); },
+      [&] { return palpate_watch_parts(t, a, e, 3, b, e, 3, nullptr); },
+      [&] { return palpate_update_topology(nullptr); },
+      [&] { return palpate_get_thread_count(nullptr, 0, &number, flag); },
+      [&] { return palpate_get_thread_count(t, 0, nullptr, flag); },
+      [&] { return palpate_get_thread_events(nullptr, &events, count); },
+      [&] { return palpate_get_thread_events(t, nullptr, count); },
+      [&] { return palpate_get_thread_events(t, &events, nullptr); },
+      [&] { return palpate_clear_thread_events(nullptr); },
       [&] { return palpate_get_smooth_normals(nullptr, a, b, 0, view, count); },
       [&] { return palpate_get_smooth_normals(cd, a, b, 0, nullptr, count); },
       [&] { return palpate_get_smooth_normals(cd, a, b, 0, view, nullptr); },
@@ -422,6 +444,8 @@ TEST_F(CMisuse, NullIsRefused) {
         << "call " << i << ": " << message;
   }
   palpate_destroy(nullptr);
+  palpate_destroy_topology(t);
+  palpate_destroy_topology(nullptr);
   palpate_destroy_queries(nullptr);
   palpate_release_snapshot(nullptr);
   palpate_release_field(nullptr);
