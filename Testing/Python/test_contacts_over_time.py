@@ -147,3 +147,38 @@ def test_advance_calls_a_predicate_of_python():
     collisions.advance()
     (side,) = collisions.problem().pairs[0].sides
     assert side.ids[0] == 1
+
+
+def test_a_stitch_and_two_parts_of_threads() -> None:
+    hole = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+    thread = np.array([[3, 0.1, -1], [3, 0.1, 1.0]])
+    collisions = palpate.OctreeBasedCD()
+    loop_id = collisions.add_line_mesh(hole, [[0, 1], [1, 2], [2, 3], [3, 0]])
+    thread_id = collisions.add_line_mesh(thread, [[0, 1]])
+    topology = palpate.ThreadTopology(collisions)
+    stitch = topology.add((thread_id, [0, 1]), (loop_id, [0, 1, 2, 3]))
+    parts = topology.add_parts((thread_id, [0, 1]), (loop_id, [0, 1, 2, 3]))
+    counts = []
+    for x in (0.0, -3.0):
+        collisions.advance()
+        collisions.set_positions(thread_id, thread - [3 - x, 0, 0])
+        topology.update()
+        counts.append((topology.count(stitch), topology.count(parts)))
+    assert counts == [(1, 1), (0, 1)]  # the last side of the loop is no edge of the second part
+    events = topology.events()
+    assert events["index"].tolist() == [stitch, parts, stitch]
+    assert (events["cause"] == palpate.ThreadEventCause.PASSED).all()
+    assert events["change"].tolist() == [1, 1, -1] and events["step"].tolist() == [1, 1, 2]
+    assert events["thread"].tolist() == [[0, 1]] * 3
+    assert events["loop"].tolist() == [[1, 2], [1, 2], [3, 0]]
+    assert events["time"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+    topology.clear()
+    collisions.set_disabled_elements(thread_id, [0])
+    topology.update()
+    assert topology.is_lost(stitch) and topology.count(stitch) == 0
+    assert topology.events()["cause"].tolist() == [palpate.ThreadEventCause.DISABLED] * 2
+    with pytest.raises(palpate.Error) as caught:
+        topology.count(2)
+    assert caught.value.code is palpate.ErrorCode.INDEX_OUT_OF_RANGE
+    with pytest.raises(TypeError, match="geometry, vertices"):
+        topology.add(thread_id, (loop_id, [0, 1, 2]))

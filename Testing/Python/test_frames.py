@@ -203,6 +203,7 @@ def test_representations_tell_what_a_thing_is():
             scene.collisions.problem().geometries[0],
             scene.collisions.problem().pairs[0],
             palpate.StepGuard(scene.collisions),
+            palpate.ThreadTopology(scene.collisions),
             palpate.RigidMesh(BLADE, BLADE_TRIANGLES),
             palpate.PenetrationTracker(0, 1),
             palpate.make_thread_pool(1),

@@ -109,6 +109,16 @@ def test_queries_and_guards_keep_the_object_alive():
     assert caught.value.code is palpate.ErrorCode.INVALID_CALL
 
 
+def test_a_topology_keeps_the_object_alive():
+    scene = Cut()
+    topology = palpate.ThreadTopology(scene.collisions)
+    index = topology.add((scene.blade, [0, 1]), (scene.organ, [0, 1, 2]))
+    del scene
+    gc.collect()
+    topology.update()
+    assert not topology.is_lost(index)
+
+
 def test_snapshots_outlive_the_object():
     scene = Cut()
     scene.collisions.publish(2.5)

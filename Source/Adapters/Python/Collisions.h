@@ -140,6 +140,7 @@ void addBodies(py::module_& module, py::class_<Queries>& queries);
 void addFields(py::module_& module);
 void addSnapshots(py::module_& module, CollisionsClass& collisions);
 void addStepGuard(py::module_& module);
+void addThreadTopology(py::module_& module);
 void addCapture(py::module_& module, CollisionsClass& collisions);
 void addFunctions(py::module_& module);
 void addMeshFiles(py::module_& module);

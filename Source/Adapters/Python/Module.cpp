@@ -70,6 +70,7 @@ Threads   frames and batches of queries release the GIL. While a call that chang
   addQueries(module);
   addSnapshots(module, collisions);
   addStepGuard(module);
+  addThreadTopology(module);
   addCapture(module, collisions);
   addFunctions(module);
   addMeshFiles(module);

@@ -9,6 +9,7 @@
 #include <palpate/PenetrationTracker.h>
 #include <palpate/SpatialQueries.h>
 #include <palpate/StepGuard.h>
+#include <palpate/ThreadTopology.h>
 
 #include <cstring>
 #include <functional>
@@ -143,6 +144,14 @@ template <>
 inline constexpr auto kFields<HeldVertex> = std::tuple(field("geometry", &HeldVertex::geometry),
                                                        field("vertex", &HeldVertex::vertex),
                                                        field("fraction", &HeldVertex::fraction));
+template <>
+inline constexpr auto kFields<ThreadEvent> = std::tuple(field("index", &ThreadEvent::index),
+                                                        field("step", &ThreadEvent::step),
+                                                        field("cause", &ThreadEvent::cause),
+                                                        field("change", &ThreadEvent::change),
+                                                        field("thread", &ThreadEvent::thread),
+                                                        field("loop", &ThreadEvent::loop),
+                                                        field("time", &ThreadEvent::time));
 template <>
 inline constexpr auto kFields<VertexTriangleDistance> =
     std::tuple(field("weights", &VertexTriangleDistance::weights),

@@ -31,6 +31,7 @@ from palpate._enums import (
     OctreeUpdate,
     ShapeElement,
     Sidedness,
+    ThreadEventCause,
     TriangleFeature,
 )
 from palpate._errors import Error
@@ -53,6 +54,7 @@ from palpate._palpate import (
     Snapshot,
     SpatialQueries,
     StepGuard,
+    ThreadTopology,
     capture,
     detect_collision,
     edge_edge_distance,
@@ -191,6 +193,8 @@ __all__ = [
     "StepGuard",
     "SurfaceProxySettings",
     "TetrahedralSurface",
+    "ThreadEventCause",
+    "ThreadTopology",
     "TriangleFeature",
     "UnfinishedPair",
     "Validity",

@@ -90,6 +90,16 @@ class ContactEnd(_Named):
     APART = 4
 
 
+class ThreadEventCause(_Named):
+    """Why a count of ThreadTopology changed."""
+
+    PASSED = 0
+    END_PASSED = 1
+    SET = 2
+    CUT = 3
+    DISABLED = 4
+
+
 class ContactFeaturesKind(_Named):
     """The features that a contact predicate receives."""
 
