@@ -384,7 +384,7 @@ TEST(AllocationFailureOfThreadTopology, LeavesItUnchanged) {
   const Positions hole{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   const auto threadAt = [](double x) { return Positions{{x, 0.1, -1}, {x, 0.1, 1}}; };
   const std::vector<std::uint32_t> rim{0, 1, 2, 3}, ends{0, 1};
-  using Words = std::vector<std::int64_t>;
+  using Numbers = std::vector<std::int64_t>;
   std::size_t failures = 0;
   const auto run = [&](std::size_t n) {
     OctreeBasedCD collisions;
@@ -394,15 +394,16 @@ TEST(AllocationFailureOfThreadTopology, LeavesItUnchanged) {
     ThreadTopology topology(collisions);
     std::size_t watches = 0;
     const auto state = [&] {
-      Words words;
+      Numbers numbers;
       for (std::size_t i = 0; i < watches; ++i)
-        words.insert(words.end(), {topology.count(i), topology.isLost(i)});
+        numbers.insert(numbers.end(), {topology.count(i), topology.isLost(i)});
       for (const ThreadEvent& e : topology.events())
-        words.insert(words.end(), {static_cast<int>(e.cause), e.change, e.thread[0], e.loop[0]});
-      return words;
+        numbers.insert(numbers.end(),
+                       {static_cast<int>(e.cause), e.change, e.thread[0], e.loop[0]});
+      return numbers;
     };
     const auto attempt = [&](auto&& call) {
-      const Words before = state();
+      const Numbers before = state();
       if (FailingAllocation::throwsAt(n, call)) {
         ++failures;
         EXPECT_EQ(state(), before) << n;
@@ -414,17 +415,17 @@ TEST(AllocationFailureOfThreadTopology, LeavesItUnchanged) {
     ++watches;
     attempt([&] { EXPECT_EQ(topology.addParts(threadPath, loopPath), watches); });
     ++watches;
-    Words all;
+    Numbers all;
     for (const double x : {3.0, 0.5, -3.0}) {
       collisions.advance();
       collisions.setPositions(thread, threadAt(x));
       attempt([&] { topology.update(); });
-      const Words words = state();
-      all.insert(all.end(), words.begin(), words.end());
+      const Numbers numbers = state();
+      all.insert(all.end(), numbers.begin(), numbers.end());
     }
     return all;
   };
-  const Words truth = run(1'000'000);
+  const Numbers truth = run(1'000'000);
   EXPECT_EQ(failures, 0u);
   EXPECT_GT(truth.size(), 30u);
   for (std::size_t n = 1, before = 1; failures != before; ++n) {
