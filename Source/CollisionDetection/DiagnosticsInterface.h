@@ -33,6 +33,8 @@ void detectVerticesByBruteForce(const PairRecord&, std::span<const std::uint32_t
 
 /// The complete input of a detection at this moment.
 CollisionProblem problemOf(const Settings&, const GeometryTable&, const PairTable&);
+/// The same of one geometry, without positions and transforms.
+CollisionProblem::Geometry problemOf(const Geometry&);
 
 /// The audit of one OctreeBasedCD over its life.
 struct AuditRecord {

@@ -32,6 +32,8 @@ class FreeMotionSearch {
             const Deadline* = nullptr);
   /// Makes what find() wrote the result.
   void commit(const GeometryTable&) noexcept;
+  /// The next find() searches again.
+  void forget() noexcept { m_known.clear(); }
 
  private:
   /// A pair, and the part of m_nodePairs that belongs to it.

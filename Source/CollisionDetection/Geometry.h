@@ -53,7 +53,10 @@ class GeometryMotion {
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
 struct Geometry : CountedObject {
-  explicit Geometry(GeometryId id) : body(id) {}
+  /// revisions: where the numbers of its revisions begin.
+  explicit Geometry(GeometryId id, Revision::Counter revisions = {}) : body(id), step(revisions) {
+    body.revisions.counter = revisions;
+  }
 
   Body body;
   CollisionFilter filter;

@@ -69,6 +69,51 @@ void checkShapeMayChange(const Geometry& geometry, const char* call) {
               geometry.body.id);
 }
 
+void checkName(const Body& body, const std::string& name) {
+  if (name.find('\0') != std::string::npos)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body) + ": the name has a null character, which would end messages",
+                body.id);
+}
+
+void checkFilter(const Geometry& geometry, const CollisionFilter& filter) {
+  const GeometryId id = geometry.body.id;
+  if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(geometry) + ": sidedness is " +
+                    std::to_string(static_cast<int>(filter.sidedness)) +
+                    "; it must be Both or Outer",
+                id);
+  if (filter.sidedness == Sidedness::Outer && !geometry.body.mesh.topology.hasFaces())
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(geometry) + " is " + nameOf(geometry.body.mesh.topology.type) +
+                    ", which has no sides",
+                id);
+}
+
+void checkElements(const Geometry& geometry, std::span<const std::uint32_t> elements) {
+  const std::size_t count = geometry.body.mesh.topology.elements.size();
+  for (const std::uint32_t element : elements)
+    if (element >= count)
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(geometry) + ": element " + std::to_string(element) +
+                      " is out of range; the geometry has " + std::to_string(count) + " elements",
+                  geometry.body.id, element);
+}
+
+void checkTags(const Body& body, std::size_t given) {
+  const bool isOne = body.shape || body.isField();
+  const std::size_t count = isOne        ? 1
+                            : body.solid ? body.solid->topology.tetrahedra.size()
+                                         : body.mesh.topology.elements.size();
+  if (given != 0 && given != count)
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(body) + ": " + std::to_string(given) + " tags given, but it has " +
+                    (isOne ? "1 element"
+                           : std::to_string(count) + (body.solid ? " tetrahedra" : " elements")),
+                body.id);
+}
+
 static void checkHasPositions(const Geometry& geometry) {
   if (geometry.body.shape)
     throw Error(ErrorCode::WrongPositionCount,

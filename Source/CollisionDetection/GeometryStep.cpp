@@ -223,6 +223,53 @@ void GeometryStep::restoreNow(TriangleMesh& mesh, PlacedShape* shape,
   if (shape) shape->now.place(shape->analytical, now.transform());  // into its own memory
 }
 
+GeometryStep::State GeometryStep::state(const TriangleMesh& mesh) const {
+  return {mesh.now, mesh.before, m_detected, m_isNew, m_bodyGiven, m_transformGiven};
+}
+
+Positions GeometryStep::positionsOf(const GeometryLabel& label, const TriangleMesh& mesh,
+                                    const SavedEnd& end, std::span<const Positions* const> others,
+                                    const Threads& threads) {
+  std::vector<const Positions*> known{&mesh.now, &m_detected, &mesh.before};
+  known.insert(known.end(), others.begin(), others.end());
+  Positions positions;
+  const auto same = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
+    return other->size() == end.body.size() &&
+           (end.body.empty() || std::memcmp(other->body().data(), end.body.data(),
+                                            end.body.size() * sizeof(Eigen::Vector3d)) == 0);
+  });
+  if (same != known.end()) {
+    positions.setBodyOf(**same);
+  } else {
+    auto body = std::make_shared<CountedVector<Eigen::Vector3d>>(end.body.size());
+    const auto bounds = checkPositions(label, end.body, body->data(), "", threads);
+    positions.setBody(std::move(body), bounds, m_revisions.next());
+  }
+  if (!end.pose) return positions;
+  if (const std::string fault = faultOf(*end.pose); !fault.empty())
+    throw Error(ErrorCode::InvalidTransform, nameOf(label) + ": " + fault, label.id);
+  const auto equal = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
+    return other->isPlaced() && haveSameBits(other->transform(), *end.pose);
+  });
+  if (equal != known.end())
+    positions.placeAs(**equal);
+  else
+    positions.place(*end.pose, m_revisions.next());
+  return positions;
+}
+
+void GeometryStep::restore(TriangleMesh& mesh, PlacedShape* shape, const State& state) noexcept {
+  mesh.now = state.now;
+  mesh.before = state.before;
+  m_detected = state.detected;
+  m_isNew = state.isNew;
+  m_bodyGiven = state.bodyGiven;
+  m_transformGiven = state.transformGiven;
+  if (!shape) return;
+  shape->now.place(shape->analytical, mesh.now.transform());  // into its own memory
+  shape->before.place(shape->analytical, mesh.before.transform());
+}
+
 void GeometryStep::advance(TriangleMesh& mesh, PlacedShape* shape) noexcept {
   // Both are placements of one shape, so that the assignment reuses the memory.
   if (shape && !mesh.before.isSameAs(mesh.now)) shape->before = shape->now;

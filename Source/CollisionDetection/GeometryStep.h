@@ -33,6 +33,8 @@ namespace palpate {
 /// Errors   a call that throws changes nothing.
 class GeometryStep {
  public:
+  explicit GeometryStep(Revision::Counter revisions = {}) : m_revisions(revisions) {}
+
   /// Positions of a new geometry or topology, at both ends.
   void start(TriangleMesh&, Positions::Body) noexcept;
   /// The shape of a new analytical geometry, not placed.
@@ -67,6 +69,24 @@ class GeometryStep {
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }
   bool isNew() const { return m_isNew; }
+
+  /// All on which the next calls depend.
+  struct State {
+    Positions now, before, detected;
+    bool isNew = true, bodyGiven = false, transformGiven = false;
+  };
+  State state(const TriangleMesh&) const;
+  /// An end of a saved state: positions in the body's frame, and the pose if it is placed.
+  struct SavedEnd {
+    std::span<const Eigen::Vector3d> body;
+    std::optional<Pose> pose;
+  };
+  /// Positions for restore(). What equals that of an end now, or of one in `others`, takes its
+  /// revision. Throws NonFinitePosition, InvalidTransform.
+  Positions positionsOf(const GeometryLabel&, const TriangleMesh&, const SavedEnd&,
+                        std::span<const Positions* const> others, const Threads&);
+  void restore(TriangleMesh&, PlacedShape*, const State&) noexcept;
+  Revision nextRevision() { return m_revisions.next(); }
 
  private:
   /// Positions are checked while they are copied into one of these that nothing else uses.

@@ -55,17 +55,6 @@ double shortEdge(const MeshTopology& topology, std::span<const Eigen::Vector3d> 
   return *place;
 }
 
-/// Of the surface triangles of a body whose tetrahedra have these.
-CountedVector<std::uint32_t> tagsOfSurface(const Solid& solid,
-                                           std::span<const std::uint32_t> tags) {
-  CountedVector<std::uint32_t> ofSurface;
-  if (tags.empty()) return ofSurface;
-  ofSurface.reserve(solid.topology.surfaceOwner.size());
-  for (const std::uint32_t owner : solid.topology.surfaceOwner)
-    ofSurface.push_back(owner == kNoElement ? 0 : tags[owner]);
-  return ofSurface;
-}
-
 }  // namespace
 
 /// L: how far the octree's boxes may lag behind the positions; 0: not at all.
@@ -86,7 +75,9 @@ GeometryId GeometryTable::nextId() const {
 
 std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> rest,
                                               MeshTopology topology) const {
-  auto geometry = std::make_unique<Geometry>(nextId());
+  constexpr int kOfOneTable = 40;  // bits of revisions between two calls of restore()
+  auto geometry =
+      std::make_unique<Geometry>(nextId(), Revision::Counter(m_restores << kOfOneTable));
   auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
   TriangleMesh& mesh = geometry->body.mesh;
   mesh.rest = std::move(rest);
@@ -154,18 +145,31 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
   return add(std::move(geometry));
 }
 
-GeometryId GeometryTable::add(const CutMesh& mesh) {
+GeometryId GeometryTable::add(const CollisionProblem::Geometry& given) {
   const GeometryId id = nextId();
-  CountedVector<Eigen::Vector3d> rest = checkedRest(id, mesh.positions);
-  checkCounts(id, mesh.positions, mesh.triangles, GeometryType::Triangles);
-  const auto removed = checkedRemoval(id, "triangle", mesh.triangles.size(), {}, mesh.removed);
-  MeshTopology topology(mesh.positions.size(), mesh.triangles, removed);
+  const std::vector<Eigen::Vector3d>& positions = given.rest.empty() ? given.now : given.rest;
+  if (given.type == GeometryType::Field) return add(given.field);
+  if (given.analytical) return add(*given.analytical);
+  if (given.radii.size() > 1) checkOnePerVertex(id, positions, given.radii);
+  if (given.type == GeometryType::Points) return addPoints(positions, given.radii);
+  if (given.type == GeometryType::Lines) {
+    std::vector<Segment> segments;
+    for (const auto& [p, q, _] : given.triangles) segments.push_back({p, q});
+    return addLines(positions, segments, given.radii);
+  }
+  if (given.removed.empty() && given.removedTetrahedra.empty())
+    return given.tetrahedra.empty() ? add(positions, std::span<const Triangle>(given.triangles))
+                                    : add(positions, given.tetrahedra);
+  CountedVector<Eigen::Vector3d> rest = checkedRest(id, positions);
+  checkCounts(id, positions, given.triangles, GeometryType::Triangles);
+  const auto removed = checkedRemoval(id, "triangle", given.triangles.size(), {}, given.removed);
+  MeshTopology topology(positions.size(), given.triangles, removed);
   std::unique_ptr<Solid> solid;
-  if (!mesh.tetrahedra.empty()) {
+  if (!given.tetrahedra.empty()) {
     solid = std::make_unique<Solid>();
     solid->topology = checkedTopology(
-        id, rest, mesh.tetrahedra,
-        checkedRemoval(id, "tetrahedron", mesh.tetrahedra.size(), {}, mesh.removedTetrahedra));
+        id, rest, given.tetrahedra,
+        checkedRemoval(id, "tetrahedron", given.tetrahedra.size(), {}, given.removedTetrahedra));
     if (keepSurfaceIds(topology.elements, solid->topology) != topology.removed ||
         solid->topology.surface != topology.elements)
       throw Error(ErrorCode::InvalidSettings,
@@ -450,7 +454,7 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
   cut.topology = cutTopology(
       surface, gone, std::span(cut.solid->topology.surface).subspan(surface.elements.size()),
       cut.rest.size());
-  cut.tags = tagsOfSurface(*cut.solid, cut.solid->tags);
+  cut.tags = tagsOfSurface(cut.solid->topology, cut.solid->tags);
   apply(std::move(cut), prepare);
   ++m_state;
   return ids;
@@ -484,25 +488,13 @@ void GeometryTable::apply(Cut cut, const Preparation& prepare) {
 
 void GeometryTable::setName(GeometryId id, std::string name) {
   Body& body = at(id).body;
-  if (name.find('\0') != std::string::npos)
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(body) + ": the name has a null character, which would end messages", id);
+  checkName(body, name);
   body.name = std::move(name);
 }
 
 void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
   Geometry& geometry = at(id);
-  if (filter.sidedness != Sidedness::Both && filter.sidedness != Sidedness::Outer)
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(geometry) + ": sidedness is " +
-                    std::to_string(static_cast<int>(filter.sidedness)) +
-                    "; it must be Both or Outer",
-                id);
-  if (filter.sidedness == Sidedness::Outer && !geometry.body.mesh.topology.hasFaces())
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(geometry) + " is " + nameOf(geometry.body.mesh.topology.type) +
-                    ", which has no sides",
-                id);
+  checkFilter(geometry, filter);
   geometry.filter = filter;
   geometry.body.mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
   geometry.body.revisions.filter = geometry.body.revisions.counter.next();
@@ -511,15 +503,8 @@ void GeometryTable::setFilter(GeometryId id, const CollisionFilter& filter) {
 void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> elements) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setDisabledElements()");
-  MeshTopology& topology = geometry.body.mesh.topology;
-  for (const std::uint32_t element : elements)
-    if (element >= topology.elements.size())
-      throw Error(ErrorCode::IndexOutOfRange,
-                  nameOf(geometry) + ": element " + std::to_string(element) +
-                      " is out of range; the geometry has " +
-                      std::to_string(topology.elements.size()) + " elements",
-                  id, element);
-  topology.disable(elements);
+  checkElements(geometry, elements);
+  geometry.body.mesh.topology.disable(elements);
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
   geometry.freeMotion.clear();
 }
@@ -527,20 +512,10 @@ void GeometryTable::setDisabled(GeometryId id, std::span<const std::uint32_t> el
 void GeometryTable::setTags(GeometryId id, std::span<const std::uint32_t> tags) {
   Geometry& geometry = at(id);
   Body& body = geometry.body;
-  const MeshTopology& topology = body.mesh.topology;
-  const bool isOne = body.shape || body.isField();
-  const std::size_t count = isOne        ? 1
-                            : body.solid ? body.solid->topology.tetrahedra.size()
-                                         : topology.elements.size();
-  if (!tags.empty() && tags.size() != count)
-    throw Error(ErrorCode::InvalidSettings,
-                nameOf(geometry) + ": " + std::to_string(tags.size()) + " tags given, but it has " +
-                    (isOne ? "1 element"
-                           : std::to_string(count) + (body.solid ? " tetrahedra" : " elements")),
-                id);
+  checkTags(body, tags.size());
   CountedVector<std::uint32_t> given(tags.begin(), tags.end());
   if (body.solid) {
-    CountedVector<std::uint32_t> ofSurface = tagsOfSurface(*body.solid, given);
+    CountedVector<std::uint32_t> ofSurface = tagsOfSurface(body.solid->topology, given);
     // Nothing below throws.
     body.solid->tags = std::move(given);
     given = std::move(ofSurface);

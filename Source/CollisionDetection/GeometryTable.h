@@ -1,5 +1,6 @@
 #pragma once
 
+#include <palpate/Capture.h>
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>
@@ -8,6 +9,7 @@
 #include "Core/Threads.h"
 #include "Core/Trace.h"
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -18,16 +20,23 @@
 
 namespace palpate {
 
-/// A mesh after cuts, with the ids that they left. Of a tetrahedral mesh, `triangles` is the
-/// surface.
-struct CutMesh {
-  std::span<const Eigen::Vector3d> positions;
-  std::span<const Triangle> triangles;
-  std::span<const std::uint32_t> removed;
-  std::span<const Tetrahedron> tetrahedra;
-  std::span<const std::uint32_t> removedTetrahedra;
+/// Adds geometries of a problem, also with the ids that cuts left.
+struct ProblemGeometries {
+  static GeometryId add(OctreeBasedCD&, const CollisionProblem::Geometry&);
+};
 
-  GeometryId addTo(OctreeBasedCD&) const;
+/// What a saved state has of a geometry.
+struct SavedGeometry {
+  /// Without a field and a proxy. Positions are in the body's frame.
+  CollisionProblem::Geometry problem;
+  std::optional<std::array<double, 2>> field{};  ///< error bound and band of the one that it has
+  std::optional<SurfaceProxySettings> proxy{};
+  std::array<std::optional<Pose>, 3> poses{};  ///< now, before, detected; none: not placed
+  bool isDetectedOther = false;                ///< its positions are neither those now nor before
+  bool isDetectedBefore = false;               ///< else: they are those before
+  std::vector<Eigen::Vector3d> detected{};     ///< with isDetectedOther
+  bool isNew = false, bodyGiven = false, transformGiven = false;
+  std::vector<double> freeMotion{};
 };
 
 /// Geometries by id. Checks the user's input.
@@ -40,7 +49,9 @@ class GeometryTable {
                       std::span<const double> radii);
   GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
   GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
-  GeometryId add(const CutMesh&);
+  /// At rest at its positions, without what is attached. Of a tetrahedral mesh after cuts,
+  /// `triangles` is the surface.
+  GeometryId add(const CollisionProblem::Geometry&);
   GeometryId add(const AnalyticalGeometry&);
   GeometryId add(std::shared_ptr<const DistanceField>);
   void attach(GeometryId, std::shared_ptr<const DistanceField>);  ///< null: detaches
@@ -77,6 +88,7 @@ class GeometryTable {
   /// Puts the positions and the transform now back to those of earlier in this step.
   void restoreNow(Geometry&, const Positions& now) noexcept;
   void advance() noexcept;
+  std::uint32_t lastId() const { return m_nextId; }          ///< ids are below it
   std::uint64_t stepNumber() const { return m_stepNumber; }  ///< counts advance()
   /// A number for the present state of all positions, transforms, elements and shapes; not 0.
   std::uint64_t state() const { return m_state; }
@@ -92,10 +104,32 @@ class GeometryTable {
 
   GeometryId nextId() const;  ///< of what is added next; throws if there are no more
 
+  /// A geometry of a saved state, checked. It is one of the table, which keeps what follows from
+  /// its elements, or a new one.
+  struct Restored {
+    Geometry* geometry = nullptr;
+    std::unique_ptr<Geometry> made{};
+    GeometryStep::State step{};
+    std::string name{};
+    CollisionFilter filter{};
+    CountedVector<std::uint32_t> tags{}, solidTags{};
+    std::optional<MeshTopology> topology{};  ///< where other elements are disabled
+    BodyRevisions revisions{};
+    Buffer<double> freeMotion{};
+    void apply() noexcept;  ///< all but `made`
+  };
+  /// Throws the errors of the calls that add and change geometries. NotAvailable if the table has
+  /// no such field.
+  Restored restored(const SavedGeometry&, const Threads&) const;
+  /// The table becomes that of a saved state. Call prepareToRestore() before.
+  void prepareToRestore(std::size_t count);
+  void restore(std::span<Restored>, std::uint32_t nextId, std::uint64_t stepNumber) noexcept;
+
  private:
   /// A geometry with its topology, and positions at both ends of the step; not yet in the table.
   std::unique_ptr<Geometry> make(CountedVector<Eigen::Vector3d> rest, MeshTopology) const;
   GeometryId add(std::unique_ptr<Geometry>);
+  std::unique_ptr<Geometry> make(const SavedGeometry&, const Threads&) const;
   static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
                           std::unique_ptr<Solid>, const Preparation&);
   struct Cut;
@@ -106,6 +140,8 @@ class GeometryTable {
   CountedVector<Geometry*> m_changed;
   bool m_wasUpdatedByOneThread = false;
   std::uint64_t m_stepNumber = 0, m_state = 1;
+  /// Counts restore(). Ids are then used again, so that revisions must differ from all before.
+  std::uint64_t m_restores = 0;
 };
 
 }  // namespace palpate

@@ -70,9 +70,10 @@ GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> po
   return all->withinLimit([&] { return all->geometries.add(positions, tetrahedra); });
 }
 
-GeometryId CutMesh::addTo(OctreeBasedCD& collisions) const {
+GeometryId ProblemGeometries::add(OctreeBasedCD& collisions,
+                                  const CollisionProblem::Geometry& geometry) {
   const OctreeBasedCD::Implementation::ChangeGuard all(collisions.m_implementation);
-  return all->withinLimit([&] { return all->geometries.add(*this); });
+  return all->withinLimit([&] { return all->geometries.add(geometry); });
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
@@ -475,6 +476,17 @@ void OctreeBasedCD::writeTrace(const std::filesystem::path& path) const {
   if (!all.trace)
     throw Error(ErrorCode::NotAvailable, "no frames are traced: Settings::traceFrames is 0");
   writeWholeFile(path, all.trace->json(), "the trace");
+}
+
+std::vector<std::byte> OctreeBasedCD::save() const {
+  const Implementation& all = read();
+  const auto lock = all.querySource->lockOctrees();  // because an update also chooses methods
+  return all.save();
+}
+
+void OctreeBasedCD::restore(std::span<const std::byte> state) {
+  const Implementation::ChangeGuard all(m_implementation);
+  all->withinLimit([&] { all->restore(state); });
 }
 
 std::span<const AuditFailure> OctreeBasedCD::auditFailures() const { return read().audit.failures; }

@@ -19,6 +19,7 @@
 #include "Core/Trace.h"
 
 #include <atomic>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -149,6 +150,9 @@ struct OctreeBasedCD::Implementation {
                     Trace*);
   /// records: all that had to be found, in the order of urgency.
   void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&);
+
+  std::vector<std::byte> save() const;
+  void restore(std::span<const std::byte>);
 
   /// Before a step ends: finds the crossings of pairs that changed since their last detection, for
   /// PairSettings::rememberSides. Results and statistics stay as they are.

@@ -237,6 +237,23 @@ void PairRecord::commitEmpty() noexcept {
   trust.forget();
 }
 
+void PairRecord::takeOver(PairRecord& former) noexcept {
+  PALPATE_ASSERT(a == former.a && b == former.b);
+  if (pair.settings.restDistance == former.pair.settings.restDistance)
+    nearAtRest = std::move(former.nearAtRest);
+  kept = std::move(former.kept);
+  keptElements = former.keptElements;
+  slowFrames = former.slowFrames;
+  recentSpeed = former.recentSpeed;
+  searchedCandidates = former.searchedCandidates;
+  pauseFrames = former.pauseFrames;
+  nextPause = former.nextPause;
+  fieldScratch = std::move(former.fieldScratch);
+  if (former.proxy && proxySettings == former.proxySettings && proxyVersion.isValid() &&
+      former.proxyVersion.isCurrent(proxyVersion.state()))
+    proxy = std::move(former.proxy);
+}
+
 namespace {
 
 std::uint64_t keyOf(GeometryId a, GeometryId b) {
@@ -280,8 +297,13 @@ void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings, const Threads& threads) {
   Geometry& first = geometries.at(a);
-  Geometry& second = geometries.at(b);
-  const SupportedPairs& support = checkPair(first, second, settings);
+  add(first, geometries.at(b), settings, first.body.isPlaced(), nullptr, threads);
+}
+
+PairRecord& PairTable::add(Geometry& first, Geometry& second, const PairSettings& settings,
+                           bool isPlaced, const PairRecord* former, const Threads& threads) {
+  const GeometryId a = first.body.id, b = second.body.id;
+  const SupportedPairs& support = checkPair(first, second, settings, isPlaced);
   if (m_byIds.contains(keyOf(a, b)))
     throw Error(ErrorCode::DuplicatePair,
                 nameOf(first, second) + " was added before; setPairSettings() changes its settings",
@@ -293,7 +315,8 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   record->support = &support;
   planWithoutMotion(*record);
   record->settingsRevision = m_revisions.next();
-  if (settings.restDistance > 0.0)
+  const bool takesOver = former && former->pair.settings.restDistance == settings.restDistance;
+  if (settings.restDistance > 0.0 && !takesOver)
     record->nearAtRest = verticesWithin(first.body.mesh.topology, first.body.mesh.rest,
                                         settings.restDistance, threads);
   record->index = m_records.size();
@@ -306,6 +329,18 @@ void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
   // Nothing below throws.
   m_pairs.push_back(record->pair);
   m_records.push_back(std::move(record));
+  return *m_records.back();
+}
+
+PairRecord* PairTable::find(GeometryId a, GeometryId b) const {
+  const auto found = m_byIds.find(keyOf(a, b));
+  return found != m_byIds.end() && found->second->pair.a == a ? found->second : nullptr;
+}
+
+PairTable PairTable::successor() const {
+  PairTable next;
+  next.m_revisions = m_revisions;
+  return next;
 }
 
 PairRecord& PairTable::at(const GeometryTable& geometries, GeometryId a, GeometryId b) const {

@@ -111,6 +111,9 @@ struct PairRecord : CountedObject {
 
   void releaseMemory();  ///< keeps the result
 
+  /// What `former` has derived and holds for this pair, too. Both are of the same geometries.
+  void takeOver(PairRecord& former) noexcept;
+
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
   /// ask for candidates.
   bool hasCandidates() const { return support->kind == PairKind::Meshes; }
@@ -170,6 +173,13 @@ struct PairRecord : CountedObject {
 class PairTable {
  public:
   void add(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
+  /// A pair of a saved state. isPlaced: of a. former: a pair of the same two geometries, from which
+  /// the new one will takeOver(), or null.
+  PairRecord& add(Geometry& a, Geometry& b, const PairSettings&, bool isPlaced,
+                  const PairRecord* former, const Threads&);
+  PairRecord* find(GeometryId a, GeometryId b) const;  ///< in this order; null if there is none
+  /// A table without pairs, whose revisions differ from all of this one.
+  PairTable successor() const;
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
   /// PairSettings::restDistance: the vertices that are near at rest, in a new topology of a
   /// geometry. Empty if no pair needs them. isCut: it differs from the topology now in a part, and

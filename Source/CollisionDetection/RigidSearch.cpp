@@ -48,15 +48,20 @@ class RigidSearch::Step {
   /// An upper bound of size(displacement) over all vertices, of a mesh those that its elements
   /// have, which alone are in the octree, or 0 without any: the largest value plus twice the slack
   /// for rounding errors. In a box of positions, size(displacement) is at most its value at the
-  /// centre plus, for each axis, growth(axis) times half the box's edge.
+  /// centre plus, for each axis, growth(axis) times half the box's edge. The result depends neither
+  /// on the octree nor on the vertex with which the search begins.
   template <class Size>
   double largest(std::uint32_t& vertex, const Vector3d& growth, Size&& size) {
     const std::span<const Vector3d> body = m_geometry.body.mesh.now.body();
     const auto sizeOf = [&](std::uint32_t v) { return size(m_now(body[v]) - m_before(body[v])); };
-    if (body.empty()) return 0.0;
-    if (vertex >= body.size()) vertex = 0;
-    constexpr double kNone = -std::numeric_limits<double>::infinity();
     const CountedVector<bool>& isUsed = m_geometry.body.mesh.topology.isUsed;
+    if (body.empty() || (!isUsed.empty() && m_geometry.body.mesh.topology.count() == 0)) return 0.0;
+    if (vertex >= body.size()) vertex = 0;
+    // Where the body does not turn about an axis that matters, all vertices move alike.
+    const Eigen::AlignedBox3d& bounds = m_geometry.body.mesh.now.bounds();
+    if (const double spread = growth.dot(0.5 * bounds.sizes()); spread <= m_slack)
+      return size(m_matrix * bounds.center() + m_vector) + spread + 2.0 * m_slack;
+    constexpr double kNone = -std::numeric_limits<double>::infinity();
     const auto counts = [&](std::uint32_t v) { return isUsed.empty() || isUsed[v]; };
     double best = counts(vertex) ? sizeOf(vertex) : kNone;
     const auto testOne = [&](std::uint32_t v) {
@@ -71,7 +76,7 @@ class RigidSearch::Step {
       if (!box) return true;
       const Vector3d centre = box->center() + tree.frame().origin;
       const double most = size(m_matrix * centre + m_vector) + growth.dot(0.5 * box->sizes());
-      return !(most <= best + m_slack);
+      return !(most + 2.0 * m_slack <= best);
     };
     if (tree.encloses(m_geometry.body.mesh, m_geometry.body.revisions.elements.topology)) {
       forEachOverlapping(tree.octree(), mayExceed, [&](std::uint32_t begin, std::uint32_t end) {

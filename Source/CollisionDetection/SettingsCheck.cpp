@@ -65,8 +65,8 @@ namespace {
 /// Checks the settings of a pair. Throws an Error that describes the fault.
 class PairCheck {
  public:
-  PairCheck(const Geometry& a, const Geometry& b, const PairSettings& settings)
-      : m_a(a), m_b(b), m_settings(settings), m_method(settings.method) {}
+  PairCheck(const Geometry& a, const Geometry& b, const PairSettings& settings, bool isPlaced)
+      : m_a(a), m_b(b), m_settings(settings), m_method(settings.method), m_isPlaced(isPlaced) {}
 
   const SupportedPairs& check() const {
     range();
@@ -151,7 +151,7 @@ class PairCheck {
   void shapes() const {
     const auto &a = m_a.body.shape, &b = m_b.body.shape;
     const bool self = &m_a == &m_b;
-    support(!self || a || !m_a.body.isPlaced(), kRigidWithItself);
+    support(!self || a || !m_isPlaced, kRigidWithItself);
     support(!self || !a, "a shape cannot be tested against itself");
     support(!a || !b || !a->now.isPlane() || !b->now.isPlane(),
             "a pair of two planes is not supported");
@@ -204,13 +204,14 @@ class PairCheck {
   const Geometry &m_a, &m_b;
   const PairSettings& m_settings;
   const Method m_method;
+  const bool m_isPlaced;
 };
 
 }  // namespace
 
-const SupportedPairs& checkPair(const Geometry& a, const Geometry& b,
-                                const PairSettings& settings) {
-  return PairCheck(a, b, settings).check();
+const SupportedPairs& checkPair(const Geometry& a, const Geometry& b, const PairSettings& settings,
+                                bool isPlaced) {
+  return PairCheck(a, b, settings, isPlaced).check();
 }
 
 }  // namespace palpate

@@ -13,7 +13,13 @@ const Settings& checked(const Settings&);
 
 /// Returns the row of the table of support by which a pair is answered. Throws UnsupportedMethod or
 /// InvalidSettings with the fault.
-const SupportedPairs& checkPair(const Geometry& a, const Geometry& b, const PairSettings&);
+/// isPlaced: of a.
+const SupportedPairs& checkPair(const Geometry& a, const Geometry& b, const PairSettings&,
+                                bool isPlaced);
+inline const SupportedPairs& checkPair(const Geometry& a, const Geometry& b,
+                                       const PairSettings& settings) {
+  return checkPair(a, b, settings, a.body.isPlaced());
+}
 
 /// Throws unless a pair by Method::DistanceField can do with this field of its body, or null.
 /// largestRadius: L, of the other geometry. named: the geometry of the error.

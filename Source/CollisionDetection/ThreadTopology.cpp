@@ -5,8 +5,10 @@
 #include "CollisionDetection/StepSource.h"
 #include "Tracking/LoopPassages.h"
 #include "Bodies/InputChecks.h"
+#include "Core/Archive.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <utility>
@@ -115,6 +117,37 @@ void copyVertices(const Geometry& geometry, const VertexPath& path,
     vertices.push_back({first | v, {mesh.before[v], mesh.now[v]}});
 }
 
+constexpr std::string_view kTopologyTitle = "palpate-threads";
+constexpr std::uint32_t kTopologyVersion = 1;
+
+template <class File>
+void describeWatch(File& file, Watch& watch) {
+  for (VertexPath* path : {&watch.thread, &watch.loop}) {
+    file.integer(path->geometry);
+    description::itemsOf(file, path->vertices, sizeof(std::uint32_t),
+                         [&](std::uint32_t& vertex) { file.integer(vertex); });
+    if constexpr (File::kReads)
+      file.need(path->vertices.size() >= (path == &watch.loop ? 3 : 2), "a path is too short");
+  }
+  for (int* count : {&watch.count, &watch.countBefore}) {
+    file.integer(*count);
+    if constexpr (File::kReads)
+      file.need(std::abs(std::int64_t{*count}) < 1 << 28, "a count is out of range");
+  }
+  for (bool* flag : {&watch.isLost, &watch.wasLost}) description::fieldOf(file, *flag);
+}
+
+template <class File>
+void describeEvent(File& file, ThreadEvent& event) {
+  file.integer(event.index);
+  file.integer(event.step);
+  description::enumeratorOf(file, event.cause, Cause::Disabled);
+  file.integer(event.change);
+  description::fieldOf(file, event.thread);
+  description::fieldOf(file, event.loop);
+  file.real(event.time);
+}
+
 }  // namespace
 
 struct ThreadTopology::Implementation {
@@ -131,6 +164,18 @@ struct ThreadTopology::Implementation {
   std::vector<int> nextCounts;
   std::vector<bool> nextLost;
 
+  template <class File>
+  void describe(File& file) {
+    description::itemsOf(file, watches, 32, [&](Watch& watch) { describeWatch(file, watch); });
+    description::itemsOf(file, events, 48, [&](ThreadEvent& event) { describeEvent(file, event); });
+    file.integer(eventsBefore);
+    description::optionalOf(file, step, [&](std::uint64_t& number) { file.integer(number); });
+    if constexpr (File::kReads)
+      file.need(eventsBefore <= events.size() &&
+                    std::all_of(events.begin(), events.end(),
+                                [&](const ThreadEvent& e) { return e.index < watches.size(); }),
+                "an event names a thread that does not exist");
+  }
   const Watch& at(std::size_t index) const {
     if (index >= watches.size())
       throw Error(ErrorCode::IndexOutOfRange, "ThreadTopology: index " + std::to_string(index) +
@@ -304,6 +349,21 @@ void ThreadTopology::clear() {
   Implementation& own = all();
   own.events.clear();
   own.eventsBefore = 0;
+}
+
+std::vector<std::byte> ThreadTopology::save() const {
+  ArchiveWriter file(kTopologyTitle, kTopologyVersion);
+  all().describe(file);
+  return file.bytes();
+}
+
+void ThreadTopology::restore(std::span<const std::byte> state) {
+  ArchiveReader file(state, "the saved state of threads", kTopologyTitle, kTopologyVersion);
+  Implementation restored;
+  restored.source = all().source;
+  restored.describe(file);
+  file.expectEnd();
+  *m_implementation = std::move(restored);
 }
 
 }  // namespace palpate

@@ -2,8 +2,8 @@
 
 #include "Diagnostics/Audit.h"
 #include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/ProblemDescription.h"
 #include "CollisionDetection/SettingsCheck.h"
-#include "Shapes/Shape.h"
 #include "Core/FloatingPoint.h"
 #include "Core/WholeFile.h"
 
@@ -17,7 +17,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <type_traits>
 #include <utility>
 #include <version>
 
@@ -26,24 +25,7 @@ namespace palpate {
 namespace {
 
 constexpr std::string_view kTitle = "palpate-capture";
-constexpr int kVersion = 14;
-
-// Enumerators are written by name. The names are in the order of the declarations.
-constexpr std::array<std::string_view, 6> kMethods{"Auto",       "Intersection",  "Proximity",
-                                                   "Continuous", "DistanceField", "Proxy"};
-constexpr std::array<std::string_view, 5> kGeometryTypes{"Triangles", "Lines", "Points", "Shape",
-                                                         "Field"};
-constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
-constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
-                                                  "Box",    "Cylinder", "ConvexHull"};
-constexpr std::array<std::string_view, 3> kPassages{"VertexTriangle", "TriangleVertex", "EdgeEdge"};
-constexpr std::array<std::string_view, 2> kContacts{"Distinct", "All"};
-// Before version 9, a third value of `contacts` stood for earliestTimeOnly.
-enum class ContactsBefore9 { Distinct, All, Earliest };
-constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "Earliest"};
-constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
-constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
-constexpr std::array<std::string_view, 3> kBounds{"Box", "Dop14", "Dop18"};
+using description::kVersion;
 
 /// For messages: long words are cut.
 std::string quoted(std::string_view text) {
@@ -56,6 +38,7 @@ std::string quoted(std::string_view text) {
 /// Writes a text of words. Line breaks are for human readers only.
 class Writer {
  public:
+  static constexpr bool kReads = false;
   void word(std::string_view text) { (m_text += text) += ' '; }
   template <class Enumerator, std::size_t size>
   void word(Enumerator value, const std::array<std::string_view, size>& names) {
@@ -101,6 +84,7 @@ bool isHexadecimal(std::string_view text, double& value) {
 /// Reads such a text. Throws Error (ErrorCode::File) that names the file and the line.
 class Reader {
  public:
+  static constexpr bool kReads = true;
   Reader(const std::filesystem::path& path, std::string text)
       : m_name("the capture \"" + path.string() + "\""), m_text(std::move(text)), m_rest(m_text) {}
 
@@ -162,232 +146,18 @@ class Reader {
   std::ptrdiff_t m_line = 1;
 };
 
-// Functions that write or read parts of a file: `file` is a Writer or a Reader.
-
-template <class File>
-constexpr bool kReads = std::is_same_v<File, Reader>;
-
-template <class File, class SettingsType>
-void settingsLine(File& file, SettingsType& settings, int version) {
-  file.word(settings.engine, kEngines);
-  file.integer(settings.threads);
-  file.integer(settings.octree.maxDepth);
-  file.integer(settings.octree.maxElementsPerLeaf);
-  file.word(settings.octree.update, kUpdates);
-  if (version >= 10) file.word(settings.octree.bounds, kBounds);
-}
-
-template <class File>
-void fieldOf(File& file, auto& value) {
-  using Value = std::decay_t<decltype(value)>;
-  if constexpr (std::is_same_v<Value, double>) {
-    file.real(value);
-  } else if constexpr (std::is_same_v<Value, bool>) {
-    int number = value;
-    file.integer(number);
-    if constexpr (kReads<File>) value = number != 0;
-  } else if constexpr (std::is_integral_v<Value>) {
-    file.integer(value);
-  } else {
-    for (auto& part : value) fieldOf(file, part);
-  }
-}
-
-// Least numbers of characters of items: a digit and a space for each number.
-constexpr std::size_t kNumberText = 2, kPointText = 3 * kNumberText, kVertexText = 2 * kPointText,
-                      kTriangleText = 3 * kNumberText, kTetrahedronText = 4 * kNumberText,
-                      kGeometryText = std::string_view("geometry 0 0 0 ").size(),
-                      kPairText = std::string_view("pair 0 0 Auto Auto 0 All ").size(),
-                      kSideText = std::string_view("EdgeEdge 0 0 0 0 0 ").size();
-
-/// The size of a list. A Reader resizes the list to it. least: characters of an item.
-template <class File>
-void sizeOf(File& file, auto& list, std::size_t least) {
-  std::size_t size = list.size();
-  file.count(size, least);
-  if constexpr (kReads<File>) list.resize(size);
-}
-
-template <class File>
-void listOf(File& file, auto& list) {
-  sizeOf(file, list, kNumberText);
-  fieldOf(file, list);
-}
-
-template <class File, class SettingsType>
-void contactsOf(File& file, SettingsType& settings, int version) {
-  if (version >= 9) return file.word(settings.contacts, kContacts);
-  if constexpr (kReads<File>) {
-    ContactsBefore9 contacts{};
-    file.word(contacts, kContactsBefore9);
-    settings.continuous.earliestTimeOnly = contacts == ContactsBefore9::Earliest;
-    settings.contacts = contacts == ContactsBefore9::All ? Contacts::All : PairSettings().contacts;
-  }
-}
-
-template <class File, class PairType>
-void pairLine(File& file, PairType& pair, int version) {
-  file.integer(pair.a);
-  file.integer(pair.b);
-  file.word(pair.settings.method, kMethods);
-  file.word(pair.method, kMethods);
-  file.real(pair.settings.thickness);
-  contactsOf(file, pair.settings, version);
-  if (version >= 2) file.real(pair.settings.automatic.motionTolerance);
-  if (version >= 3) file.real(pair.settings.restDistance);
-  if (version >= 4) fieldOf(file, pair.predicate);
-  if (version >= 6) file.real(pair.settings.continuous.timeTolerance);
-  if (version >= 9) fieldOf(file, pair.settings.continuous.earliestTimeOnly);
-  if (version >= 11) file.real(pair.settings.allowedError);
-  if (version >= 11) file.real(pair.settings.proxy.widestNormalCone);
-  if (version >= 12) file.real(pair.settings.freeMotionReach);
-  if (version >= 13) fieldOf(file, pair.settings.trackContacts);
-  if (version >= 13) fieldOf(file, pair.settings.reportCrossings);
-  if (version < 14) return;
-  file.integer(pair.settings.priority);
-  fieldOf(file, pair.settings.smoothNormals);
-  fieldOf(file, pair.settings.rememberSides);
-  sizeOf(file, pair.sides, kSideText);
-  for (auto& side : pair.sides) {
-    file.word(side.kind, kPassages);
-    fieldOf(file, side.ids);
-    fieldOf(file, side.forward);
-  }
-}
-
-template <class File, class FilterType>
-void filterOf(File& file, FilterType& filter) {
-  file.integer(filter.groups);
-  file.integer(filter.mask);
-  file.word(filter.sidedness, kSides);
-}
-
-/// A shape's dimensions, and its placements at both ends of the step.
-template <class File, class MeshType>
-void shapeOf(File& file, MeshType& mesh, int version) {
-  forEachField(*mesh.analytical, [&](std::string_view, auto& field) {
-    if constexpr (requires { field.capacity(); }) sizeOf(file, field, kPointText);
-    fieldOf(file, field);
-  });
-  const auto poseOf = [&](auto& pose) {
-    for (int k = 0; k < 3; ++k) {
-      for (int i = 0; i < 3; ++i) fieldOf(file, pose.rotation(k, i));
-      fieldOf(file, pose.translation[k]);
-    }
-  };
-  poseOf(mesh.motion.now);
-  if (version >= 7) return poseOf(mesh.motion.before);
-  if constexpr (kReads<File>) mesh.motion.before = mesh.motion.now;
-}
-
-/// A shape of the type with this index.
-template <std::size_t... indices>
-AnalyticalGeometry shapeOfType(std::size_t index, std::index_sequence<indices...>) {
-  AnalyticalGeometry shape;
-  (void)((index == indices && (shape.emplace<indices>(), true)) || ...);
-  return shape;
-}
-
-template <class File, class MeshType>
-void meshLines(File& file, MeshType& mesh, int version) {
-  file.expect("geometry");
-  auto id = static_cast<std::uint32_t>(mesh.id);
-  file.integer(id);
-  sizeOf(file, mesh.now, kVertexText);
-  sizeOf(file, mesh.triangles, kTriangleText);
-  if (version >= 3) {
-    file.word(mesh.type, kGeometryTypes);
-    listOf(file, mesh.radii);
-    if (mesh.type == GeometryType::Shape) {
-      std::size_t index = mesh.analytical ? mesh.analytical->index() : 0;
-      file.word(index, kShapes);
-      if constexpr (kReads<File>)
-        mesh.analytical = shapeOfType(index, std::make_index_sequence<kShapes.size()>());
-      shapeOf(file, mesh, version);
-    }
-  }
-  std::size_t rest = kReads<File> ? mesh.type == GeometryType::Lines : mesh.rest.size();
-  if (version >= 4) {
-    filterOf(file, mesh.filter);
-    listOf(file, mesh.disabled);
-    file.count(rest, kNumberText);
-  }
-  if (version >= 8) sizeOf(file, mesh.tetrahedra, kTetrahedronText);
-  if (version >= 14)
-    for (auto* list : {&mesh.tags, &mesh.removed, &mesh.removedTetrahedra}) listOf(file, *list);
-  file.endLine();
-  if constexpr (kReads<File>) {
-    mesh.id = GeometryId{id};
-    mesh.before.resize(mesh.now.size());
-    mesh.rest.resize(rest ? mesh.now.size() : 0);
-  }
-  for (std::size_t v = 0; v < mesh.now.size(); ++v) {
-    fieldOf(file, mesh.before.at(v));
-    fieldOf(file, mesh.now[v]);
-    if (rest) fieldOf(file, mesh.rest.at(v));
-    file.endLine();
-  }
-  const auto elements = [&](auto& list) {
-    for (auto& element : list) {
-      fieldOf(file, element);
-      file.endLine();
-    }
-  };
-  elements(mesh.triangles);
-  elements(mesh.tetrahedra);
-}
-
-/// All lines except the title.
-template <class File, class ProblemType>
-void problemLines(File& file, ProblemType& problem, int version) {
-  settingsLine(file, problem.settings, version);
-  file.endLine();
-  sizeOf(file, problem.geometries, kGeometryText);
-  sizeOf(file, problem.pairs, kPairText);
-  file.endLine();
-  for (auto& mesh : problem.geometries) meshLines(file, mesh, version);
-  for (auto& pair : problem.pairs) {
-    file.expect("pair");
-    pairLine(file, pair, version);
-    file.endLine();
-  }
-  file.expect("end");
-  file.endLine();
-}
-
 std::string textOf(const CollisionProblem& problem) {
   Writer file;
   file.word(kTitle);
   file.integer(kVersion);
   file.endLine();
-  problemLines(file, problem, kVersion);
+  description::problemLines(file, problem, kVersion);
   return file.text();
-}
-
-GeometryId add(OctreeBasedCD& detection, const CollisionProblem::Geometry& mesh) {
-  if (mesh.type == GeometryType::Field) return detection.addDistanceField(mesh.field);
-  if (mesh.analytical) return detection.addAnalyticalGeometry(*mesh.analytical);
-  const std::vector<Eigen::Vector3d>& rest = mesh.rest.empty() ? mesh.now : mesh.rest;
-  if (mesh.type == GeometryType::Triangles &&
-      !(mesh.removed.empty() && mesh.removedTetrahedra.empty()))
-    return CutMesh{rest, mesh.triangles, mesh.removed, mesh.tetrahedra, mesh.removedTetrahedra}
-        .addTo(detection);
-  if (!mesh.tetrahedra.empty()) return detection.addTetrahedralMesh(rest, mesh.tetrahedra);
-  if (mesh.type == GeometryType::Triangles) return detection.addTriangleMesh(rest, mesh.triangles);
-  const bool one = mesh.radii.size() <= 1;
-  const double radius = one && !mesh.radii.empty() ? mesh.radii.front() : 0.0;
-  if (mesh.type == GeometryType::Points)
-    return one ? detection.addPointSet(mesh.now, radius)
-               : detection.addPointSet(mesh.now, mesh.radii);
-  std::vector<Segment> segments;
-  for (const auto& [p, q, _] : mesh.triangles) segments.push_back({p, q});
-  return one ? detection.addLineMesh(rest, segments, radius)
-             : detection.addLineMesh(rest, segments, mesh.radii);
 }
 
 void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
   for (const CollisionProblem::Geometry& mesh : problem.geometries) {
-    const GeometryId id = add(detection, mesh);
+    const GeometryId id = ProblemGeometries::add(detection, mesh);
     const bool isField = mesh.type == GeometryType::Field;
     if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
     if (mesh.analytical || mesh.field || mesh.proxy)
@@ -452,7 +222,7 @@ CollisionProblem readCapture(const std::filesystem::path& path) {
     file.failWhole("its version is " + std::to_string(version) + "; versions up to " +
                    std::to_string(kVersion) + " can be read");
   CollisionProblem problem;
-  problemLines(file, problem, version);
+  description::problemLines(file, problem, version);
   if (version == 1)  // Auto then stood for the one method in pair.method
     for (CollisionProblem::Pair& pair : problem.pairs) pair.settings.method = pair.method;
   file.expectEnd();

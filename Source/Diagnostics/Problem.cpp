@@ -16,6 +16,22 @@ void copyTo(std::vector<T>& out, std::span<const T> from) {
 
 CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   const TriangleMesh& mesh = geometry.body.mesh;
+  CollisionProblem::Geometry copy = problemOf(geometry);
+  if (geometry.isShapeFixed()) {
+    copyTo(copy.before, mesh.before.body());
+    copyTo(copy.now, mesh.now.body());
+  } else if (!geometry.body.shape) {
+    copy.before = mesh.before.all(), copy.now = mesh.now.all();
+  }
+  copy.motion = {mesh.before.transform(), mesh.now.transform()};
+  if (geometry.body.solid) copyTo<Eigen::Vector3d>(copy.rest, mesh.rest);
+  return copy;
+}
+
+}  // namespace
+
+CollisionProblem::Geometry problemOf(const Geometry& geometry) {
+  const TriangleMesh& mesh = geometry.body.mesh;
   CollisionProblem::Geometry copy;
   copy.id = geometry.body.id;
   copy.name = geometry.body.name;
@@ -28,23 +44,14 @@ CollisionProblem::Geometry meshOf(const Geometry& geometry) {
   if (geometry.body.shape) copy.analytical = geometry.body.shape->analytical;
   copy.field = geometry.body.field;
   if (geometry.proxy) copy.proxy = geometry.proxySettings;
-  if (geometry.isShapeFixed()) {
-    copyTo(copy.before, mesh.before.body());
-    copyTo(copy.now, mesh.now.body());
-  } else if (!geometry.body.shape)
-    copy.before = mesh.before.all(), copy.now = mesh.now.all();
-  copy.motion = {mesh.before.transform(), mesh.now.transform()};
   if (copy.type != GeometryType::Points) copyTo<Triangle>(copy.triangles, mesh.topology.elements);
   if (copy.radii.empty() && mesh.largestRadius > 0.0) copy.radii = {mesh.largestRadius};
   if (geometry.body.solid) {
     copyTo<Tetrahedron>(copy.tetrahedra, geometry.body.solid->topology.tetrahedra);
     copyTo<std::uint32_t>(copy.removedTetrahedra, geometry.body.solid->topology.removed);
-    copyTo<Eigen::Vector3d>(copy.rest, mesh.rest);
   }
   return copy;
 }
-
-}  // namespace
 
 CollisionProblem problemOf(const Settings& settings, const GeometryTable& geometries,
                            const PairTable& pairs) {

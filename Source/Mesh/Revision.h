@@ -19,6 +19,8 @@ class Revision {
 /// Creates revisions, each of them once. Revisions of different counters are not comparable.
 class Revision::Counter {
  public:
+  Counter() = default;
+  explicit Counter(std::uint64_t last) : m_last(last) {}  ///< begins above this number
   Revision next() { return Revision(++m_last); }
 
  private:

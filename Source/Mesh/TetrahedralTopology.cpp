@@ -149,4 +149,14 @@ CountedVector<std::uint32_t> keepSurfaceIds(std::span<const Triangle> ids,
   return without;
 }
 
+CountedVector<std::uint32_t> tagsOfSurface(const TetrahedralTopology& topology,
+                                           std::span<const std::uint32_t> tags) {
+  CountedVector<std::uint32_t> ofSurface;
+  if (tags.empty()) return ofSurface;
+  ofSurface.reserve(topology.surfaceOwner.size());
+  for (const std::uint32_t owner : topology.surfaceOwner)
+    ofSurface.push_back(owner == kNoElement ? 0 : tags[owner]);
+  return ofSurface;
+}
+
 }  // namespace palpate

@@ -58,4 +58,8 @@ TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
 CountedVector<std::uint32_t> keepSurfaceIds(std::span<const Triangle> ids,
                                             TetrahedralTopology& topology);
 
+/// Of the surface triangles, where the tetrahedra have these tags, or none.
+CountedVector<std::uint32_t> tagsOfSurface(const TetrahedralTopology&,
+                                           std::span<const std::uint32_t> tags);
+
 }  // namespace palpate

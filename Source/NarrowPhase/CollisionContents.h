@@ -38,6 +38,7 @@ struct CollisionData::Contents : CountedObject {
   } smooth{};
   CountedVector<Crossing> rememberedSides{};
 
+  static bool isIn(const CollisionData& data) { return data.m_contents != nullptr; }
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {
     if (!data.m_contents) data.m_contents = std::make_unique<Contents>();

@@ -168,6 +168,12 @@ SnapshotPool::SnapshotPool(std::shared_ptr<MemoryBudget> budget)
     : m_scratch(std::make_shared<SpatialQueries::Source::Pool>(std::move(budget))) {}
 SnapshotPool::~SnapshotPool() = default;
 
+std::shared_ptr<SnapshotPool> SnapshotPool::successor(std::shared_ptr<MemoryBudget> budget) const {
+  auto next = std::make_shared<SnapshotPool>(std::move(budget));
+  next->m_last = m_last;
+  return next;
+}
+
 /// Takes back the copies of free slots.
 void SnapshotPool::reclaim() {
   for (const auto& slot : m_slots) {

@@ -51,6 +51,8 @@ class SnapshotPool : public std::enable_shared_from_this<SnapshotPool> {
   std::shared_ptr<const Snapshot> take(SpatialQueries::Source&, double time);
   /// Gives back the memory of snapshots that nobody holds, and what queries keep.
   void releaseMemory();
+  /// A pool without snapshots, which counts on from this one.
+  std::shared_ptr<SnapshotPool> successor(std::shared_ptr<MemoryBudget>) const;
   std::size_t copyCount() const { return m_copies.size(); }
   std::size_t slotCount() const { return m_slots.size(); }
 
@@ -82,6 +84,11 @@ class LatestSnapshot {
       : m_pool(std::make_shared<SnapshotPool>(std::move(budget))) {}
 
   void releaseMemory() { m_pool->releaseMemory(); }
+  /// A pool for another state of the geometries, in which ids may stand for other ones.
+  std::shared_ptr<SnapshotPool> newPool(std::shared_ptr<MemoryBudget> budget) const {
+    return m_pool->successor(std::move(budget));
+  }
+  void setPool(std::shared_ptr<SnapshotPool> pool) noexcept { m_pool.swap(pool); }
   void publish(SpatialQueries::Source&, double time);
   std::shared_ptr<const Snapshot> get() const;
 

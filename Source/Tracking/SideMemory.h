@@ -4,6 +4,7 @@
 
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Archive.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
 
@@ -50,6 +51,10 @@ class SideMemory : public CountedObject {
 
   void releaseMemory();
 
+  /// For saved states. self: of one geometry with itself.
+  template <class File>
+  void describe(File&, bool self);
+
  private:
   /// The vertices of one mesh that hold a closest point, with their weights.
   template <std::size_t N>
@@ -90,5 +95,24 @@ class SideMemory : public CountedObject {
   Buffer<std::uint32_t> m_order;
   ContactKind m_ofSecond = ContactKind::TriangleVertex;  ///< of the second mesh's vertices
 };
+
+template <class File>
+void SideMemory::describe(File& file, bool self) {
+  using namespace description;
+  file.integer(m_step);
+  file.integer(m_version);
+  for (auto* sides : {&m_start, &m_end})
+    itemsOf(file, *sides, 22 + sizeof(Triangle), [&](Side& side) {
+      enumeratorOf(file, side.passage.kind, ContactKind::EdgeEdge);
+      fieldOf(file, side.passage.ids);
+      fieldOf(file, side.passage.forward);
+      fieldOf(file, side.corners);
+      if constexpr (File::kReads) {
+        side.passage.time = 0.0;
+        file.need(!self || side.passage.kind != ContactKind::TriangleVertex,
+                  "a mesh with itself has no such side");
+      }
+    });
+}
 
 }  // namespace palpate

@@ -4,7 +4,11 @@
 
 #include <palpate/Capture.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
+#include <span>
+#include <vector>
 
 using namespace palpate;
 using namespace palpate::c;
@@ -420,4 +424,18 @@ palpate_status palpate_release_memory(palpate_cd* cd) {
 }
 palpate_status palpate_capture(const palpate_cd* cd, const char* path) {
   return guarded(__func__, [&] { capture(of(cd), &given(path, "path")); });
+}
+palpate_status palpate_save(const palpate_cd* cd, uint8_t* bytes, size_t capacity, size_t* count) {
+  return guarded(__func__, [&] {
+    const auto out = std::as_writable_bytes(arrayOf<uint8_t>(bytes, capacity, "bytes"));
+    given(count, "count");
+    const std::vector<std::byte> state = of(cd).save();
+    std::copy_n(state.begin(), std::min(state.size(), out.size()), out.begin());
+    *count = state.size();
+  });
+}
+palpate_status palpate_restore(palpate_cd* cd, const uint8_t* bytes, size_t count) {
+  return guarded(__func__, [&] {
+    of(cd).restore(std::as_bytes(arrayOf<const uint8_t>(bytes, count, "bytes")));
+  });
 }

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
 
 namespace palpate::python {
 
@@ -20,6 +24,10 @@ std::chrono::microseconds microsecondsOf(double seconds) {
   constexpr double kMost = 1e9;
   return std::chrono::microseconds(
       static_cast<std::int64_t>(1e6 * std::clamp(seconds, -kMost, kMost)));
+}
+
+py::bytes bytesOf(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
@@ -63,6 +71,29 @@ Ends a detect_collision() with a budget that another thread runs.)")
           R"(write_trace(path) -> None
 
 Writes the times of the last Settings.trace_frames detections as JSON for Perfetto and Chrome.)")
+      .def(
+          "save",
+          [](Collisions& self) {
+            const std::vector<std::byte> state =
+                self.read([](OctreeBasedCD& d) { return d.save(); });
+            return bytesOf(state);
+          },
+          R"(save() -> bytes
+
+The state: geometries and pairs with their ids, the step, the last answers, contacts over time.)")
+      .def(
+          "restore",
+          [](Collisions& self, const py::bytes& state) {
+            const std::string_view bytes = state;
+            self.work([&](OctreeBasedCD& d) {
+              d.restore(std::as_bytes(std::span(bytes.data(), bytes.size())));
+            });
+          },
+          py::arg("state"),
+          R"(restore(state) -> None
+
+Goes back to a state of this or another object: the next frames have the same bits. Predicates and
+distance fields are those of this object. Raises Error for other or changed bytes.)")
       .def(
           "memory_use",
           [](Collisions& self) {

@@ -288,10 +288,24 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// A copy of all that the next detection reads, with placed deforming meshes in the world.
   CollisionProblem problem() const;
 
+  /// The state as bytes: geometries and pairs with their ids, both ends of the step, the last
+  /// answers, and what is known of contacts and sides from step to step.
+  /// Cost     linear in the state.
+  std::vector<std::byte> save() const;
+  /// Goes back to a state of this or another object with the same Settings::engine. The next calls
+  /// give the same bits as they gave after save(), except times and counts of work.
+  /// Kept     Settings, snapshots, contact predicates and distance fields: geometries and pairs that
+  ///          had one must have it here, under the same ids. Objects that use this one, such as a
+  ///          StepGuard or PenetrationTracker, keep their own state.
+  /// Errors   File, with the byte or the fault, for other or changed bytes; NotAvailable without
+  ///          such a predicate or field. An exception changes nothing.
+  /// Cost     linear in the state; geometries whose elements differ from those here are built anew.
+  void restore(std::span<const std::byte>);
+
  private:
   friend class StepGuard;
   friend class ThreadTopology;
-  friend struct CutMesh;
+  friend struct ProblemGeometries;
   std::shared_ptr<StepSource> stepSource();
   void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now);
   using BatchFunction = void (*)(void*, const CollisionPair&, std::span<const ElementPair>);

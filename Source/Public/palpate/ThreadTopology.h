@@ -86,6 +86,11 @@ class PALPATE_EXPORT ThreadTopology {
   std::span<const ThreadEvent> events() const;
   void clear();  ///< forgets events() of earlier updates
 
+  /// All of the above as bytes, beside those of OctreeBasedCD::save(). Restore both.
+  std::vector<std::byte> save() const;
+  /// Throws File, with the byte, for other or changed bytes, and then changes nothing.
+  void restore(std::span<const std::byte>);
+
  private:
   struct Implementation;
   Implementation& all() const;  ///< throws InvalidCall

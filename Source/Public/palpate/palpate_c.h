@@ -353,6 +353,11 @@ PALPATE_EXPORT palpate_status palpate_advance(palpate_cd* cd);
 PALPATE_EXPORT palpate_status palpate_release_memory(palpate_cd* cd);
 /// Writes the problem of the next detection to a file, which readCapture() of C++ reads.
 PALPATE_EXPORT palpate_status palpate_capture(const palpate_cd* cd, const char* path);
+/// The state, a list of bytes. Each call makes it anew: give a capacity that suffices.
+PALPATE_EXPORT palpate_status palpate_save(const palpate_cd* cd, uint8_t* bytes, size_t capacity,
+                                           size_t* count);
+/// Goes back to a state of this or another palpate_cd.
+PALPATE_EXPORT palpate_status palpate_restore(palpate_cd* cd, const uint8_t* bytes, size_t count);
 
 // Contacts. <palpate/CollisionData.h> has the law that all satisfy, and signs and sides.
 

@@ -240,6 +240,22 @@ TEST_F(CScene, ContactsValidityAndStatisticsAreThoseOfCpp) {
   for (const std::size_t count : kinds) EXPECT_GT(count, 0u);
 }
 
+TEST_F(CScene, SavedStates) {
+  step(0, 0);
+  step(1, 0);
+  std::size_t size = 0, again = 0;
+  EXPECT_OK(palpate_save(m_cd, nullptr, 0, &size));
+  std::vector<std::uint8_t> state(size), last(size);
+  EXPECT_OK(palpate_save(m_cd, state.data(), size, &again));
+  EXPECT_EQ(again, size);
+  step(2, 0);
+  EXPECT_OK(palpate_restore(m_cd, state.data(), size));
+  EXPECT_OK(palpate_save(m_cd, last.data(), size, &again));
+  EXPECT_EQ(last, state);
+  EXPECT_EQ(palpate_restore(m_cd, state.data(), size - 1), PALPATE_FILE);
+  EXPECT_NE(std::string(palpate_last_error()).find("saved state, byte"), std::string::npos);
+}
+
 TEST_F(CScene, DetectionsWithABudget) {
   std::uint8_t complete = 7;
   step(0, 0);

@@ -1,0 +1,182 @@
+// Part of CollisionDetection/GeometryTable.h: the geometries of a saved state.
+#include "CollisionDetection/GeometryTable.h"
+
+#include "CollisionDetection/GeometryChecks.h"
+#include "CollisionDetection/DiagnosticsInterface.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+template <class T>
+bool haveEqualBits(std::span<const T> l, std::span<const T> r) {
+  return l.size() == r.size() &&
+         (l.empty() || std::memcmp(l.data(), r.data(), l.size_bytes()) == 0);
+}
+
+template <class T>
+bool areEqual(const std::vector<T>& l, const auto& r) {
+  return haveEqualBits<T>(l, r);
+}
+
+/// Whether all that follows from the elements and the shape at rest is the same, and what is
+/// attached.
+bool isSameBody(const Geometry& geometry, const SavedGeometry& saved) {
+  const CollisionProblem::Geometry& given = saved.problem;
+  const Body& body = geometry.body;
+  const MeshTopology& topology = body.mesh.topology;
+  if (given.type != topology.type || saved.field.has_value() != static_cast<bool>(body.field) ||
+      saved.proxy.has_value() != static_cast<bool>(geometry.proxy) ||
+      given.analytical.has_value() != body.shape.has_value())
+    return false;
+  if (geometry.isShapeFixed() &&
+      !((!saved.proxy || *saved.proxy == geometry.proxySettings) &&
+        areEqual(given.now, body.mesh.now.body()) && given.disabled.empty()))
+    return false;
+  if (body.shape) return body.shape->analytical == *given.analytical;
+  if (body.isField()) return true;
+  const CollisionProblem::Geometry own = problemOf(geometry);
+  return given.now.size() == topology.vertexCount && areEqual(own.triangles, given.triangles) &&
+         areEqual(own.radii, given.radii) && areEqual(own.removed, given.removed) &&
+         areEqual(own.tetrahedra, given.tetrahedra) &&
+         areEqual(own.removedTetrahedra, given.removedTetrahedra) &&
+         areEqual(given.rest.empty() ? given.now : given.rest, body.mesh.rest);
+}
+
+}  // namespace
+
+std::unique_ptr<Geometry> GeometryTable::make(const SavedGeometry& saved,
+                                              const Threads& threads) const {
+  const CollisionProblem::Geometry& given = saved.problem;
+  const GeometryId id = given.id;
+  GeometryTable one;
+  one.m_nextId = static_cast<std::uint32_t>(id);
+  one.m_restores = m_restores + 1;
+  std::shared_ptr<const DistanceField> field;
+  if (saved.field) field = find(id)->body.field;
+  if (given.type == GeometryType::Field) {
+    one.add(field);
+  } else {
+    one.add(given);
+    if (field || saved.proxy) {
+      one.setPositions(id, {}, given.now, threads);
+      one.setDisabled(id, given.disabled);
+    }
+    if (field) one.attach(id, field);
+    if (saved.proxy) one.attach(id, saved.proxy, threads);
+  }
+  return std::move(one.m_geometries.front());
+}
+
+GeometryTable::Restored GeometryTable::restored(const SavedGeometry& saved,
+                                                const Threads& threads) const {
+  const CollisionProblem::Geometry& given = saved.problem;
+  Restored result;
+  result.geometry = find(given.id);
+  if (saved.field) {
+    const DistanceField* const field =
+        result.geometry ? result.geometry->body.field.get() : nullptr;
+    if (!field || *saved.field != std::array{field->errorBound(), field->band()})
+      throw Error(ErrorCode::NotAvailable,
+                  "a saved state has no distance fields: " + nameOf(given.id) +
+                      " must have the one that it had",
+                  given.id);
+  }
+  if (!result.geometry || !isSameBody(*result.geometry, saved)) {
+    result.made = make(saved, threads);
+    result.geometry = result.made.get();
+  }
+  Geometry& geometry = *result.geometry;
+  Body& body = geometry.body;
+  checkName(body, given.name);
+  checkFilter(geometry, given.filter);
+  checkElements(geometry, given.disabled);
+  checkTags(body, given.tags.size());
+  result.name = given.name;
+  result.filter = given.filter;
+  result.tags.assign(given.tags.begin(), given.tags.end());
+  if (body.solid) {
+    result.solidTags = std::move(result.tags);
+    result.tags = tagsOfSurface(body.solid->topology, result.solidTags);
+  }
+  BodyRevisions& now = body.revisions;
+  result.revisions = now;
+  if (!(given.filter == geometry.filter &&
+        haveEqualBits<std::uint32_t>(result.tags, body.mesh.tags) &&
+        (!body.solid || haveEqualBits<std::uint32_t>(result.solidTags, body.solid->tags))))
+    result.revisions.filter = now.counter.next();
+  if (!areEqual(given.disabled, body.mesh.topology.disabled)) {
+    result.topology = body.mesh.topology;
+    result.topology->disable(given.disabled);
+    result.revisions.elements.enabled = now.counter.next();
+  }
+
+  const std::span<const Eigen::Vector3d> fixed = body.mesh.now.body();
+  const bool hasPositions = !body.shape && !body.isField();
+  const auto end = [&](std::span<const Eigen::Vector3d> positions, std::size_t i,
+                       std::initializer_list<const Positions*> others) {
+    if (hasPositions) checkPositionCount(geometry, positions.size());
+    return geometry.step.positionsOf(geometry, body.mesh,
+                                     {hasPositions ? positions : fixed, saved.poses[i]},
+                                     {others.begin(), others.size()}, threads);
+  };
+  GeometryStep::State& step = result.step;
+  step.now = end(given.now, 0, {});
+  step.before = end(given.before, 1, {&step.now});
+  step.detected = end(saved.isDetectedOther    ? saved.detected
+                      : saved.isDetectedBefore ? given.before
+                                               : given.now,
+                      2, {&step.now, &step.before});
+  step.isNew = saved.isNew;
+  step.bodyGiven = saved.bodyGiven;
+  step.transformGiven = saved.transformGiven;
+  if (!saved.freeMotion.empty() && saved.freeMotion.size() != geometry.freeMotionCount())
+    throw Error(ErrorCode::InvalidSettings,
+                nameOf(geometry) + ": the number of free motions is wrong", body.id);
+  result.freeMotion.assign(saved.freeMotion.begin(), saved.freeMotion.end());
+  return result;
+}
+
+void GeometryTable::Restored::apply() noexcept {
+  Body& body = geometry->body;
+  TriangleMesh& mesh = body.mesh;
+  body.name = std::move(name);
+  geometry->filter = filter;
+  mesh.outerSideOnly = filter.sidedness == Sidedness::Outer;
+  mesh.tags = std::move(tags);
+  if (body.solid) body.solid->tags = std::move(solidTags);
+  if (topology) mesh.topology = std::move(*topology);
+  const Revision::Counter counter = body.revisions.counter;
+  body.revisions = revisions;
+  body.revisions.counter = counter;
+  geometry->step.restore(mesh, body.shape ? &*body.shape : nullptr, step);
+  geometry->freeMotion = std::move(freeMotion);
+}
+
+void GeometryTable::prepareToRestore(std::size_t count) {
+  m_geometries.reserve(count);
+  m_changed.reserve(2 * count + 1);  // so that no frame allocates
+}
+
+void GeometryTable::restore(std::span<Restored> all, std::uint32_t nextId,
+                            std::uint64_t stepNumber) noexcept {
+  PALPATE_ASSERT(m_geometries.capacity() >= all.size());
+  for (Restored& each : all) {
+    each.apply();
+    if (!each.made)
+      for (auto& own : m_geometries)
+        if (own.get() == each.geometry) each.made = std::move(own);
+  }
+  m_geometries.clear();
+  for (Restored& each : all) m_geometries.push_back(std::move(each.made));
+  m_nextId = nextId;
+  m_stepNumber = stepNumber;
+  ++m_restores;
+  ++m_state;
+}
+
+}  // namespace palpate

@@ -1,0 +1,454 @@
+// Part of CollisionDetection/OctreeBasedCDImplementation.h: saved states.
+#include "CollisionDetection/OctreeBasedCDImplementation.h"
+
+#include "CollisionDetection/PairResults.h"
+#include "CollisionDetection/ProblemDescription.h"
+#include "Bodies/SavedRevisions.h"
+#include "Core/Archive.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+namespace palpate {
+
+namespace {
+
+using namespace description;
+
+constexpr std::string_view kStateTitle = "palpate-state";
+constexpr std::uint32_t kStateVersion = 1;
+
+using Contents = CollisionData::Contents;
+using PairStates = std::array<SavedRevisions, 2>;
+
+// Least bytes of items.
+constexpr std::size_t kGeometryBytes = 64, kSavedPairBytes = 64, kContactBytes = 64;
+
+template <class File>
+void poseOf(File& file, Pose& pose) {
+  for (double& value : pose.rotation.reshaped()) file.real(value);
+  fieldOf(file, pose.translation);
+}
+
+template <class File>
+void describeGeometry(File& file, SavedGeometry& geometry) {
+  CollisionProblem::Geometry& problem = geometry.problem;
+  meshLines(file, problem, kVersion);
+  itemsOf(file, problem.name, 1, [&](char& letter) { file.integer(letter); });
+  optionalOf(file, geometry.field, [&](auto& bounds) { fieldOf(file, bounds); });
+  optionalOf(file, geometry.proxy, [&](SurfaceProxySettings& settings) {
+    for (double* value : {&settings.reach, &settings.errorBound, &settings.widestNormalCone})
+      file.real(*value);
+  });
+  for (auto& pose : geometry.poses) optionalOf(file, pose, [&](Pose& p) { poseOf(file, p); });
+  for (bool* flag : {&geometry.isDetectedOther, &geometry.isDetectedBefore, &geometry.isNew,
+                     &geometry.bodyGiven, &geometry.transformGiven})
+    fieldOf(file, *flag);
+  itemsOf(file, geometry.detected, sizeof(Eigen::Vector3d),
+          [&](Eigen::Vector3d& p) { fieldOf(file, p); });
+  itemsOf(file, geometry.freeMotion, sizeof(double), [&](double& value) { file.real(value); });
+}
+
+template <class File>
+void describeContact(File& file, VertexTriangleContact& c) {
+  file.integer(c.vertex);
+  file.integer(c.triangle);
+  fieldOf(file, c.vertices);
+  fieldOf(file, c.weights);
+  fieldOf(file, c.normal);
+  file.real(c.distance);
+  file.real(c.timeOfImpact);
+  enumeratorOf(file, c.feature, TriangleFeature::Face);
+}
+
+template <class File>
+void describeContact(File& file, EdgeEdgeContact& c) {
+  fieldOf(file, c.edgeA);
+  fieldOf(file, c.edgeB);
+  file.real(c.weightA);
+  file.real(c.weightB);
+  fieldOf(file, c.normal);
+  file.real(c.distance);
+  file.real(c.timeOfImpact);
+  enumeratorOf(file, c.featureA, EdgeFeature::Interior);
+  enumeratorOf(file, c.featureB, EdgeFeature::Interior);
+}
+
+template <class File>
+void describeContact(File& file, ShapeContact& c) {
+  enumeratorOf(file, c.element, ShapeElement::Face);
+  file.integer(c.id);
+  fieldOf(file, c.vertices);
+  for (auto* vector : {&c.weights, &c.point, &c.pointOnShape, &c.normal}) fieldOf(file, *vector);
+  file.real(c.distance);
+  file.real(c.timeOfImpact);
+}
+
+template <class File>
+void describeContact(File& file, ShapeShapeContact& c) {
+  for (auto* vector : {&c.pointA, &c.pointB, &c.normal}) fieldOf(file, *vector);
+  file.real(c.distance);
+  file.real(c.timeOfImpact);
+}
+
+template <class File>
+void describeContact(File& file, ElementPair& c) {
+  file.integer(c.a);
+  file.integer(c.b);
+}
+
+template <class File>
+void describeContact(File& file, TrackedContact& c) {
+  keyOf(file, c.key);
+  optionalOf(file, c.predecessor, [&](ContactKey& key) { keyOf(file, key); });
+  file.integer(c.age);
+  file.integer(c.userData);
+  enumeratorOf(file, c.end, ContactEnd::Apart);
+}
+
+template <class File>
+void describeContact(File& file, Crossing& c) {
+  enumeratorOf(file, c.kind, ContactKind::EdgeEdge);
+  fieldOf(file, c.ids);
+  file.real(c.time);
+  fieldOf(file, c.forward);
+}
+
+template <class File>
+void describeValidity(File& file, Validity& validity) {
+  for (bool* flag :
+       {&validity.trusted, &validity.startedApart, &validity.sideMayBeWrong, &validity.unwelded})
+    fieldOf(file, *flag);
+  file.word(validity.method, kMethods);
+  enumeratorOf(file, validity.reason, MethodReason::OutOfTime);
+  file.integer(validity.atEnd);
+  file.integer(validity.atImpact);
+  for (double* value : {&validity.displacement, &validity.displacementLimit, &validity.arcDeviation,
+                        &validity.effectiveThickness, &validity.proxyDepth})
+    file.real(*value);
+  file.integer(validity.age);
+  for (auto* list : {&validity.untrustedVerticesA, &validity.untrustedVerticesB,
+                     &validity.degenerateTrianglesA, &validity.degenerateTrianglesB,
+                     &validity.outsideBand, &validity.nearThreshold, &validity.unreliableSign})
+    itemsOf(file, *list, sizeof(std::uint32_t), [&](std::uint32_t& id) { file.integer(id); });
+}
+
+/// Throws unless all ids are below the numbers of vertices and of elements of the two geometries.
+void checkIds(const ArchiveReader& file, const Contents& c, const PairStates& states) {
+  const auto& [a, b] = states;
+  const std::size_t vertices = std::max(a.vertexCount, b.vertexCount),
+                    elements = std::max(a.elementCount, b.elementCount);
+  const auto need = [&](std::uint32_t id, std::size_t count) {
+    file.need(id < count, "a contact names a vertex or element that does not exist");
+  };
+  for (const auto& x : c.vertexTriangle) {
+    need(x.vertex, a.vertexCount), need(x.triangle, b.elementCount);
+    for (const std::uint32_t v : x.vertices) need(v, b.vertexCount);
+  }
+  for (const auto& x : c.triangleVertex) {
+    need(x.vertex, b.vertexCount), need(x.triangle, a.elementCount);
+    for (const std::uint32_t v : x.vertices) need(v, a.vertexCount);
+  }
+  for (const auto& x : c.edgeEdge)
+    for (int i = 0; i < 2; ++i) need(x.edgeA[i], a.vertexCount), need(x.edgeB[i], b.vertexCount);
+  for (const auto& x : c.intersectingTriangles)
+    need(x.a, a.elementCount), need(x.b, b.elementCount);
+  for (const auto& x : c.shape) {
+    need(x.id, x.element == ShapeElement::Face ? elements : vertices);
+    for (const std::uint32_t v : x.vertices) need(v, vertices);
+  }
+  const Validity& v = c.validity;
+  for (const std::uint32_t id : v.untrustedVerticesA) need(id, a.vertexCount);
+  for (const std::uint32_t id : v.untrustedVerticesB) need(id, b.vertexCount);
+  for (const std::uint32_t id : v.degenerateTrianglesA) need(id, a.elementCount);
+  for (const std::uint32_t id : v.degenerateTrianglesB) need(id, b.elementCount);
+}
+
+/// Lists beside those of contacts are empty or as long, and what has an order has it.
+void checkLists(const ArchiveReader& file, const Contents& c) {
+  const auto beside = [&](const auto& list, const auto& contacts) {
+    file.need(list.empty() || list.size() == contacts.size(),
+              "a list has not one item for each contact");
+  };
+  const auto keys = [&](const auto& tracked, ContactKind kind) {
+    file.need(std::all_of(tracked.begin(), tracked.end(),
+                          [&](const TrackedContact& t) { return t.key.kind == kind; }) &&
+                  std::is_sorted(tracked.begin(), tracked.end(),
+                                 [](const auto& l, const auto& r) { return l.key < r.key; }),
+              "tracked contacts are not in order");
+  };
+  const auto all = [&](ContactKind kind, const auto& contacts, const auto& tracked) {
+    beside(tracked, contacts);
+    keys(tracked, kind);
+    beside(c.tags[static_cast<std::size_t>(kind)], contacts);
+  };
+  all(ContactKind::VertexTriangle, c.vertexTriangle, c.tracked.vertexTriangle);
+  all(ContactKind::TriangleVertex, c.triangleVertex, c.tracked.triangleVertex);
+  all(ContactKind::EdgeEdge, c.edgeEdge, c.tracked.edgeEdge);
+  all(ContactKind::Shape, c.shape, c.tracked.shape);
+  all(ContactKind::ShapeShape, c.shapeShape, c.tracked.shapeShape);
+  beside(c.smooth.vertexTriangle, c.vertexTriangle);
+  beside(c.smooth.triangleVertex, c.triangleVertex);
+  beside(c.smooth.edgeEdge, c.edgeEdge);
+  beside(c.smooth.shape, c.shape);
+  for (const auto* list :
+       {&c.validity.outsideBand, &c.validity.nearThreshold, &c.validity.unreliableSign})
+    for (const std::uint32_t index : *list)
+      file.need(index < c.shape.size(), "a list names a contact that does not exist");
+  const std::size_t size = sizeOf(c);
+  file.need(c.validity.atEnd <= size && c.validity.atImpact <= size - c.validity.atEnd,
+            "a number of contacts is wrong");
+}
+
+template <class File>
+void describeContents(File& file, Contents& c) {
+  const auto lists = [&](std::size_t least, auto&... each) {
+    (itemsOf(file, each, least, [&](auto& item) { describeContact(file, item); }), ...);
+  };
+  lists(kContactBytes, c.vertexTriangle, c.triangleVertex, c.edgeEdge, c.shape, c.shapeShape);
+  lists(sizeof(ElementPair), c.intersectingTriangles);
+  file.real(c.earliestTimeOfImpact);
+  file.real(c.errorBound);
+  describeValidity(file, c.validity);
+  auto& t = c.tracked;
+  lists(30, t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended,
+        c.crossings, c.rememberedSides);
+  fieldOf(file, t.elementsOfSecond);
+  for (auto& list : c.tags)
+    itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
+  auto& s = c.smooth;
+  for (auto* list : {&s.vertexTriangle, &s.triangleVertex, &s.edgeEdge, &s.shape})
+    itemsOf(file, *list, sizeof(Eigen::Vector3d), [&](Eigen::Vector3d& n) { fieldOf(file, n); });
+  if constexpr (File::kReads) checkLists(file, c);
+}
+
+/// All but the geometries, settings and predicate.
+template <class File>
+void describePair(File& file, PairRecord& record, const PairStates& states) {
+  for (bool* flag : {&record.hasData, &record.yields, &record.sidesAreKnown, &record.byBodies})
+    fieldOf(file, *flag);
+  derivedOf(file, record.dataVersion, [&](PairRecord::State& state) {
+    states[0].stateOf(file, state.a);
+    states[1].stateOf(file, state.b);
+    SavedRevisions::choose(file, state.settings, std::array{record.settingsRevision}, {});
+    file.integer(state.sides);
+  });
+  for (std::size_t i = 0; i < 2; ++i) states[i].topologyOf(file, record.dataTopologies[i]);
+  bool hasContents = Contents::isIn(record.data);
+  fieldOf(file, hasContents);
+  if (hasContents) {
+    Contents& contents = Contents::of(record.data);
+    describeContents(file, contents);
+    if constexpr (File::kReads)
+      if (record.dataTopologies == record.topologies()) checkIds(file, contents, states);
+  }
+  record.trust.describe(file, states);
+  optionalOf(file, record.tracker, [&](ContactTracker& tracker) {
+    tracker.describe(file, states, Contents::of(record.data), record.dataVersion.isValid());
+  });
+  optionalOf(file, record.sides,
+             [&](SideMemory& sides) { sides.describe(file, record.a == record.b); });
+  ProxySettings& proxy = record.proxySettings;
+  for (double* value : {&proxy.reach, &proxy.allowedError, &proxy.normalCone}) file.real(*value);
+  derivedOf(file, record.proxyVersion, [&](PairRecord::ProxyState& state) {
+    states[1].elementsOf(file, state.elements);
+    states[1].bodyOf(file, state.positions);
+  });
+}
+
+template <class File>
+void describeUnfinished(File& file, FrameStatistics& statistics) {
+  fieldOf(file, statistics.freeMotionUnfinished);
+  itemsOf(file, statistics.unfinishedPairs, 20, [&](UnfinishedPair& pair) {
+    for (GeometryId* id : {&pair.a, &pair.b}) file.integer(*id);
+    file.real(pair.distanceBound);
+    file.integer(pair.age);
+  });
+}
+
+SavedRevisions revisionsOf(const Geometry& geometry) {
+  const MeshTopology& topology = geometry.body.mesh.topology;
+  return {geometry.body.state(),
+          geometry.step.detected().state(),
+          {},
+          topology.vertexCount,
+          topology.elements.size()};
+}
+
+/// Of a geometry that restore() will change so.
+SavedRevisions revisionsOf(const GeometryTable::Restored& restored) {
+  Geometry& geometry = *restored.geometry;
+  SavedRevisions saved = revisionsOf(geometry);
+  const BodyRevisions& revisions = restored.revisions;
+  saved.now = {revisions.elements, revisions.filter, revisions.field, restored.step.before.state(),
+               restored.step.now.state()};
+  saved.detected = restored.step.detected.state();
+  const Revision other = geometry.body.revisions.counter.next(),
+                 otherEnd = geometry.step.nextRevision();
+  saved.other = {{other, other}, other, other, {otherEnd, otherEnd}, {otherEnd, otherEnd}};
+  return saved;
+}
+
+template <class T>
+void copyTo(std::vector<T>& out, std::span<const T> from) {
+  out.assign(from.begin(), from.end());
+}
+
+SavedGeometry savedOf(const Geometry& geometry) {
+  const Body& body = geometry.body;
+  SavedGeometry saved{.problem = problemOf(geometry)};
+  CollisionProblem::Geometry& problem = saved.problem;
+  const GeometryStep::State step = geometry.step.state(body.mesh);
+  if (problem.field) saved.field = {problem.field->errorBound(), problem.field->band()};
+  saved.proxy = problem.proxy;
+  if (!body.shape && !body.isField()) {
+    copyTo(problem.now, step.now.body());
+    copyTo(problem.before, step.before.body());
+    const bool isAtRest =
+        std::equal(problem.now.begin(), problem.now.end(), body.mesh.rest.begin(),
+                   body.mesh.rest.end(), [](const Eigen::Vector3d& l, const Eigen::Vector3d& r) {
+                     return std::memcmp(l.data(), r.data(), sizeof l) == 0;
+                   });
+    if (!isAtRest) copyTo<Eigen::Vector3d>(problem.rest, body.mesh.rest);
+    saved.isDetectedBefore = step.detected.hasSameBody(step.before);
+    saved.isDetectedOther = !saved.isDetectedBefore && !step.detected.hasSameBody(step.now);
+    if (saved.isDetectedOther) copyTo(saved.detected, step.detected.body());
+  }
+  for (std::size_t i = 0; const Positions* end : {&step.now, &step.before, &step.detected}) {
+    if (end->isPlaced()) saved.poses[i] = end->transform();
+    ++i;
+  }
+  saved.isNew = step.isNew;
+  saved.bodyGiven = step.bodyGiven;
+  saved.transformGiven = step.transformGiven;
+  saved.freeMotion.assign(geometry.freeMotion.begin(), geometry.freeMotion.end());
+  return saved;
+}
+
+}  // namespace
+
+std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
+  ArchiveWriter file(kStateTitle, kStateVersion);
+  file.integer(geometries.lastId());
+  file.integer(geometries.stepNumber());
+  file.integer(audit.frame);
+  file.count(geometries.all().size());
+  for (const auto& geometry : geometries.all()) {
+    SavedGeometry saved = savedOf(*geometry);
+    describeGeometry(file, saved);
+  }
+  file.count(pairs.records().size());
+  for (const auto& record : pairs.records()) {
+    CollisionProblem::Pair pair{static_cast<std::uint32_t>(record->pair.a),
+                                static_cast<std::uint32_t>(record->pair.b), record->pair.settings,
+                                record->plan.method, static_cast<bool>(record->predicate)};
+    pairLine(file, pair, kVersion);
+    describePair(file, *record, {revisionsOf(*record->a), revisionsOf(*record->b)});
+  }
+  FrameStatistics unfinished;
+  unfinished.unfinishedPairs = statistics.unfinishedPairs;
+  unfinished.freeMotionUnfinished = statistics.freeMotionUnfinished;
+  describeUnfinished(file, unfinished);
+  return file.bytes();
+}
+
+void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
+  const std::string name = "the saved state";
+  ArchiveReader file(state, name, kStateTitle, kStateVersion);
+  // What the calls that add geometries and pairs refuse is refused here, too.
+  const auto checked = [&](auto&& call) -> decltype(auto) {
+    try {
+      return call();
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::MemoryLimit || error.code() == ErrorCode::NotAvailable ||
+          error.code() == ErrorCode::File)
+        throw;
+      file.fail(error.what());
+    }
+  };
+  std::uint32_t lastId = 0;
+  std::uint64_t stepNumber = 0, auditFrame = 0;
+  file.integer(lastId);
+  file.integer(stepNumber);
+  file.integer(auditFrame);
+
+  std::size_t count = 0;
+  file.count(count, kGeometryBytes);
+  std::vector<GeometryTable::Restored> all;
+  for (std::size_t i = 0; i < count; ++i) {
+    SavedGeometry saved;
+    describeGeometry(file, saved);
+    const auto id = static_cast<std::uint32_t>(saved.problem.id);
+    file.need(id < lastId && (all.empty() || all.back().geometry->body.id < saved.problem.id),
+              "the id of a geometry is out of order");
+    all.push_back(checked([&] { return geometries.restored(saved, threads); }));
+  }
+  const auto find = [&](std::uint32_t id) -> GeometryTable::Restored& {
+    const auto found = std::lower_bound(
+        all.begin(), all.end(), GeometryId{id},
+        [](const auto& restored, GeometryId i) { return restored.geometry->body.id < i; });
+    file.need(found != all.end() && found->geometry->body.id == GeometryId{id},
+              "a pair names a geometry that does not exist");
+    return *found;
+  };
+
+  file.count(count, kSavedPairBytes);
+  PairTable restored = pairs.successor();
+  std::vector<std::pair<PairRecord*, PairRecord*>> successors;
+  for (std::size_t i = 0; i < count; ++i) {
+    CollisionProblem::Pair pair{};
+    pairLine(file, pair, kVersion);
+    const auto &a = find(pair.a), &b = find(pair.b);
+    PairRecord* const same = pairs.find(GeometryId{pair.a}, GeometryId{pair.b});
+    PairRecord* const former = a.made || b.made ? nullptr : same;
+    PairRecord& record = checked([&]() -> PairRecord& {
+      return restored.add(*a.geometry, *b.geometry, pair.settings, a.step.now.isPlaced(), former,
+                          threads);
+    });
+    if (pair.predicate) {
+      if (!same || !same->predicate)
+        throw Error(ErrorCode::NotAvailable,
+                    name + " has no contact predicates: " + nameOf(*record.a, *record.b) +
+                        " must have the one that it had",
+                    record.pair.a);
+      checked([&] {
+        restored.setPredicate(geometries, record.pair.a, record.pair.b, same->predicate);
+      });
+    }
+    describePair(file, record, {revisionsOf(a), revisionsOf(b)});
+    if (former) successors.emplace_back(former, &record);
+  }
+  FrameStatistics next;
+  describeUnfinished(file, next);
+  file.expectEnd();
+  geometries.prepareToRestore(all.size());
+  shownOctrees.trees.reserve(all.size());
+  const bool anyMade =
+      std::any_of(all.begin(), all.end(), [](const auto& each) { return bool{each.made}; });
+  auto pool = anyMade ? latestSnapshot.newPool(budget) : nullptr;
+
+  // Nothing below throws.
+  selectedPairs.clear();
+  for (const auto& [former, record] : successors) record->takeOver(*former);
+  std::swap(pairs, restored);
+  geometries.restore(all, lastId, stepNumber);
+  if (pool) latestSnapshot.setPool(std::move(pool));
+  for (const auto& record : pairs.records()) {
+    planWithoutMotion(*record);
+    const CollisionData& data = record->data;
+    record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
+    next.contacts += record->statistics.contacts;
+    next.intersectingTriangles += data.intersectingTriangles().size();
+  }
+  freeMotions.forget();
+  audit.failures.clear();
+  audit.frame = auditFrame;
+  octreesState = 0;
+  hasUpdates = false;
+  updateOctreeView();
+  setStatistics(std::move(next));
+}
+
+}  // namespace palpate

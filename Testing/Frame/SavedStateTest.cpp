@@ -1,0 +1,398 @@
+#include <palpate/OctreeBasedCD.h>
+#include <palpate/ThreadTopology.h>
+
+#include "Core/Archive.h"
+#include "Common/Answers.h"
+#include "Common/ExpectRefused.h"
+#include "Common/FailingAllocation.h"
+#include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
+#include "Common/WholeScene.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstring>
+#include <functional>
+#include <vector>
+
+// OctreeBasedCD::save() and restore(): the frames after restore() have the same bits.
+
+namespace palpate {
+namespace {
+
+using testing::Answers;
+using testing::FailingAllocation;
+using testing::Mesh;
+using testing::Positions;
+using testing::Random;
+using Bytes = std::vector<std::byte>;
+
+/// A sheet sinks through another one, with all that lasts from step to step.
+class Sheets {
+ public:
+  explicit Sheets(std::uint32_t n = 6) : m_low(testing::sheet(n, 0.0, 0)), m_high(m_low) {
+    for (Vector3d& p : m_high.positions) p += Vector3d(0.03, 0.02, 0.05);
+    low = detection.addTriangleMesh(m_low.positions, m_low.triangles);
+    high = detection.addTriangleMesh(m_high.positions, m_high.triangles);
+    ball = detection.addAnalyticalGeometry(Sphere{{0, 0, 0}, 0.2});
+    detection.addCollisionPair(high, low,
+                               {.method = Method::Continuous,
+                                .thickness = 0.02,
+                                .freeMotionReach = 0.1,
+                                .trackContacts = true,
+                                .reportCrossings = true,
+                                .smoothNormals = true,
+                                .rememberSides = true});
+    detection.addCollisionPair(high, high, {.method = Method::Continuous, .restDistance = 0.3});
+    detection.addCollisionPair(low, ball, {.thickness = 0.05, .trackContacts = true});
+    detection.setTags(low, std::vector<std::uint32_t>(m_low.triangles.size(), 7));
+    detection.setName(low, "tissue");
+  }
+
+  /// Moves everything and detects. The step that follows depends on the number alone.
+  void frame(int number) {
+    Positions now = m_high.positions;
+    const double depth = 0.12 * std::sin(0.8 * number);
+    for (Vector3d& p : now) p[2] -= depth + 0.01 * std::cos(number + 5 * p[0]);
+    now.resize(detection.vertexCount(high), Vector3d(2, 2, 2));
+    detection.setPositions(high, now);
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(0.3 * number, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    detection.setTransform(ball, {turn, {0.5, 0.5, 0.22 + 0.03 * std::sin(number)}});
+    if (number % 5 == 3) {
+      detection.detectCollision(std::chrono::microseconds(0));  // no time for anything
+    } else {
+      detection.detectCollision();
+      mark(number);
+    }
+  }
+  void advance() { detection.advance(); }
+
+  /// A cut, and other changes that restore() must undo.
+  void change() {
+    detection.replaceTriangles(high, std::vector<std::uint32_t>{1, 4},
+                               std::vector<Triangle>{{0, 2, 8}}, {});
+    detection.setDisabledElements(low, std::vector<std::uint32_t>{0, 3});
+    detection.setTags(low, {});
+    detection.setName(low, "cut");
+    detection.removeCollisionPair(low, ball);
+    detection.removeCollisionPair(high, high);
+    detection.setTransform(high, {});  // a pair with itself would forbid it
+  }
+
+  OctreeBasedCD detection{Settings{.threads = 1}};
+  GeometryId low, high, ball;
+
+ private:
+  using Vector3d = Eigen::Vector3d;
+  void mark(int number) {
+    const CollisionData& data = detection.collisionData(high, low);
+    if (!data.trackedVertexTriangle().empty())
+      detection.setUserData(high, low, data.trackedVertexTriangle().front().key,
+                            static_cast<std::uint64_t>(number));
+  }
+
+  Mesh m_low, m_high;
+};
+
+/// The answers of `frames` frames.
+std::vector<Answers> run(Sheets& sheets, int first, int frames) {
+  std::vector<Answers> answers;
+  for (int i = first; i < first + frames; ++i) {
+    sheets.frame(i);
+    answers.emplace_back(sheets.detection);
+    sheets.advance();
+  }
+  return answers;
+}
+
+void expectSame(const std::vector<Answers>& l, const std::vector<Answers>& r) {
+  ASSERT_EQ(l.size(), r.size());
+  for (std::size_t i = 0; i < l.size(); ++i) {
+    SCOPED_TRACE(::testing::Message() << "frame " << i);
+    testing::expectSame(l[i], r[i]);
+  }
+}
+
+TEST(SavedState, FramesAfterRestoreHaveTheSameBits) {
+  constexpr int kFrames = 8;
+  std::size_t sides = 0, ended = 0, unfinished = 0, crossings = 0, successors = 0;
+  for (int start = 1; start < 12; ++start) {
+    SCOPED_TRACE(::testing::Message() << "saved before frame " << start);
+    Sheets sheets;
+    run(sheets, 0, start);
+    const Bytes state = sheets.detection.save();
+    const std::vector<Answers> truth = run(sheets, start, kFrames);
+    for (const Answers& each : truth) {
+      sides += each.data[0].rememberedSides().size();
+      ended += each.data[0].ended().size();
+      crossings += each.data[0].crossings().size();
+      unfinished += each.unfinished.size();
+      for (const TrackedContact& t : each.data[0].trackedVertexTriangle())
+        successors += t.predecessor && t.age > 1 && t.userData != 0;
+    }
+    sheets.detection.restore(state);
+    EXPECT_TRUE(sheets.detection.save() == state);
+    EXPECT_EQ(sheets.detection.name(sheets.low), "tissue");
+    expectSame(run(sheets, start, kFrames), truth);
+    EXPECT_EQ(sheets.detection.statistics().rebuiltOctrees, 0u);
+
+    sheets.change();
+    sheets.detection.detectCollision();
+    sheets.detection.restore(state);
+    EXPECT_TRUE(sheets.detection.save() == state);
+    expectSame(run(sheets, start, kFrames), truth);
+
+    Sheets other(3);  // other meshes under the same ids
+    other.frame(2);
+    other.detection.restore(state);
+    std::swap(other.detection, sheets.detection);
+    expectSame(run(sheets, start, kFrames), truth);
+
+    sheets.detection = OctreeBasedCD(Settings{.threads = 2});
+    sheets.detection.restore(state);
+    expectSame(run(sheets, start, kFrames), truth);
+    const GeometryId next = sheets.detection.addPointSet(Positions{{0, 0, 0}});
+    EXPECT_EQ(static_cast<std::uint32_t>(next), 3u);
+  }
+  EXPECT_GT(sides, 100u);
+  EXPECT_GT(ended, 100u);
+  EXPECT_GT(crossings, 100u);
+  EXPECT_GT(unfinished, 30u);
+  EXPECT_GT(successors, 10u);
+}
+
+/// Within a step: after a detection, and between set positions.
+TEST(SavedState, StepsContinue) {
+  Sheets sheets;
+  run(sheets, 0, 3);
+  sheets.frame(4);
+  const Bytes state = sheets.detection.save();
+  const auto rest = [&] {
+    std::vector<Answers> answers;
+    sheets.detection.detectCollision();
+    answers.emplace_back(sheets.detection);
+    sheets.frame(5);
+    answers.emplace_back(sheets.detection);
+    sheets.frame(4);  // positions of the saved state are current again
+    answers.emplace_back(sheets.detection);
+    sheets.advance();
+    sheets.frame(6);
+    answers.emplace_back(sheets.detection);
+    return answers;
+  };
+  const std::vector<Answers> truth = rest();
+  sheets.detection.restore(state);
+  expectSame(rest(), truth);
+  sheets.detection = OctreeBasedCD();
+  sheets.detection.restore(state);
+  expectSame(rest(), truth);
+}
+
+/// Geometries of every type and pairs of every method, with fields and leaves.
+TEST(SavedState, KeepsEveryGeometryTypeAndMethod) {
+  const testing::WholeSceneInput input(4);
+  testing::WholeScene scene(input, {.threads = 1}), other(input, {.threads = 2});
+  const auto run = [](testing::WholeScene& s) {
+    std::vector<Answers> answers;
+    for (int i = 3; i < 6; ++i) {
+      s.move(i);
+      s.detection.detectCollision();
+      answers.emplace_back(s.detection);
+      s.detection.advance();
+    }
+    return answers;
+  };
+  for (int i = 0; i < 3; ++i) {
+    scene.move(i);
+    scene.detection.detectCollision();
+    scene.detection.advance();
+  }
+  const Bytes state = scene.detection.save();
+  const std::vector<Answers> truth = run(scene);
+  scene.detection.restore(state);
+  expectSame(run(scene), truth);
+  other.move(9);
+  other.detection.restore(state);
+  expectSame(run(other), truth);
+
+  // Snapshots and queries are those of the restored geometries.
+  scene.detection.publish();
+  other.detection.restore(state);
+  scene.detection.restore(state);
+  const auto nearest = [&](OctreeBasedCD& d) {
+    return d.queries().closestPoint(scene.organ, {0.1, 0.2, 2})->distance;
+  };
+  scene.detection.publish();
+  EXPECT_EQ(nearest(scene.detection), nearest(other.detection));
+  EXPECT_EQ(scene.detection.latestSnapshot()
+                ->queries()
+                .closestPoint(scene.organ, {0.1, 0.2, 2})
+                ->distance,
+            nearest(scene.detection));
+
+  // A new object has neither the fields nor the ids.
+  OctreeBasedCD empty;
+  testing::expectRefused(ErrorCode::NotAvailable, "distance field", [&] { empty.restore(state); });
+  EXPECT_TRUE(empty.pairs().empty());
+}
+
+TEST(SavedState, PredicatesAreThoseOfTheObject) {
+  Sheets sheets;
+  sheets.frame(1);
+  const Bytes without = sheets.detection.save();
+  sheets.detection.setContactPredicate(sheets.high, sheets.low,
+                                       [](const ContactFeatures& f) { return f.a[0] % 2 == 0; });
+  sheets.frame(2);
+  const Bytes with = sheets.detection.save();
+  const std::vector<Answers> truth = run(sheets, 3, 4);
+  sheets.detection.restore(with);
+  expectSame(run(sheets, 3, 4), truth);
+  sheets.detection.restore(without);
+  testing::expectRefused(ErrorCode::NotAvailable, "predicate",
+                         [&] { sheets.detection.restore(with); });
+  EXPECT_TRUE(sheets.detection.save() == without);
+}
+
+Bytes withChecksum(Bytes bytes) {
+  const std::size_t end = bytes.size() - 8;
+  const std::uint64_t sum = archiveChecksum(std::span(bytes).first(end));
+  std::memcpy(bytes.data() + end, &sum, 8);
+  return bytes;
+}
+
+/// Restores bytes that may be anything. Returns whether they were refused, with nothing changed.
+bool isRefused(OctreeBasedCD& detection, const Bytes& before, const Bytes& bytes) {
+  try {
+    detection.restore(bytes);
+  } catch (const Error& error) {
+    EXPECT_TRUE(error.code() == ErrorCode::File || error.code() == ErrorCode::NotAvailable)
+        << error.what();
+    EXPECT_NE(std::string(error.what()).find("saved state"), std::string::npos) << error.what();
+    EXPECT_TRUE(detection.save() == before);
+    return true;
+  }
+  return false;
+}
+
+TEST(SavedState, TruncatedAndForeignBytesAreRefused) {
+  Sheets sheets(2);
+  run(sheets, 0, 4);
+  const Bytes state = sheets.detection.save();
+  for (std::size_t size = 0; size < state.size(); ++size) {
+    if (testing::isLeftOut(size)) continue;
+    Bytes part(state.begin(), state.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_TRUE(isRefused(sheets.detection, state, part)) << size;
+    if (size >= 28) {
+      EXPECT_TRUE(isRefused(sheets.detection, state, withChecksum(part))) << size;
+    }
+  }
+  Bytes longer = state;
+  longer.insert(longer.end() - 8, std::byte{0});
+  EXPECT_TRUE(isRefused(sheets.detection, state, withChecksum(longer)));
+  ThreadTopology threads(sheets.detection);
+  EXPECT_TRUE(isRefused(sheets.detection, state, threads.save()));
+}
+
+/// A wrong checksum is refused. With a right one, what is accepted is a state like any other.
+TEST(SavedState, ChangedBytesAreRefusedOrAState) {
+  Sheets sheets(2);
+  run(sheets, 0, 9);
+  sheets.frame(9);
+  const Bytes state = sheets.detection.save();
+  Random random(5);
+  std::size_t accepted = 0, refused = 0;
+  for (int i = 0; i < testing::casesOf(6000); ++i) {
+    Bytes changed = state;
+    for (auto flips = 1 + random() % 3; flips > 0; --flips) {
+      std::byte& byte = changed[random() % (changed.size() - 8)];
+      const unsigned kind = random() % 4;
+      byte = kind == 0   ? static_cast<std::byte>(random() % 256)
+             : kind == 1 ? std::byte{0xff}
+                         : byte ^ static_cast<std::byte>(1u << random() % 8);
+    }
+    if (changed == state) continue;
+    EXPECT_TRUE(isRefused(sheets.detection, state, changed)) << i;
+    if (isRefused(sheets.detection, state, withChecksum(changed))) {
+      ++refused;
+      continue;
+    }
+    ++accepted;
+    EXPECT_FALSE(isRefused(sheets.detection, state, sheets.detection.save()));
+    sheets.detection.detectCollision();
+    sheets.detection.advance();
+    sheets.detection.detectCollision();
+    sheets.detection.restore(state);
+    ASSERT_TRUE(sheets.detection.save() == state) << i;
+  }
+  EXPECT_GT(accepted, testing::leastOf(500));
+  EXPECT_GT(refused, testing::leastOf(500));
+}
+
+TEST(SavedState, FailingAllocationsChangeNothing) {
+  Sheets sheets(2);
+  run(sheets, 0, 4);
+  const Bytes state = sheets.detection.save();
+  sheets.change();
+  run(sheets, 4, 2);
+  const Bytes before = sheets.detection.save();
+  std::size_t n = 1;
+  while (FailingAllocation::throwsAt(n, [&] { sheets.detection.restore(state); })) {
+    ASSERT_TRUE(sheets.detection.save() == before) << n;
+    n += testing::kShareOfCases;
+  }
+  EXPECT_GT(n, 100u);
+  EXPECT_TRUE(sheets.detection.save() == state);
+}
+
+TEST(SavedState, ThreadTopologyIsRestoredBesideIt) {
+  const Positions at{{0.2, 0.2, 1}, {0.2, 0.2, 0.5}, {5, 5, 5}},
+      square{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  OctreeBasedCD detection;
+  const GeometryId thread = detection.addLineMesh(at, std::vector<Segment>{{0, 1}, {1, 2}}),
+                   hole = detection.addTriangleMesh(square,
+                                                    std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}});
+  ThreadTopology topology(detection);
+  topology.add({thread, {0, 1, 2}}, {hole, {0, 1, 2, 3}});
+  const auto run = [&] {
+    std::vector<std::vector<ThreadEvent>> events;
+    for (int i = 1; i < 6; ++i) {
+      Positions now = at;
+      for (int v = 0; v < 2; ++v) now[v][2] -= 0.3 * i;
+      detection.setPositions(thread, now);
+      for (int repeats = 0; repeats < 2; ++repeats) {
+        topology.update();
+        events.emplace_back(topology.events().begin(), topology.events().end());
+      }
+      detection.advance();
+    }
+    return events;
+  };
+  detection.advance();
+  topology.update();
+  const Bytes state = detection.save(), ofThreads = topology.save();
+  const auto truth = run();
+  EXPECT_NE(topology.count(0), 0);
+  detection.restore(state);
+  topology.restore(ofThreads);
+  EXPECT_EQ(topology.count(0), 0);
+  EXPECT_EQ(run(), truth);
+  const Bytes last = topology.save();
+  for (std::size_t i = 0; i < ofThreads.size() - 8; ++i) {
+    Bytes changed = ofThreads;
+    changed[i] ^= std::byte{0xff};
+    EXPECT_THROW(topology.restore(changed), Error);
+    try {
+      topology.restore(withChecksum(changed));
+      topology.update();
+      topology.restore(last);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::File) << error.what();
+    }
+    ASSERT_TRUE(topology.save() == last) << i;
+  }
+}
+
+}  // namespace
+}  // namespace palpate
