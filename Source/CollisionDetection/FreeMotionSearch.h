@@ -32,8 +32,13 @@ class FreeMotionSearch {
             const Deadline* = nullptr);
   /// Makes what find() wrote the result.
   void commit(const GeometryTable&) noexcept;
-  /// The next find() searches again.
-  void forget() noexcept { m_known.clear(); }
+  /// A pair, and its state for which the results hold.
+  struct Known {
+    CollisionPair pair;
+    PairRecord::State state;
+  };
+  std::vector<Known>& known() { return m_known; }
+  const std::vector<Known>& known() const { return m_known; }
 
  private:
   /// A pair, and the part of m_nodePairs that belongs to it.
@@ -53,10 +58,6 @@ class FreeMotionSearch {
     Buffer<std::uint32_t> elements;
     ShapePairScratch shapes;
   };
-  struct Known {
-    CollisionPair pair;
-    PairRecord::State state;
-  };
 
   bool isKnown(const PairTable&) const;
   bool search(Engine, const Threads&, const Deadline*);
@@ -66,8 +67,8 @@ class FreeMotionSearch {
   static void runByBruteForce(const Work&, Scratch&);
   static void withShape(const Work&, Engine, Scratch&);
 
-  std::vector<Known> m_known;  ///< for which the results hold
-  bool m_isNew = false;        ///< commit() has something to commit
+  std::vector<Known> m_known;
+  bool m_isNew = false;  ///< commit() has something to commit
   std::vector<Work> m_works;
   std::vector<Geometry*> m_boxed;  ///< each once
   std::vector<Place> m_places;

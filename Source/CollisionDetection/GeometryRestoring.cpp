@@ -124,6 +124,9 @@ GeometryTable::Restored GeometryTable::restored(const SavedGeometry& saved,
                                      {hasPositions ? positions : fixed, saved.poses[i]},
                                      {others.begin(), others.size()}, threads);
   };
+  if (!saved.poses[0] && (saved.poses[1] || saved.poses[2]))
+    throw Error(ErrorCode::InvalidTransform, nameOf(geometry) + " is placed before, but not now",
+                body.id);
   GeometryStep::State& step = result.step;
   step.now = end(given.now, 0, {});
   step.before = end(given.before, 1, {&step.now});

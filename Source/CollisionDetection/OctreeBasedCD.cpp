@@ -478,11 +478,7 @@ void OctreeBasedCD::writeTrace(const std::filesystem::path& path) const {
   writeWholeFile(path, all.trace->json(), "the trace");
 }
 
-std::vector<std::byte> OctreeBasedCD::save() const {
-  const Implementation& all = read();
-  const auto lock = all.querySource->lockOctrees();  // because an update also chooses methods
-  return all.save();
-}
+std::vector<std::byte> OctreeBasedCD::save() const { return read().save(); }
 
 void OctreeBasedCD::restore(std::span<const std::byte> state) {
   const Implementation::ChangeGuard all(m_implementation);

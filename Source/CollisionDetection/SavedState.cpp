@@ -3,11 +3,14 @@
 
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/ProblemDescription.h"
+#include "Validity/TrustDescription.h"
+#include "Tracking/TrackingDescription.h"
 #include "Bodies/SavedRevisions.h"
 #include "Core/Archive.h"
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <string>
 #include <utility>
 
@@ -224,17 +227,22 @@ void describeContents(File& file, Contents& c) {
   if constexpr (File::kReads) checkLists(file, c);
 }
 
+template <class File>
+void describeState(File& file, PairRecord::State& state, const PairRecord& record,
+                   const PairStates& states) {
+  states[0].stateOf(file, state.a);
+  states[1].stateOf(file, state.b);
+  SavedRevisions::choose(file, state.settings, std::array{record.settingsRevision}, {});
+  file.integer(state.sides);
+}
+
 /// All but the geometries, settings and predicate.
 template <class File>
 void describePair(File& file, PairRecord& record, const PairStates& states) {
   for (bool* flag : {&record.hasData, &record.yields, &record.sidesAreKnown, &record.byBodies})
     fieldOf(file, *flag);
-  derivedOf(file, record.dataVersion, [&](PairRecord::State& state) {
-    states[0].stateOf(file, state.a);
-    states[1].stateOf(file, state.b);
-    SavedRevisions::choose(file, state.settings, std::array{record.settingsRevision}, {});
-    file.integer(state.sides);
-  });
+  derivedOf(file, record.dataVersion,
+            [&](PairRecord::State& state) { describeState(file, state, record, states); });
   for (std::size_t i = 0; i < 2; ++i) states[i].topologyOf(file, record.dataTopologies[i]);
   bool hasContents = Contents::isIn(record.data);
   fieldOf(file, hasContents);
@@ -255,6 +263,22 @@ void describePair(File& file, PairRecord& record, const PairStates& states) {
   derivedOf(file, record.proxyVersion, [&](PairRecord::ProxyState& state) {
     states[1].elementsOf(file, state.elements);
     states[1].bodyOf(file, state.positions);
+  });
+}
+
+/// The pairs for whose states free motions hold. recordOf(pair): null if there is none any more;
+/// free motions then hold for no state.
+template <class File, class RecordOf, class StatesOf>
+void describeKnown(File& file, std::vector<FreeMotionSearch::Known>& known, RecordOf&& recordOf,
+                   StatesOf&& statesOf) {
+  using Known = FreeMotionSearch::Known;
+  constexpr GeometryId kNone{kNoElement};
+  if (std::any_of(known.begin(), known.end(), [&](const Known& k) { return !recordOf(k.pair); }))
+    known.assign(1, {{kNone, kNone, {}}, {}});
+  itemsOf(file, known, 24, [&](Known& each) {
+    for (GeometryId* id : {&each.pair.a, &each.pair.b}) file.integer(*id);
+    if (const PairRecord* const record = recordOf(each.pair))
+      describeState(file, each.state, *record, statesOf(*record));
   });
 }
 
@@ -343,10 +367,16 @@ std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
   for (const auto& record : pairs.records()) {
     CollisionProblem::Pair pair{static_cast<std::uint32_t>(record->pair.a),
                                 static_cast<std::uint32_t>(record->pair.b), record->pair.settings,
-                                record->plan.method, static_cast<bool>(record->predicate)};
+                                record->pair.settings.method, static_cast<bool>(record->predicate)};
     pairLine(file, pair, kVersion);
     describePair(file, *record, {revisionsOf(*record->a), revisionsOf(*record->b)});
   }
+  std::vector<FreeMotionSearch::Known> known = freeMotions.known();
+  describeKnown(
+      file, known, [&](const CollisionPair& pair) { return pairs.find(pair.a, pair.b); },
+      [](const PairRecord& record) -> PairStates {
+        return {revisionsOf(*record.a), revisionsOf(*record.b)};
+      });
   FrameStatistics unfinished;
   unfinished.unfinishedPairs = statistics.unfinishedPairs;
   unfinished.freeMotionUnfinished = statistics.freeMotionUnfinished;
@@ -397,6 +427,7 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
   file.count(count, kSavedPairBytes);
   PairTable restored = pairs.successor();
   std::vector<std::pair<PairRecord*, PairRecord*>> successors;
+  std::vector<PairStates> states;
   for (std::size_t i = 0; i < count; ++i) {
     CollisionProblem::Pair pair{};
     pairLine(file, pair, kVersion);
@@ -417,9 +448,14 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
         restored.setPredicate(geometries, record.pair.a, record.pair.b, same->predicate);
       });
     }
-    describePair(file, record, {revisionsOf(a), revisionsOf(b)});
+    states.push_back({revisionsOf(a), revisionsOf(b)});
+    describePair(file, record, states.back());
     if (former) successors.emplace_back(former, &record);
   }
+  std::vector<FreeMotionSearch::Known> known;
+  describeKnown(
+      file, known, [&](const CollisionPair& pair) { return restored.find(pair.a, pair.b); },
+      [&](const PairRecord& record) { return states[record.index]; });
   FrameStatistics next;
   describeUnfinished(file, next);
   file.expectEnd();
@@ -442,7 +478,7 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
     next.contacts += record->statistics.contacts;
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
-  freeMotions.forget();
+  freeMotions.known().swap(known);
   audit.failures.clear();
   audit.frame = auditFrame;
   octreesState = 0;

@@ -4,7 +4,6 @@
 
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/NarrowPhase.h"
-#include "Core/Archive.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
 
@@ -95,24 +94,5 @@ class SideMemory : public CountedObject {
   Buffer<std::uint32_t> m_order;
   ContactKind m_ofSecond = ContactKind::TriangleVertex;  ///< of the second mesh's vertices
 };
-
-template <class File>
-void SideMemory::describe(File& file, bool self) {
-  using namespace description;
-  file.integer(m_step);
-  file.integer(m_version);
-  for (auto* sides : {&m_start, &m_end})
-    itemsOf(file, *sides, 22 + sizeof(Triangle), [&](Side& side) {
-      enumeratorOf(file, side.passage.kind, ContactKind::EdgeEdge);
-      fieldOf(file, side.passage.ids);
-      fieldOf(file, side.passage.forward);
-      fieldOf(file, side.corners);
-      if constexpr (File::kReads) {
-        side.passage.time = 0.0;
-        file.need(!self || side.passage.kind != ContactKind::TriangleVertex,
-                  "a mesh with itself has no such side");
-      }
-    });
-}
 
 }  // namespace palpate

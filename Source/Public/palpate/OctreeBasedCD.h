@@ -294,9 +294,9 @@ class PALPATE_EXPORT OctreeBasedCD {
   std::vector<std::byte> save() const;
   /// Goes back to a state of this or another object with the same Settings::engine. The next calls
   /// give the same bits as they gave after save(), except times and counts of work.
-  /// Kept     Settings, snapshots, contact predicates and distance fields: geometries and pairs that
-  ///          had one must have it here, under the same ids. Objects that use this one, such as a
-  ///          StepGuard or PenetrationTracker, keep their own state.
+  /// Kept     Settings, snapshots, contact predicates and distance fields. Geometries and pairs
+  ///          that had one must have it here, under the same ids. Objects that use this one, such
+  ///          as a StepGuard or PenetrationTracker, keep their own state.
   /// Errors   File, with the byte or the fault, for other or changed bytes; NotAvailable without
   ///          such a predicate or field. An exception changes nothing.
   /// Cost     linear in the state; geometries whose elements differ from those here are built anew.
