@@ -23,7 +23,8 @@ namespace palpate::testing {
 /// A model beside it keeps only the last values, by the rules of a step. After each frame the
 /// object must have the same contacts as a new object with the values of the model, and as brute
 /// force. State that lasts from step to step must be as in an object that was given only the last
-/// values of each step.
+/// values of each step. Some frames are made twice, the second time from a saved state, which may
+/// be restored into a new object; all bits must be the same.
 class RandomHistory {
  public:
   explicit RandomHistory(std::uint64_t seed);
@@ -69,6 +70,9 @@ class RandomHistory {
   // Random calls. Each changes the object and the model, or neither if the library refuses the
   // call.
   void act();
+  void actAndDetect();
+  /// actAndDetect(), and again from a saved state.
+  void replay();
   void add();
   void remove(GeometryId);
   void setPositions(GeometryId);
