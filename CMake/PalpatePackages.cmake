@@ -2,7 +2,7 @@
 # VTK, libpalpate-dev what programs are compiled against, libpalpate-vtk0 and libpalpate-vtk-dev the same of
 # Palpate::Vtk, python3-palpate the Python package, and palpate-tools the scenes, charts, replay and check as commands
 # with man pages. FCL has no package.
-set(tools OrganScene LiverLift FastNeedle Suturing Threading BoneDrilling Palpation Retraction RobotArms Haptics XRay
+set(tools OrganScene LiverLift FastNeedle Suturing Cutting Threading BoneDrilling Palpation Retraction RobotArms Haptics XRay
   SpeedAccuracy Replay)
 set(manual ${PROJECT_BINARY_DIR}/manual)
 find_program(HELP2MAN help2man REQUIRED)

@@ -11,6 +11,7 @@ declare -A options=(
   [Palpation]="$size --frames 60"
   [LiverLift]="$size --frames 90"
   [Suturing]="$size --frames 58"
+  [Cutting]="$size --frames 75"
   [Retraction]="$size --frames 75"
   [RobotArms]="$size --frames 170"
   [XRay]="--frames 20 --pixels 512"

@@ -90,6 +90,12 @@ struct ShownBody {
   bool isWhole = true;
 };
 
+std::vector<std::uint32_t> cornersOf(std::span<const Triangle> triangles) {
+  std::vector<std::uint32_t> corners;
+  for (const Triangle& t : triangles) corners.insert(corners.end(), t.begin(), t.end());
+  return corners;
+}
+
 /// Joins the vertices in each cell of a grid whose cells are as small as the triangles' number
 /// permits.
 void simplify(ShownBody& body, std::span<const Vector3d> positions) {
@@ -124,6 +130,7 @@ struct RunReport::Implementation {
   struct Placed {
     const std::string* block;
     Vector3d low, size;
+    const std::string* elements;  ///< null: those of the first frame
     std::optional<Pose> pose;
   };
   struct Cells {
@@ -148,7 +155,10 @@ struct RunReport::Implementation {
     std::vector<Pair> pairs;
     template <class F>
     void forEachBlock(F&& f) const {
-      for (const Placed& body : bodies) f(body.block);
+      for (const Placed& body : bodies) {
+        f(body.block);
+        if (body.elements != nullptr) f(body.elements);
+      }
       for (const Cells& part : cells) f(part.block);
       for (const auto& [body, block] : untrusted) f(block);
       f(contacts);
@@ -198,8 +208,7 @@ void RunReport::Implementation::addBody(World& world, World::BodyId id, const Bo
       isShape ? std::span<const Vector3d>(body.drawn.positions) : world.positions(id);
   ShownBody& part = shown.emplace_back();
   for (std::uint32_t v = 0; v < positions.size(); ++v) part.vertices.push_back(v);
-  for (const Triangle& t : isShape ? body.drawn.triangles : body.triangles)
-    part.elements.insert(part.elements.end(), t.begin(), t.end());
+  part.elements = cornersOf(isShape ? body.drawn.triangles : body.triangles);
   for (const Segment& s : body.segments)
     part.elements.insert(part.elements.end(), s.begin(), s.end());
   const std::string name = look && !look->label.empty() ? look->label : body.name;
@@ -234,12 +243,20 @@ RunReport::Implementation::Placed RunReport::Implementation::place(World& world,
                                               : isRigid
                                                   ? std::span(body.rest)
                                                   : std::span<const Vector3d>(world.positions(id));
+  ShownBody& part = shown[id];
+  const std::string* elements = nullptr;
+  if (part.isWhole && !body.triangles.empty()) {  // cuts add vertices and change triangles
+    for (auto v = static_cast<std::uint32_t>(part.vertices.size()); v < positions.size(); ++v)
+      part.vertices.push_back(v);
+    const std::vector<std::uint32_t> corners = cornersOf(body.triangles);
+    if (corners != part.elements) elements = keep(corners);
+  }
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t v : shown[id].vertices) box.extend(positions[v]);
+  for (const std::uint32_t v : part.vertices) box.extend(positions[v]);
   if (box.isEmpty()) box.extend(Vector3d::Zero());
   std::vector<std::uint32_t> steps;
-  for (const std::uint32_t v : shown[id].vertices) putSteps(steps, positions[v], box);
-  Placed placed{keep(steps), box.min(), box.sizes(), {}};
+  for (const std::uint32_t v : part.vertices) putSteps(steps, positions[v], box);
+  Placed placed{keep(steps), box.min(), box.sizes(), elements, {}};
   if (isRigid) placed.pose = Pose{body.rotation, body.translation};
   return placed;
 }
@@ -379,8 +396,9 @@ std::string RunReport::html(const Text& text, std::span<const Series> series) co
               {"box", numbers({frame.box.min(), frame.box.sizes()})},
               {"least", rounded(frame.least)},
               {"most", rounded(frame.most)}}}};
-    for (const auto& [block, low, size, pose] : frame.bodies) {
+    for (const auto& [block, low, size, elements, pose] : frame.bodies) {
       at["bodies"].push_back({{"block", indexOf(block)}, {"box", numbers({low, size})}});
+      if (elements != nullptr) at["bodies"].back()["elements"] = indexOf(elements);
       if (pose)
         at["bodies"].back()["pose"] =
             numbers({pose->rotation.row(0).transpose(), pose->rotation.row(1).transpose(),

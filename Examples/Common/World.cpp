@@ -72,6 +72,22 @@ World::BodyId World::addShape(std::string name, const AnalyticalGeometry& shape,
   return add({std::move(name), id, GeometryType::Shape, 0, 0, {}, {}, 0, std::move(drawn)}, {}, 0);
 }
 
+World::BodyId World::addSolid(std::string name, std::span<const Vector3d> positions,
+                              std::span<const Tetrahedron> tetrahedra, double inverseMass) {
+  const GeometryId id = m_detection.addTetrahedralMesh(positions, tetrahedra);
+  const std::span<const Triangle> surface = m_detection.surface(id).triangles;
+  return add({std::move(name),
+              id,
+              GeometryType::Triangles,
+              0,
+              0,
+              {surface.begin(), surface.end()},
+              {},
+              0,
+              {}},
+             positions, inverseMass);
+}
+
 void World::addStiffness(BodyId body, double edgeCompliance, double bendingCompliance) {
   std::map<Segment, std::vector<std::uint32_t>> opposite;  // corners across each edge
   for (const Triangle& t : m_bodies[body].triangles) {
@@ -158,6 +174,20 @@ void World::addRigid(BodyId body, std::uint32_t count) {
 
 void World::disable(BodyId body, std::span<const std::uint32_t> triangles) {
   m_detection.setDisabledElements(m_bodies[body].id, triangles);
+}
+
+std::vector<std::uint32_t> World::cut(BodyId id, std::span<const std::uint32_t> removed,
+                                      std::span<const Tetrahedron> added,
+                                      std::span<const Vector3d> newPositions,
+                                      std::span<const Vector3d> rest, double inverseMass) {
+  const Timed timed(m_times.cut);
+  Body& body = m_bodies[id];
+  const auto ids = m_detection.replaceTetrahedra(body.id, removed, added, newPositions, rest);
+  m_solver.add(newPositions, inverseMass);
+  body.count += static_cast<std::uint32_t>(newPositions.size());
+  const std::span<const Triangle> surface = m_detection.surface(body.id).triangles;
+  body.triangles.assign(surface.begin(), surface.end());
+  return ids;
 }
 
 void World::place(BodyId id, const Eigen::Matrix3d& rotation, const Vector3d& translation) {

@@ -30,8 +30,8 @@ class World {
     std::string name;
     GeometryId id;
     GeometryType type;
-    std::uint32_t first, count;  ///< its particles; a shape has none
-    std::vector<Triangle> triangles;
+    std::uint32_t first, count;       ///< its particles; a shape has none
+    std::vector<Triangle> triangles;  ///< removed ones are {0, 0, 0}
     std::vector<Segment> segments;
     double radius;    ///< of lines and points
     SceneMesh drawn;  ///< of a shape, in its own frame
@@ -44,7 +44,7 @@ class World {
   struct Times {
     double boxes = 0, octree = 0, pairs = 0, narrowPhase = 0, order = 0;
     double collision = 0;  ///< wall clock from setPositions() to contacts, and to rows of detect()
-    double hold = 0, solver = 0;
+    double hold = 0, solver = 0, cut = 0;
     std::size_t contacts = 0;  ///< of the last detection
     std::size_t held = 0;      ///< particles
   };
@@ -61,6 +61,9 @@ class World {
   BodyId addPoints(std::string name, std::span<const Eigen::Vector3d> positions, double radius,
                    double inverseMass);
   BodyId addShape(std::string name, const AnalyticalGeometry&, SceneMesh drawn);
+  /// Tetrahedra, which collide by their surface.
+  BodyId addSolid(std::string name, std::span<const Eigen::Vector3d> positions,
+                  std::span<const Tetrahedron> tetrahedra, double inverseMass);
   /// Keeps distances along each edge of a mesh and across it between the opposite corners. For a
   /// thread: distances along each segment, and each vertex in the middle of its neighbours.
   void addStiffness(BodyId, double edgeCompliance, double bendingCompliance);
@@ -80,6 +83,11 @@ class World {
   void addGuard(BodyId a, BodyId b);
   /// Disables these triangles, as where something pierced them. All others are enabled.
   void disable(BodyId, std::span<const std::uint32_t> triangles);
+  /// OctreeBasedCD::replaceTetrahedra(), before predict(). Only for the body that was added last.
+  std::vector<std::uint32_t> cut(BodyId, std::span<const std::uint32_t> removed,
+                                 std::span<const Tetrahedron> added,
+                                 std::span<const Eigen::Vector3d> newPositions,
+                                 std::span<const Eigen::Vector3d> rest, double inverseMass);
   /// Places a shape or a rigid mesh.
   void place(BodyId, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation);
 

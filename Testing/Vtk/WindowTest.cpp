@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 
 namespace palpate::vtk {
 namespace {
@@ -249,6 +250,26 @@ TEST(Window, PickNamesTheElementUnderTheCursor) {
   window.setView(kCentred);
   window.show();
   EXPECT_EQ(window.pick(150, 150), "geometry 1, a shape");
+}
+
+TEST(Window, CutMeshesAreDrawnAsMeshesWithoutTheRemovedTriangles) {
+  scenes::SceneMesh ball = scenes::sphere(2);
+  ball.triangles.push_back({0, 1, 1});  // without area
+  const auto imageOf = [](const OctreeBasedCD& detection) {
+    Window window(detection, false, 100, 100);
+    window.show();
+    return window.image().rgb;
+  };
+  OctreeBasedCD whole, cut, anew;
+  whole.addTriangleMesh(ball.positions, ball.triangles);
+  const GeometryId id = cut.addTriangleMesh(ball.positions, ball.triangles);
+  std::vector<std::uint32_t> removed(40);
+  std::iota(removed.begin(), removed.end(), 0u);
+  cut.replaceTriangles(id, removed, {}, {});
+  ball.triangles.erase(ball.triangles.begin(), ball.triangles.begin() + 40);
+  anew.addTriangleMesh(ball.positions, ball.triangles);
+  EXPECT_EQ(imageOf(cut), imageOf(anew));
+  EXPECT_NE(imageOf(cut), imageOf(whole));
 }
 
 TEST(Window, DrawsEveryGeometryTypeAtItsPlace) {

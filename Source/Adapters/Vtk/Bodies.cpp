@@ -146,7 +146,7 @@ void makeCells(vtkPolyData* data, const Mesh& mesh) {
   vtkNew<vtkCellArray> cells;
   for (const auto& [a, b, c] : mesh.triangles) {
     const std::array<vtkIdType, 3> corners{a, b, c};
-    cells->InsertNextCell(b == c ? 2 : 3, corners.data());
+    cells->InsertNextCell(mesh.type == GeometryType::Lines ? 2 : 3, corners.data());
   }
   for (vtkIdType i = 0; mesh.type == GeometryType::Points && i < points->GetNumberOfPoints(); ++i)
     cells->InsertNextCell(1, &i);
