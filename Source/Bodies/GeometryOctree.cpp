@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
 #include <utility>
 
 namespace palpate {
@@ -56,7 +57,8 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   PALPATE_ASSERT(scale > 0.0);
   const State now = stateOf(mesh, topology);
   const bool isSameTopology = m_treeVersion.state().topology == topology;
-  const bool canRefit = m_isBuilt && isSameTopology;
+  bool canRefit = m_isBuilt && isSameTopology;
+  const bool isCut = m_isBuilt && !isSameTopology && settings.update == OctreeUpdate::Auto;
   m_treeVersion.invalidate();
   m_isBuilt = m_isLagging = false;
   m_frame = m_floatsFrame = {m_sample.median, scale};
@@ -72,8 +74,9 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     startOrdered(0);
   } else {
     bool fits = false;
+    if (isCut) canRefit = replaceElements(mesh.topology, settings);
     if (canRefit && settings.update == OctreeUpdate::Auto) {
-      fitBoxes(mesh, settings, threads, false);
+      fitBoxes(mesh, settings, threads, isCut);
       lastUpdate = LooseOctree::Update::Refitted;
       fits = m_octree.isTight();
     }
@@ -96,6 +99,60 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
   m_lastPositions = mesh.now.bodyRevision();
   ++m_updates;
   m_treeVersion.commit(now);
+}
+
+/// Removes elements that a cut removed. Each element that it added joins the group of the nearest
+/// of those, by the sums of their corners. Returns false, and changes nothing, if a group would
+/// become empty or too full, or if the cut is so large that a rebuild costs less.
+bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeSettings& settings) {
+  constexpr std::size_t kLargeCut = 4096;
+  const auto order = m_octree.order();
+  const auto groups = m_octree.groups();
+  if (order.empty() || topology.removed.empty()) return false;
+  CountedVector<std::uint32_t> places, groupsOfPlaces;
+  std::uint32_t firstAdded = 0;
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    firstAdded = std::max(firstAdded, order[i] + 1);
+    if (topology.isDisabled[order[i]] && topology.isRemoved(order[i])) places.push_back(i);
+  }
+  const std::size_t added = topology.elements.size() - firstAdded;
+  if (places.size() * std::max<std::size_t>(1, added) > kLargeCut + order.size()) return false;
+  const auto sumOf = [&](const Triangle& t) {
+    const FloatPoint &a = m_floats[t[0]], &b = m_floats[t[1]], &c = m_floats[t[2]];
+    return std::array{a.x + b.x + c.x, a.y + b.y + c.y, a.z + b.z + c.z};
+  };
+  CountedVector<std::array<float, 3>> sums;
+  std::map<std::uint32_t, std::int64_t> sizes;
+  for (const std::uint32_t place : places) {
+    sums.push_back(sumOf(m_ordered[place]));
+    const auto g = static_cast<std::uint32_t>(
+        std::upper_bound(groups.begin(), groups.end(), place) - groups.begin() - 1);
+    groupsOfPlaces.push_back(g);
+    sizes.try_emplace(g, groups[g + 1] - groups[g]).first->second -= 1;
+  }
+  CountedVector<Octree::Joining> joining;
+  for (std::uint32_t id = firstAdded; id < topology.elements.size(); ++id) {
+    if (topology.isRemoved(id)) continue;
+    if (places.empty()) return false;
+    const auto sum = sumOf(topology.elements[id]);
+    std::size_t nearest = 0;
+    float least = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      float squared = 0;
+      for (std::size_t k = 0; k < 3; ++k) squared += (sums[i][k] - sum[k]) * (sums[i][k] - sum[k]);
+      if (squared < least) least = squared, nearest = i;
+    }
+    joining.push_back({groupsOfPlaces[nearest], id});
+    ++sizes[groupsOfPlaces[nearest]];
+  }
+  for (const auto& [group, size] : sizes)
+    if (size < 1 || size > 2 * settings.maxElementsPerLeaf) return false;
+  std::sort(joining.begin(), joining.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.group, a.element) < std::pair(b.group, b.element);
+  });
+  m_octree.replace(places, joining);
+  startOrdered(m_octree.size());
+  return true;
 }
 
 bool GeometryOctree::canRefitSome(const TriangleMesh& mesh, Revision topology, double scale,

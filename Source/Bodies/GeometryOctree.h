@@ -37,6 +37,9 @@ class GeometryOctree {
   /// scale: the scale of the float frames, common to all geometries.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
               const Threads&);
+  /// Call when the elements are others. Otherwise elements were removed or appended if the topology
+  /// has changed, and the next update() keeps the nodes if these are few.
+  void forgetElements() { m_isBuilt = false; }
   /// Instead of update(), if few vertices changed since the last one, and it swept no step: brings
   /// the floats and boxes of these up to date. Returns false if that is not so.
   /// Cost     linear in these vertices and in the elements of their slices, and in the number of
@@ -109,6 +112,7 @@ class GeometryOctree {
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
+  bool replaceElements(const MeshTopology&, const OctreeSettings&);
   bool canRefitSome(const TriangleMesh&, Revision topology, double scale,
                     const OctreeSettings&) const;
   void makeSlices(const TriangleMesh&);

@@ -337,6 +337,7 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.smallestHeight =
       smallestHeight(geometry.body.mesh.topology.elements, geometry.body.mesh.rest);
   geometry.shortEdge = shortest;
+  geometry.body.tree.forgetElements();
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
   geometry.body.revisions.elements.enabled = geometry.body.revisions.counter.next();
   geometry.body.revisions.filter = geometry.body.revisions.counter.next();

@@ -102,6 +102,45 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   m_stage = Stage::LaidOut;
 }
 
+void Octree::replace(std::span<const std::uint32_t> places, std::span<const Joining> joining) {
+  PALPATE_ASSERT(isBuilt());
+  m_stage = Stage::Empty;
+  m_dops.directions = 3;
+  ++m_layout;
+  const std::size_t newSize = size() - places.size() + joining.size();
+  Buffer<std::uint32_t> order, newPlaces(size() + 1);  // the latter of where groups begin
+  order.reserve(newSize + BoxArrays::kPadding);        // read in whole vectors
+  auto gone = places.begin();
+  auto joins = joining.begin();
+  for (std::uint32_t g = 0; g < m_nodes.groupNodes.size(); ++g) {
+    std::uint32_t& begin = m_nodes.groups[g];
+    const std::uint32_t end = m_nodes.groups[g + 1];
+    newPlaces[begin] = static_cast<std::uint32_t>(order.size());
+    for (std::uint32_t from = begin;; ++gone) {
+      const std::uint32_t to = gone != places.end() && *gone < end ? *gone : end;
+      order.insert(order.end(), m_order.begin() + from, m_order.begin() + to);
+      if (to == end) break;
+      from = to + 1;
+    }
+    begin = newPlaces[begin];
+    for (; joins != joining.end() && joins->group == g; ++joins) order.push_back(joins->element);
+    PALPATE_ASSERT(order.size() > begin);
+    const OctreeNode node = m_nodes.groupNodes[g];
+    OctreeBlock& block = m_nodes.pool[blockOf(node)];
+    if (block.isLeaf(slotOf(node)))
+      block.child[slotOf(node)] =
+          OctreeBlock::kLeaf | (static_cast<std::uint32_t>(order.size()) - begin);
+  }
+  newPlaces.back() = m_nodes.groups.back() = static_cast<std::uint32_t>(order.size());
+  PALPATE_ASSERT(gone == places.end() && joins == joining.end() && order.size() == newSize);
+  // Where any slot begins, also one without own elements, a group begins, or all end.
+  for (std::size_t block = 0; block < m_nodes.pool.used(); ++block)
+    for (std::uint32_t& begin : m_nodes.pool[block].begin) begin = newPlaces[begin];
+  m_order = std::move(order);
+  m_boxes.resize(newSize);
+  m_stage = Stage::LaidOut;
+}
+
 void Octree::fit(const Threads& threads) {
   PALPATE_ASSERT(m_stage != Stage::Empty);
   m_stage = Stage::LaidOut;

@@ -161,6 +161,15 @@ class Octree {
   /// of all boxes. bulk: the extent about 0 of most boxes. keys: scratch, one for each element.
   void build(const FloatBox& bounds, double bulk, const OctreeSettings&,
              std::span<std::uint64_t> keys, const Threads&);
+  /// An element, and the group whose node is to hold it.
+  struct Joining {
+    std::uint32_t group, element;
+  };
+  /// Of a built octree: removes the elements at these places of the order, and adds others at the
+  /// ends of their groups. Both ascend. Each group must keep an element. As after build(), order()
+  /// is then new, and no box is known; nodes may hold elements that a build would put elsewhere.
+  /// Cost     copies of the order and of the nodes' ranges.
+  void replace(std::span<const std::uint32_t> places, std::span<const Joining> joining);
   /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
   /// Of a built octree: the same for groups [first, last), whose boxes in groupBoxes() are new.
@@ -177,7 +186,7 @@ class Octree {
   void releaseMemory();  ///< gives back scratch and free blocks
 
   bool isBuilt() const { return m_stage == Stage::Built; }
-  std::uint64_t layout() const { return m_layout; }  ///< changes with each reset() and build()
+  std::uint64_t layout() const { return m_layout; }  ///< changes with each change of order()
   /// Throws unless isBuilt(). Every search starts with this.
   void requireBuilt() const {
     if (!isBuilt()) throwNotBuilt();

@@ -390,6 +390,56 @@ TEST(Cuts, NewVerticesAreAtRestInTheStepOfTheCut) {
   EXPECT_EQ(mesh.now.back(), Vector3d(0, 0, 1));
 }
 
+/// A small cut keeps the octree's nodes, until they become too full.
+TEST(Cuts, SmallOnesSeldomRebuildTheOctree) {
+  const Mesh mesh = sheet(40, 0.1, 0), ball = sphere(8, 12, {0.5, 0.5, 0.1}, 0.2);
+  OctreeBasedCD collisions(settingsOf(Engine::Octree));
+  Settings rebuilding = settingsOf(Engine::Octree);
+  rebuilding.octree.update = OctreeUpdate::Rebuild;
+  OctreeBasedCD truth(rebuilding);
+  for (OctreeBasedCD* each : {&collisions, &truth}) {
+    const GeometryId a = addMesh(*each, mesh), b = addMesh(*each, ball);
+    each->addCollisionPair(a, b, {.method = Method::Proximity, .thickness = 0.03});
+    each->detectCollision();
+  }
+  const GeometryId a{0}, b{1};
+  int rebuilt = 0;
+  std::size_t contacts = 0;
+  Ids cut(20);
+  std::iota(cut.begin(), cut.end(), 1600u);
+  for (int step = 0; step < 30; ++step) {
+    std::vector<Triangle> added;
+    Positions positions;
+    const TriangleMeshView view{collisions.positions(a), mesh.triangles};
+    const CollisionProblem problem = collisions.problem();
+    for (const std::uint32_t id : cut) {
+      const auto& [p, q, r] = problem.geometries[0].triangles[id];
+      const auto middle = static_cast<std::uint32_t>(view.positions.size() + positions.size());
+      positions.push_back((view.positions[p] + view.positions[q]) / 2);
+      added.insert(added.end(), {{p, middle, r}, {middle, q, r}});
+    }
+    Ids ids;
+    for (OctreeBasedCD* each : {&collisions, &truth}) {
+      each->advance();
+      ids = each->replaceTriangles(a, cut, added, positions);
+      each->detectCollision();
+      EXPECT_EQ(each->octree().validate(), std::vector<std::string>{});
+    }
+    rebuilt += static_cast<int>(collisions.statistics().rebuiltOctrees);
+    if (step == 0) {
+      EXPECT_EQ(rebuilt, 0);
+    }
+    EXPECT_EQ(truth.statistics().rebuiltOctrees, 1u);
+    EXPECT_EQ(collisions.collisionData(a, b).hash(), truth.collisionData(a, b).hash());
+    EXPECT_EQ(collisions.candidatePairs(a, b), truth.candidatePairs(a, b));
+    contacts += collisions.statistics().contacts;
+    cut.assign(ids.begin(), ids.begin() + 20);
+  }
+  EXPECT_GT(rebuilt, 0);
+  EXPECT_LT(rebuilt, 15);
+  EXPECT_GT(contacts, 100u);
+}
+
 TEST(Cuts, LeaveMeshesOpenOrClosed) {
   const Mesh ball = sphere(6, 8, {0, 0, 0}, 1);
   OctreeBasedCD collisions;

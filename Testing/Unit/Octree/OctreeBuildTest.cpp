@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace palpate {
 namespace {
 
@@ -136,6 +138,50 @@ TEST(Octree, PartsThatAreFittedOneByOneEqualAWholeFit) {
       if (tree.octree.isEmpty(node)) continue;
       EXPECT_EQ(tree.octree.box(node).lower, fresh.octree.box(node).lower);
       EXPECT_EQ(tree.octree.box(node).upper, fresh.octree.box(node).upper);
+    }
+  }
+}
+
+/// Elements leave and join nodes, again and again.
+TEST(OctreeReplace, LeavesAllOtherElementsInTheirNodes) {
+  testing::Random random(4);
+  for (const bool nested : {false, true}) {
+    Boxes boxes = nested ? testing::nestedBoxes(random, 5, 12, 100)
+                         : testing::randomBoxes(random, 3000, 0.02);
+    OctreeSettings settings;
+    settings.maxElementsPerLeaf = 8;
+    BoxOctree tree;
+    tree.build(boxes, settings, Threads(1));
+    const Octree& octree = tree.octree;
+    for (int round = 0; round < 20; ++round) {
+      std::vector<std::uint32_t> ids(octree.order().begin(), octree.order().end()), places;
+      std::vector<Octree::Joining> joining;
+      std::vector<std::vector<std::uint32_t>> contents;
+      const auto groups = octree.groups();
+      for (std::uint32_t g = 0; g + 1 < groups.size(); ++g) {
+        auto& content = contents.emplace_back(ids.begin() + groups[g], ids.begin() + groups[g + 1]);
+        const bool joins = random() % 10 == 0;
+        for (std::uint32_t i = groups[g + 1]; i-- > groups[g];)
+          if (random() % 10 == 0 && (content.size() > 1 || joins)) {
+            places.push_back(i);
+            content.erase(content.begin() + (i - groups[g]));
+          }
+        if (!joins) continue;
+        joining.push_back({g, static_cast<std::uint32_t>(boxes.size())});
+        content.push_back(joining.back().element);
+        boxes.push_back(boxes[ids[groups[g]]]);
+      }
+      std::sort(places.begin(), places.end());
+      const std::uint64_t layout = octree.layout();
+      tree.octree.replace(places, joining);
+      EXPECT_FALSE(octree.isBuilt());
+      EXPECT_NE(octree.layout(), layout);
+      tree.fit(boxes, Threads(1));
+      ASSERT_EQ(validate(octree, false), std::vector<std::string>{});
+      for (std::size_t g = 0; g < contents.size(); ++g)
+        EXPECT_TRUE(std::ranges::equal(
+            contents[g], octree.order().subspan(octree.groups()[g],
+                                                octree.groups()[g + 1] - octree.groups()[g])));
     }
   }
 }
