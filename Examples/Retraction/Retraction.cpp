@@ -113,7 +113,7 @@ class Retraction : public LiveScene {
         {"lift mm", kLift * lifted(static_cast<double>(m_centres.size()))},
         {"force N", force().norm()},
         {"drift mm", drift()}};
-    for (const World::BodyId organ : {m_liver, m_stomach})
+    for (const World::BodyId organ : {m_liver, m_stomach})  // numbered as their volumes
       values.emplace_back(m_world.bodies()[organ].name + " volume share",
                           volumeOf(m_world.positions(organ), m_world.bodies()[organ].triangles) /
                               m_world.solver().volumes[organ].rest);
