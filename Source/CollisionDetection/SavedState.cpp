@@ -104,8 +104,8 @@ void describeContact(File& file, ElementPair& c) {
 
 template <class File>
 void describeContact(File& file, TrackedContact& c) {
-  describeKey(file, c.key);
-  optionalOf(file, c.predecessor, [&](ContactKey& key) { describeKey(file, key); });
+  contactKeyOf(file, c.key);
+  optionalOf(file, c.predecessor, [&](ContactKey& key) { contactKeyOf(file, key); });
   file.integer(c.age);
   file.integer(c.userData);
   enumeratorOf(file, c.end, ContactEnd::Apart);

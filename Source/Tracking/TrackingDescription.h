@@ -11,7 +11,7 @@ namespace palpate {
 
 namespace description {
 template <class File>
-void keyOf(File& file, ContactKey& key) {
+void contactKeyOf(File& file, ContactKey& key) {
   enumeratorOf(file, key.kind, ContactKind::ShapeShape);
   fieldOf(file, key.ids);
 }
@@ -23,7 +23,7 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
   using namespace description;
   file.integer(m_step);
   itemsOf(file, m_before, 1 + sizeof(ContactKey::ids) + sizeof(Triangle) + 12, [&](Entry& entry) {
-    description::keyOf(file, entry.key);
+    description::contactKeyOf(file, entry.key);
     fieldOf(file, entry.corners);
     file.integer(entry.age);
     file.integer(entry.userData);
