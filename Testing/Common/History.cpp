@@ -376,7 +376,8 @@ PairSettings RandomHistory::randomSettings() {
   if (settings.method == Method::Continuous && m_random() % 4 == 0)
     settings.continuous.earliestTimeOnly = true;
   if (m_random() % 8 == 0) settings.restDistance = 0.2 * m_unit;
-  settings.trackContacts = m_random() % 2 && !settings.continuous.earliestTimeOnly;
+  settings.trackContacts =
+      settings.contacts == Contacts::Distinct && !settings.continuous.earliestTimeOnly;
   if (m_random() % 4 == 0) {
     settings.continuous.timeTolerance = 1e-3;
     settings.freeMotionReach = 0.3 * m_unit;
