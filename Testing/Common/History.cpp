@@ -507,7 +507,7 @@ OctreeBasedCD RandomHistory::fresh(Engine engine, std::map<GeometryId, GeometryI
   return collisions;
 }
 
-/// Whether two triangle meshes intersect, by exact arithmetic.
+/// Whether two geometries neither intersect nor touch when the step begins, by brute force.
 bool RandomHistory::startsApart(const Pair& pair) const {
   OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
   const auto add = [&](GeometryId id) {
@@ -520,9 +520,12 @@ bool RandomHistory::startsApart(const Pair& pair) const {
     return own;
   };
   const GeometryId a = add(pair.a), b = pair.a == pair.b ? a : add(pair.b);
-  collisions.addCollisionPair(a, b, {.method = Method::Intersection});
+  const bool areMeshes = m_bodies.at(pair.a).isMesh() && m_bodies.at(pair.b).isMesh();
+  collisions.addCollisionPair(a, b,
+                              {.method = areMeshes ? Method::Intersection : Method::Proximity});
   collisions.detectCollision();
-  return collisions.collisionData(a, b).intersectingTriangles().empty();
+  return areMeshes ? collisions.collisionData(a, b).intersectingTriangles().empty()
+                   : collisions.statistics().contacts == 0;
 }
 
 void RandomHistory::compareContacts(const OctreeBasedCD& other,
