@@ -216,8 +216,8 @@ void describeContents(File& file, Contents& c) {
   file.real(c.errorBound);
   describeValidity(file, c.validity);
   auto& t = c.tracked;
-  lists(30, t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended,
-        c.crossings, c.rememberedSides);
+  lists(34, t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended);
+  lists(29, c.crossings, c.rememberedSides);
   fieldOf(file, t.elementsOfSecond);
   for (auto& list : c.tags)
     itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
@@ -275,7 +275,7 @@ void describeKnown(File& file, std::vector<FreeMotionSearch::Known>& known, Reco
   constexpr GeometryId kNone{kNoElement};
   if (std::any_of(known.begin(), known.end(), [&](const Known& k) { return !recordOf(k.pair); }))
     known.assign(1, {{kNone, kNone, {}}, {}});
-  itemsOf(file, known, 24, [&](Known& each) {
+  itemsOf(file, known, 8, [&](Known& each) {
     for (GeometryId* id : {&each.pair.a, &each.pair.b}) file.integer(*id);
     if (const PairRecord* const record = recordOf(each.pair))
       describeState(file, each.state, *record, statesOf(*record));

@@ -167,7 +167,7 @@ struct ThreadTopology::Implementation {
   template <class File>
   void describe(File& file) {
     description::itemsOf(file, watches, 32, [&](Watch& watch) { describeWatch(file, watch); });
-    description::itemsOf(file, events, 48, [&](ThreadEvent& event) { describeEvent(file, event); });
+    description::itemsOf(file, events, 41, [&](ThreadEvent& event) { describeEvent(file, event); });
     file.integer(eventsBefore);
     description::optionalOf(file, step, [&](std::uint64_t& number) { file.integer(number); });
     if constexpr (File::kReads)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "Core/Assert.h"
+
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -35,6 +37,7 @@ class ArchiveWriter {
   void count(std::size_t value, std::size_t = 0) { integer(std::uint64_t{value}); }
   void expect(std::string_view) {}  // only texts need words
   void endLine() {}
+  std::size_t size() const { return m_size; }
   /// With a checksum behind them. Call it last.
   std::vector<std::byte> bytes();
 
@@ -158,7 +161,14 @@ void optionalOf(File& file, Optional& value, F&& describe) {
 template <class File, class F>
 void itemsOf(File& file, auto& list, std::size_t least, F&& describe) {
   sizeOf(file, list, least);
-  for (auto& item : list) describe(item);
+  if constexpr (File::kReads) {
+    for (auto& item : list) describe(item);
+  } else {
+    const std::size_t begin = file.size();
+    for (auto& item : list) describe(item);
+    // A reader refuses more items than fit into the rest.
+    PALPATE_ASSERT(file.size() - begin >= least * list.size());
+  }
 }
 
 /// A DerivedFrom, by the description of its state.

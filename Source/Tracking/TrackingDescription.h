@@ -55,17 +55,18 @@ void SideMemory::describe(File& file, bool self) {
   file.integer(m_step);
   file.integer(m_version);
   for (auto* sides : {&m_start, &m_end})
-    itemsOf(file, *sides, 22 + sizeof(Triangle), [&](Side& side) {
-      enumeratorOf(file, side.passage.kind, ContactKind::EdgeEdge);
-      fieldOf(file, side.passage.ids);
-      fieldOf(file, side.passage.forward);
-      fieldOf(file, side.corners);
-      if constexpr (File::kReads) {
-        side.passage.time = 0.0;
-        file.need(!self || side.passage.kind != ContactKind::TriangleVertex,
-                  "a mesh with itself has no such side");
-      }
-    });
+    itemsOf(file, *sides, 1 + sizeof(ContactKey::ids) + sizeof(int) + sizeof(Triangle),
+            [&](Side& side) {
+              enumeratorOf(file, side.passage.kind, ContactKind::EdgeEdge);
+              fieldOf(file, side.passage.ids);
+              fieldOf(file, side.passage.forward);
+              fieldOf(file, side.corners);
+              if constexpr (File::kReads) {
+                side.passage.time = 0.0;
+                file.need(!self || side.passage.kind != ContactKind::TriangleVertex,
+                          "a mesh with itself has no such side");
+              }
+            });
 }
 
 }  // namespace palpate
