@@ -172,6 +172,12 @@ def test_a_stitch_and_two_parts_of_threads() -> None:
     assert events["thread"].tolist() == [[0, 1]] * 3
     assert events["loop"].tolist() == [[1, 2], [1, 2], [3, 0]]
     assert events["time"] == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+    state = topology.save()
+    other = palpate.ThreadTopology(collisions)
+    other.restore(state)
+    assert other.save() == state and other.count(parts) == 1
+    with pytest.raises(palpate.Error, match="byte"):
+        other.restore(state[:-1])
     topology.clear()
     collisions.set_disabled_elements(thread_id, [0])
     topology.update()

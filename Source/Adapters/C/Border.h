@@ -6,12 +6,14 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace palpate::c {
 
@@ -49,6 +51,13 @@ std::span<Item> arrayOf(T* data, std::size_t count, const char* name) {
     throw Error(ErrorCode::TooLarge, std::string(name) + " has " + std::to_string(count) +
                                          " items; a program has no memory for them");
   return {reinterpret_cast<Item*>(data), count};
+}
+/// Copies as many bytes as fit and gives the number of all.
+inline void copyBytes(const std::vector<std::byte>& from, std::uint8_t* to, std::size_t capacity,
+                      std::size_t* count) {
+  const std::size_t copied = std::min(from.size(), capacity);
+  std::copy_n(from.begin(), copied, reinterpret_cast<std::byte*>(to));
+  *count = from.size();
 }
 template <class T>
 std::span<T> array(T* data, std::size_t count, const char* name) {

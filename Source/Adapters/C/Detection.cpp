@@ -427,11 +427,8 @@ palpate_status palpate_capture(const palpate_cd* cd, const char* path) {
 }
 palpate_status palpate_save(const palpate_cd* cd, uint8_t* bytes, size_t capacity, size_t* count) {
   return guarded(__func__, [&] {
-    const auto out = std::as_writable_bytes(arrayOf<uint8_t>(bytes, capacity, "bytes"));
-    given(count, "count");
-    const std::vector<std::byte> state = of(cd).save();
-    std::copy_n(state.begin(), std::min(state.size(), out.size()), out.begin());
-    *count = state.size();
+    array(bytes, capacity, "bytes"), given(count, "count");
+    copyBytes(of(cd).save(), bytes, capacity, count);
   });
 }
 palpate_status palpate_restore(palpate_cd* cd, const uint8_t* bytes, size_t count) {

@@ -71,3 +71,15 @@ palpate_status palpate_get_thread_events(const palpate_topology* topology,
 palpate_status palpate_clear_thread_events(palpate_topology* topology) {
   return guarded(__func__, [&] { of(topology).clear(); });
 }
+palpate_status palpate_save_topology(const palpate_topology* topology, uint8_t* bytes,
+                                     size_t capacity, size_t* count) {
+  return guarded(__func__, [&] {
+    array(bytes, capacity, "bytes"), given(count, "count");
+    copyBytes(of(topology).save(), bytes, capacity, count);
+  });
+}
+palpate_status palpate_restore_topology(palpate_topology* topology, const uint8_t* bytes,
+                                        size_t count) {
+  return guarded(__func__,
+                 [&] { of(topology).restore(std::as_bytes(array(bytes, count, "bytes"))); });
+}

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::python {
@@ -91,6 +92,15 @@ py::array_t<Number> newArray(std::size_t rows, std::size_t width = 0) {
   std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(rows)};
   if (width != 0) shape.push_back(static_cast<py::ssize_t>(width));
   return py::array_t<Number>(shape);
+}
+
+inline py::bytes bytesOf(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+/// Valid as long as the object.
+inline std::span<const std::byte> bytesIn(const py::bytes& object) {
+  const std::string_view bytes = object;
+  return std::as_bytes(std::span(bytes.data(), bytes.size()));
 }
 
 py::array_t<double> copyOf(std::span<const Eigen::Vector3d> positions);

@@ -26,10 +26,6 @@ std::chrono::microseconds microsecondsOf(double seconds) {
       static_cast<std::int64_t>(1e6 * std::clamp(seconds, -kMost, kMost)));
 }
 
-py::bytes bytesOf(std::span<const std::byte> bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 }  // namespace
 
 void addFrames(CollisionsClass& collisions) {
@@ -84,10 +80,7 @@ The state: geometries and pairs with their ids, the step, the last answers, cont
       .def(
           "restore",
           [](Collisions& self, const py::bytes& state) {
-            const std::string_view bytes = state;
-            self.work([&](OctreeBasedCD& d) {
-              d.restore(std::as_bytes(std::span(bytes.data(), bytes.size())));
-            });
+            self.work([&](OctreeBasedCD& d) { d.restore(bytesIn(state)); });
           },
           py::arg("state"),
           R"(restore(state) -> None

@@ -98,6 +98,23 @@ a number), change, thread (2,) and loop (2,): vertices or NO_ELEMENT, time in [0
             self.owner->change([&](OctreeBasedCD&) { self.topology.clear(); });
           },
           "clear() -> None\n\nForgets the events of earlier updates.")
+      .def(
+          "save",
+          [](const Topology& self) {
+            return bytesOf(self.read([](const ThreadTopology& t) { return t.save(); }));
+          },
+          R"(save() -> bytes
+
+The counts and events, beside the state of the collisions. Restore both.)")
+      .def(
+          "restore",
+          [](Topology& self, const py::bytes& state) {
+            const auto bytes = bytesIn(state);
+            self.owner->change([&](OctreeBasedCD&) { self.topology.restore(bytes); });
+          },
+          py::arg("state"), R"(restore(state) -> None
+
+Raises Error for other or changed bytes.)")
       .def("__repr__", [](const Topology&) { return "<palpate.ThreadTopology>"; });
 }
 

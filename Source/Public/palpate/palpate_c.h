@@ -584,6 +584,11 @@ PALPATE_EXPORT palpate_status palpate_get_thread_events(const palpate_topology* 
                                                         const palpate_thread_event** events,
                                                         size_t* count);
 PALPATE_EXPORT palpate_status palpate_clear_thread_events(palpate_topology* topology);
+/// The counts and events, beside palpate_save(). Restore both.
+PALPATE_EXPORT palpate_status palpate_save_topology(const palpate_topology* topology,
+                                                    uint8_t* bytes, size_t capacity, size_t* count);
+PALPATE_EXPORT palpate_status palpate_restore_topology(palpate_topology* topology,
+                                                       const uint8_t* bytes, size_t count);
 
 /// Bytes.
 typedef struct palpate_memory {

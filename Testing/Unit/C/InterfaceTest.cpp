@@ -952,6 +952,16 @@ TEST(CTopology, CountsAndEventsAreThoseOfCpp) {
   EXPECT_EQ(std::memcmp(events, same.events().data(), count * sizeof *events), 0);
   int none;
   EXPECT_EQ(palpate_get_thread_count(topology, 9, &none, nullptr), PALPATE_INDEX_OUT_OF_RANGE);
+  std::vector<std::uint8_t> state(same.save().size());
+  std::size_t size;
+  ASSERT_OK(palpate_save_topology(topology, state.data(), state.size(), &size));
+  EXPECT_EQ(size, state.size());
+  EXPECT_TRUE(std::ranges::equal(std::as_bytes(std::span(state)), same.save()));
+  ASSERT_OK(palpate_clear_thread_events(topology));
+  ASSERT_OK(palpate_restore_topology(topology, state.data(), size));
+  EXPECT_EQ(palpate_restore_topology(topology, state.data(), size - 1), PALPATE_FILE);
+  ASSERT_OK(palpate_get_thread_events(topology, &events, &count));
+  EXPECT_EQ(count, same.events().size());
   ASSERT_OK(palpate_clear_thread_events(topology));
   ASSERT_OK(palpate_get_thread_events(topology, &events, &count));
   EXPECT_EQ(count, 0u);

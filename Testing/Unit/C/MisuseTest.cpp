@@ -368,6 +368,8 @@ TEST_F(CMisuse, NullIsRefused) {
       [&] { return palpate_get_thread_events(t, nullptr, count); },
       [&] { return palpate_get_thread_events(t, &events, nullptr); },
       [&] { return palpate_clear_thread_events(nullptr); },
+      [&] { return palpate_save_topology(nullptr, nullptr, 0, count); },
+      [&] { return palpate_restore_topology(nullptr, nullptr, 0); },
       [&] { return palpate_get_smooth_normals(nullptr, a, b, 0, view, count); },
       [&] { return palpate_get_smooth_normals(cd, a, b, 0, nullptr, count); },
       [&] { return palpate_get_smooth_normals(cd, a, b, 0, view, nullptr); },
