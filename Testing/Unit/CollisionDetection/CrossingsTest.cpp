@@ -1,5 +1,6 @@
 #include "Common/ExpectRefused.h"
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
 #include "Unit/Math/ImpactOracle.h"
 
@@ -124,10 +125,11 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
                      points = particles(random, 60, 0.0);
   const Pairs pairs{{&soupA, &soupB}, {&soupA, &soupA}, {&soupA, &line},
                     {&line, &soupA},  {&line, &line},   {&points, &soupA}};
-  std::size_t passages = 0;
+  std::size_t passages = 0, number = 0;
   for (const double motion : {0.05, 0.5})
     for (const double thickness : {0.0, 0.02})
       for (const auto& [a, b] : pairs) {
+        if (isLeftOut(number++)) continue;
         const CrossingStep step{*a, *b, moved(random, a->positions, motion),
                                 moved(random, b->positions, motion)};
         passages += expectCrossings(step, thickness);
@@ -136,7 +138,7 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
         };
         expectCrossings(step, thickness, everyThird);
       }
-  EXPECT_GT(passages, 500u);
+  EXPECT_GE(passages, leastOf(500));
 }
 
 /// All positions have small whole coordinates: features pass through borders, and planes hold
@@ -150,14 +152,14 @@ TEST(Crossings, AreThoseOfRationalArithmeticOnAGrid) {
     return all;
   };
   std::size_t passages = 0;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < casesOf(12); ++i) {
     TestGeometry a = testGeometry(soup(random, 12, 1)), b = testGeometry(soup(random, 12, 1));
     a.positions = grid(a.positions.size());
     b.positions = grid(b.positions.size());
     passages += expectCrossings({a, b, grid(a.positions.size()), grid(b.positions.size())}, 0.0);
     passages += expectCrossings({a, a, grid(a.positions.size()), {}}, 0.0);
   }
-  EXPECT_GT(passages, 1000u);
+  EXPECT_GE(passages, leastOf(1000));
 }
 
 TEST(Crossings, NeedContinuousWithContacts) {
