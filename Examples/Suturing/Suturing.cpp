@@ -112,8 +112,12 @@ class Suturing : public LiveScene {
     for (Vector3d& p : bed.positions) p = {2.5 * p.x(), 2.7 + 4.8 * p.y(), -2};
     m_bed = m_world.addRigidMesh("wound", bed);
     m_world.addGuard(m_sheets[0], m_sheets[1]);
-    for (const std::size_t side : {0u, 1u})
-      m_edges[side] = watch(m_stitch, m_sheets[side], rimAt(m_sheets[side], kStitchHoles[side]));
+    for (const std::size_t side : {0u, 1u}) {
+      const auto rim = rimAt(m_sheets[side], kStitchHoles[side]);
+      m_edges[side] = watch(m_stitch, m_sheets[side], rim);
+      // The guide does not feel the tissue, so it must not be moved away from the stitch.
+      for (const std::uint32_t v : rim) mobility[m_world.bodies()[m_sheets[side]].first + v] = 0;
+    }
   }
 
   World& world() override { return m_world; }
