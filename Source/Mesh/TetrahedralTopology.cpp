@@ -4,6 +4,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace palpate {
@@ -25,20 +26,27 @@ bool ascends(const Tetrahedron& tetrahedron, std::uint32_t side) {
 }
 
 /// For each side, the side of the tetrahedron beyond it; kNone: the outside.
-CountedVector<std::uint32_t> opposites(const TetrahedralTopology& topology,
+CountedVector<std::uint32_t> opposites(const TetrahedralTopology& topology, std::size_t vertexCount,
                                        std::optional<OverusedFace>& fault) {
   const CountedVector<Tetrahedron>& tetrahedra = topology.tetrahedra;
-  CountedVector<Face> faces;
-  faces.reserve(4 * tetrahedra.size());
+  CountedVector<Face> all;
+  all.reserve(4 * tetrahedra.size());
   topology.forEach([&](std::uint32_t t) {
     for (std::uint32_t side = 4 * t; side < 4 * t + 4; ++side) {
-      faces.push_back({faceOf(tetrahedra[t], side % 4), side});
-      std::sort(faces.back().vertices.begin(), faces.back().vertices.end());
+      all.push_back({faceOf(tetrahedra[t], side % 4), side});
+      std::sort(all.back().vertices.begin(), all.back().vertices.end());
     }
   });
-  std::sort(faces.begin(), faces.end(), [](const Face& l, const Face& r) {
-    return l.vertices != r.vertices ? l.vertices < r.vertices : l.side < r.side;
-  });
+  // By the lowest vertex in linear time, then the few faces of each vertex.
+  CountedVector<std::size_t> ends(vertexCount + 1, 0);
+  for (const Face& face : all) ++ends[face.vertices[0] + 1];
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  CountedVector<Face> faces(all.size());
+  for (const Face& face : all) faces[ends[face.vertices[0]]++] = face;
+  for (std::size_t vertex = 0, begin = 0; vertex < vertexCount; begin = ends[vertex++])
+    std::sort(faces.data() + begin, faces.data() + ends[vertex], [](const Face& l, const Face& r) {
+      return l.vertices != r.vertices ? l.vertices < r.vertices : l.side < r.side;
+    });
   CountedVector<std::uint32_t> beyond(4 * tetrahedra.size(), kNone);
   for (std::size_t i = 0; i + 1 < faces.size(); ++i) {
     if (faces[i].vertices != faces[i + 1].vertices) continue;
@@ -103,7 +111,7 @@ TetrahedralTopology topologyOf(std::span<const Eigen::Vector3d> rest,
   }));
   TetrahedralTopology topology{
       {tetrahedra.begin(), tetrahedra.end()}, {}, {}, {}, {removed.begin(), removed.end()}};
-  const CountedVector<std::uint32_t> beyond = opposites(topology, fault);
+  const CountedVector<std::uint32_t> beyond = opposites(topology, rest.size(), fault);
   if (fault) return topology;
   topology.isPositive = findOrientations(rest, topology, beyond);
   topology.forEach([&](std::uint32_t t) {
