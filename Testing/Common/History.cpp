@@ -521,8 +521,10 @@ bool RandomHistory::startsApart(const Pair& pair) const {
   };
   const GeometryId a = add(pair.a), b = pair.a == pair.b ? a : add(pair.b);
   const bool areMeshes = m_bodies.at(pair.a).isMesh() && m_bodies.at(pair.b).isMesh();
-  collisions.addCollisionPair(a, b,
-                              {.method = areMeshes ? Method::Intersection : Method::Proximity});
+  PairSettings settings{.method = Method::Intersection};
+  if (!areMeshes)  // features that are near at rest have no radius
+    settings = {.method = Method::Proximity, .restDistance = pair.settings.restDistance};
+  collisions.addCollisionPair(a, b, settings);
   collisions.detectCollision();
   return areMeshes ? collisions.collisionData(a, b).intersectingTriangles().empty()
                    : collisions.statistics().contacts == 0;
