@@ -21,7 +21,7 @@ using Cause = ThreadEvent::Cause;
 
 struct Watch {
   VertexPath thread, loop;  ///< or two parts of threads
-  bool isOfParts;
+  bool isOfParts = false;
   std::vector<Segment> threadEdges, loopEdges;  ///< whose loss is that of the paths
   int count = 0, countBefore = 0;  ///< after the last update(); at the start of its step
   bool isLost = false, wasLost = false;
@@ -120,14 +120,42 @@ void copyVertices(const Geometry& geometry, const VertexPath& path,
 constexpr std::string_view kTopologyTitle = "palpate-threads";
 constexpr std::uint32_t kTopologyVersion = 1;
 
+/// Whether the edges are some of those between consecutive vertices, in their order.
+bool areEdgesOf(const VertexPath& path, const std::vector<Segment>& edges) {
+  const std::vector<std::uint32_t>& v = path.vertices;
+  std::size_t i = 0;
+  for (const Segment& edge : edges) {
+    while (i < v.size() && edge != Segment{v[i], v[(i + 1) % v.size()]}) ++i;
+    if (i++ >= v.size()) return false;
+  }
+  return true;
+}
+
 template <class File>
 void describeWatch(File& file, Watch& watch) {
+  description::fieldOf(file, watch.isOfParts);
   for (VertexPath* path : {&watch.thread, &watch.loop}) {
     file.integer(path->geometry);
     description::itemsOf(file, path->vertices, sizeof(std::uint32_t),
                          [&](std::uint32_t& vertex) { file.integer(vertex); });
     if constexpr (File::kReads)
-      file.need(path->vertices.size() >= (path == &watch.loop ? 3 : 2), "a path is too short");
+      file.need(path->vertices.size() >= (path == &watch.loop && !watch.isOfParts ? 3 : 2),
+                "a path is too short");
+  }
+  for (auto* edges : {&watch.threadEdges, &watch.loopEdges})
+    description::itemsOf(file, *edges, sizeof(Segment),
+                         [&](Segment& edge) { description::fieldOf(file, edge); });
+  for (auto* positions : {&watch.end, &watch.start})
+    description::itemsOf(file, *positions, sizeof(Eigen::Vector3d),
+                         [&](Eigen::Vector3d& p) { description::fieldOf(file, p); });
+  if constexpr (File::kReads) {
+    file.need(
+        areEdgesOf(watch.thread, watch.threadEdges) && areEdgesOf(watch.loop, watch.loopEdges),
+        "an edge is not of its path");
+    const std::size_t size =
+        watch.isOfParts ? watch.thread.vertices.size() + watch.loop.vertices.size() : 0;
+    file.need(watch.end.size() == size && watch.start.size() == size,
+              "a part has not one position for each vertex");
   }
   for (int* count : {&watch.count, &watch.countBefore}) {
     file.integer(*count);

@@ -11,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <functional>
@@ -355,15 +356,22 @@ TEST(SavedState, ThreadTopologyIsRestoredBesideIt) {
   OctreeBasedCD detection;
   const GeometryId thread = detection.addLineMesh(at, std::vector<Segment>{{0, 1}, {1, 2}}),
                    hole = detection.addTriangleMesh(square,
-                                                    std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}});
+                                                    std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}),
+                   other = detection.addLineMesh(Positions{{-1, -1, 0.4}, {1, -1, 0.4}},
+                                                 std::vector<Segment>{{0, 1}});
   ThreadTopology topology(detection);
   topology.add({thread, {0, 1, 2}}, {hole, {0, 1, 2, 3}});
+  topology.addParts({thread, {1, 2}}, {other, {0, 1}});
+  topology.add({other, {0, 1}}, {hole, {0, 1, 2, 3}});  // is torn in the last steps
   const auto run = [&] {
     std::vector<std::vector<ThreadEvent>> events;
     for (int i = 1; i < 6; ++i) {
       Positions now = at;
       for (int v = 0; v < 2; ++v) now[v][2] -= 0.3 * i;
       detection.setPositions(thread, now);
+      const double y = -1 + 0.5 * i;
+      detection.setPositions(other, Positions{{-1, y, 0.4}, {1, y, 0.4}});
+      if (i == 4) detection.setDisabledElements(other, std::vector<std::uint32_t>{0});
       for (int repeats = 0; repeats < 2; ++repeats) {
         topology.update();
         events.emplace_back(topology.events().begin(), topology.events().end());
@@ -377,6 +385,9 @@ TEST(SavedState, ThreadTopologyIsRestoredBesideIt) {
   const Bytes state = detection.save(), ofThreads = topology.save();
   const auto truth = run();
   EXPECT_NE(topology.count(0), 0);
+  const auto ofParts = [](const ThreadEvent& e) { return e.index == 1 && e.change != 0; };
+  EXPECT_TRUE(std::any_of(truth.back().begin(), truth.back().end(), ofParts));
+  EXPECT_TRUE(topology.isLost(2));
   detection.restore(state);
   topology.restore(ofThreads);
   EXPECT_EQ(topology.count(0), 0);
