@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <map>
 #include <utility>
 
 namespace palpate {
@@ -22,7 +21,7 @@ constexpr std::size_t kElementsPerSlice = 64, kMostSlices = 4096;
 
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
-  floats.resize(positions.size());
+  resizeSparingly(floats, positions.size());
   threads.forChunks(positions.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
   });
@@ -76,7 +75,7 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     bool fits = false;
     if (isCut) canRefit = replaceElements(mesh.topology, settings);
     if (canRefit && settings.update == OctreeUpdate::Auto) {
-      fitBoxes(mesh, settings, threads, isCut);
+      fitBoxes(mesh, settings, threads, false);
       lastUpdate = LooseOctree::Update::Refitted;
       fits = m_octree.isTight();
     }
@@ -106,52 +105,93 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
 /// become empty or too full, or if the cut is so large that a rebuild costs less.
 bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeSettings& settings) {
   constexpr std::size_t kLargeCut = 4096;
+  constexpr std::uint32_t kNoGroup = 0xffffffffu;
   const auto order = m_octree.order();
   const auto groups = m_octree.groups();
-  if (order.empty() || topology.removed.empty()) return false;
-  CountedVector<std::uint32_t> places, groupsOfPlaces;
-  std::uint32_t firstAdded = 0;
-  for (std::uint32_t i = 0; i < order.size(); ++i) {
-    firstAdded = std::max(firstAdded, order[i] + 1);
-    if (topology.isDisabled[order[i]] && topology.isRemoved(order[i])) places.push_back(i);
+  if (order.empty()) return false;
+  if (m_groupsLayout != m_octree.layout()) {
+    m_groupsLayout = 0;
+    const std::size_t count = *std::max_element(order.begin(), order.end()) + std::size_t{1};
+    m_groupOf.reserve(withSpare(count));
+    m_groupOf.assign(count, kNoGroup);
+    for (std::uint32_t g = 0; g + 1 < groups.size(); ++g)
+      for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) m_groupOf[order[i]] = g;
+    m_groupsLayout = m_octree.layout();
   }
-  const std::size_t added = topology.elements.size() - firstAdded;
-  if (places.size() * std::max<std::size_t>(1, added) > kLargeCut + order.size()) return false;
+  const auto firstAdded = static_cast<std::uint32_t>(m_groupOf.size());
+  struct Gone {
+    std::uint32_t place, group;
+    std::array<float, 3> sum;
+  };
   const auto sumOf = [&](const Triangle& t) {
     const FloatPoint &a = m_floats[t[0]], &b = m_floats[t[1]], &c = m_floats[t[2]];
     return std::array{a.x + b.x + c.x, a.y + b.y + c.y, a.z + b.z + c.z};
   };
-  CountedVector<std::array<float, 3>> sums;
-  std::map<std::uint32_t, std::int64_t> sizes;
-  for (const std::uint32_t place : places) {
-    sums.push_back(sumOf(m_ordered[place]));
-    const auto g = static_cast<std::uint32_t>(
-        std::upper_bound(groups.begin(), groups.end(), place) - groups.begin() - 1);
-    groupsOfPlaces.push_back(g);
-    sizes.try_emplace(g, groups[g + 1] - groups[g]).first->second -= 1;
+  CountedVector<Gone> gone;
+  for (const std::uint32_t id : topology.removed) {
+    if (id >= firstAdded || m_groupOf[id] == kNoGroup) continue;
+    const std::uint32_t group = m_groupOf[id];
+    const auto place = static_cast<std::uint32_t>(
+        std::find(order.begin() + groups[group], order.begin() + groups[group + 1], id) -
+        order.begin());
+    gone.push_back({place, group, sumOf(m_ordered[place])});
   }
+  std::sort(gone.begin(), gone.end(),
+            [](const Gone& l, const Gone& r) { return l.place < r.place; });
+  const std::size_t added = topology.elements.size() - firstAdded;
+  if (gone.empty() || gone.size() * std::max<std::size_t>(1, added) > kLargeCut + order.size())
+    return false;
   CountedVector<Octree::Joining> joining;
   for (std::uint32_t id = firstAdded; id < topology.elements.size(); ++id) {
     if (topology.isRemoved(id)) continue;
-    if (places.empty()) return false;
     const auto sum = sumOf(topology.elements[id]);
-    std::size_t nearest = 0;
+    std::uint32_t nearest = kNoGroup;
     float least = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < sums.size(); ++i) {
+    for (const Gone& one : gone) {
       float squared = 0;
-      for (std::size_t k = 0; k < 3; ++k) squared += (sums[i][k] - sum[k]) * (sums[i][k] - sum[k]);
-      if (squared < least) least = squared, nearest = i;
+      for (std::size_t k = 0; k < 3; ++k) squared += (one.sum[k] - sum[k]) * (one.sum[k] - sum[k]);
+      if (squared < least || nearest == kNoGroup) least = squared, nearest = one.group;
     }
-    joining.push_back({groupsOfPlaces[nearest], id});
-    ++sizes[groupsOfPlaces[nearest]];
+    joining.push_back({nearest, id});
   }
-  for (const auto& [group, size] : sizes)
-    if (size < 1 || size > 2 * settings.maxElementsPerLeaf) return false;
   std::sort(joining.begin(), joining.end(), [](const auto& a, const auto& b) {
     return std::pair(a.group, a.element) < std::pair(b.group, b.element);
   });
-  m_octree.replace(places, joining);
-  startOrdered(m_octree.size());
+  CountedVector<std::uint32_t> places;
+  const auto fits = [&](std::uint32_t group) {
+    const auto countIn = [&](const auto& list) {
+      return std::count_if(list.begin(), list.end(),
+                           [&](const auto& one) { return one.group == group; });
+    };
+    const std::int64_t size =
+        std::int64_t{groups[group + 1]} - groups[group] - countIn(gone) + countIn(joining);
+    return size >= 1 && size <= 2 * std::int64_t{settings.maxElementsPerLeaf};
+  };
+  for (std::size_t i = 0; i < gone.size(); ++i) {
+    if ((i == 0 || gone[i].group != gone[i - 1].group) && !fits(gone[i].group)) return false;
+    places.push_back(gone[i].place);
+  }
+  reserveAmortized(m_groupOf, topology.elements.size());
+  // Nothing below throws, but for want of memory: the next update then builds the octree anew.
+  m_groupsLayout = 0;
+  const auto moves = m_octree.replace(places, joining);
+  const std::size_t size = m_octree.size(), padded = size + BoxArrays::kPadding;
+  const std::span<Triangle> ordered =
+      m_orderedMemory.resized(m_ordered, std::max(padded, m_ordered.size() + BoxArrays::kPadding));
+  if (ordered.empty()) {
+    startOrdered(size);
+    for (std::size_t i = 0; i < size; ++i) m_ordered[i] = topology.elements[m_octree.order()[i]];
+  } else {
+    Octree::move(ordered.data(), moves);
+    m_ordered = ordered.first(size);
+    for (const auto& [group, element] : joining)
+      for (std::uint32_t i = groups[group]; i < groups[group + 1]; ++i)
+        m_ordered[i] = topology.elements[m_octree.order()[i]];
+  }
+  m_groupOf.resize(topology.elements.size(), kNoGroup);
+  for (const std::uint32_t id : topology.removed) m_groupOf[id] = kNoGroup;
+  for (const auto& [group, element] : joining) m_groupOf[element] = group;
+  m_groupsLayout = m_octree.layout();
   return true;
 }
 
@@ -365,6 +405,8 @@ void GeometryOctree::copy(const GeometryOctree& other) {
 
 void GeometryOctree::releaseMemory() {
   m_stars = {};
+  m_groupOf = {};
+  m_groupsLayout = 0;
   m_corners = {};
   m_cornerFloats = {};
   m_cornerTriangles = {};
@@ -416,7 +458,9 @@ FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads
 /// Starts m_ordered in memory that may have held keys. Its values are indeterminate.
 void GeometryOctree::startOrdered(std::size_t size) {
   m_ordered = {};
-  m_ordered = m_orderedMemory.start<Triangle>(size + BoxArrays::kPadding).first(size);
+  const std::size_t padded = size + BoxArrays::kPadding;
+  m_orderedMemory.reserve(withSpare(padded) * sizeof(Triangle));
+  m_ordered = m_orderedMemory.start<Triangle>(padded).first(size);
 }
 
 void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& settings,
@@ -453,8 +497,8 @@ const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh, cons
 
 std::size_t GeometryOctree::bytesBesidesOctree() const {
   return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) +
-         m_orderedMemory.bytes() + m_slices.capacity() * sizeof(Slice) +
-         m_slicePieces.items.capacity() * sizeof(std::uint32_t);
+         m_groupOf.capacity() * sizeof(std::uint32_t) + m_orderedMemory.bytes() +
+         m_slices.capacity() * sizeof(Slice) + m_slicePieces.bytes();
 }
 
 }  // namespace palpate

@@ -145,6 +145,9 @@ class GeometryOctree {
   std::uint64_t m_slicesLayout = 0;  ///< Octree::layout() of the slices
   std::size_t m_nextSlice = 0;
   double m_lag = 0;
+  // Of replaceElements(), made by the first one:
+  CountedVector<std::uint32_t> m_groupOf;  ///< per element: its group of the octree, or none
+  std::uint64_t m_groupsLayout = 0;        ///< Octree::layout() of m_groupOf
   bool m_isLagging = false, m_isLoose = false;
   Revision m_lastPositions;    ///< of the last update of any kind
   std::size_t m_refitted = 0;  ///< slices that updateChanged() fitted since looseness was measured

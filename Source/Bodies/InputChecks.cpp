@@ -74,18 +74,18 @@ CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel& label,
   return rest;
 }
 
-void checkCounts(const GeometryLabel& label, std::span<const Eigen::Vector3d> positions,
+void checkCounts(const GeometryLabel& label, std::size_t vertexCount,
                  std::span<const Triangle> triangles, GeometryType type, std::size_t first) {
   const bool lines = type == GeometryType::Lines;
   const std::string element = lines ? "segment" : "triangle";
-  if (positions.size() > kMostElements || first + triangles.size() > kMostElements)
+  if (vertexCount > kMostElements || first + triangles.size() > kMostElements)
     throw Error(ErrorCode::TooLarge,
-                nameOf(label) + ": " + std::to_string(positions.size()) + " vertices and " +
+                nameOf(label) + ": " + std::to_string(vertexCount) + " vertices and " +
                     std::to_string(first + triangles.size()) + " " + element +
                     "s; at most 2^28 of each are supported",
                 label.id);
   for (std::size_t t = 0; t < triangles.size(); ++t) {
-    checkIndices(label, element, first + t, triangles[t], positions.size());
+    checkIndices(label, element, first + t, triangles[t], vertexCount);
     if (lines && triangles[t][0] == triangles[t][1])
       throw Error(ErrorCode::IndexOutOfRange,
                   nameOf(label) + ", segment " + std::to_string(t) + " joins vertex " +
@@ -94,19 +94,18 @@ void checkCounts(const GeometryLabel& label, std::span<const Eigen::Vector3d> po
   }
 }
 
-TetrahedralTopology checkedTopology(const GeometryLabel& label,
-                                    std::span<const Eigen::Vector3d> rest,
-                                    std::span<const Tetrahedron> tetrahedra,
-                                    std::span<const std::uint32_t> removed) {
-  if (rest.size() > kMostElements || tetrahedra.size() > kMostTetrahedra)
+void checkTetrahedra(const GeometryLabel& label, std::size_t vertexCount,
+                     std::span<const Tetrahedron> tetrahedra, std::size_t first) {
+  if (vertexCount > kMostElements || first + tetrahedra.size() > kMostTetrahedra)
     throw Error(ErrorCode::TooLarge,
-                nameOf(label) + ": " + std::to_string(rest.size()) + " vertices and " +
-                    std::to_string(tetrahedra.size()) +
+                nameOf(label) + ": " + std::to_string(vertexCount) + " vertices and " +
+                    std::to_string(first + tetrahedra.size()) +
                     " tetrahedra; at most 2^28 and 2^26 are supported",
                 label.id);
-  for (std::size_t t = 0; t < tetrahedra.size(); ++t) {
-    checkIndices(label, "tetrahedron", t, tetrahedra[t], rest.size());
-    Tetrahedron sorted = tetrahedra[t];
+  for (std::size_t i = 0; i < tetrahedra.size(); ++i) {
+    const std::size_t t = first + i;
+    checkIndices(label, "tetrahedron", t, tetrahedra[i], vertexCount);
+    Tetrahedron sorted = tetrahedra[i];
     std::sort(sorted.begin(), sorted.end());
     if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
       throw Error(ErrorCode::IndexOutOfRange,
@@ -114,17 +113,28 @@ TetrahedralTopology checkedTopology(const GeometryLabel& label,
                       std::to_string(*twice) + " twice",
                   label.id, t);
   }
-  std::optional<OverusedFace> fault;
-  TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault, removed);
-  if (!fault) return topology;
-  const auto& [a, b, c] = fault->face;
-  const auto& [s, t, u] = fault->tetrahedra;
+}
+
+void refuse(const GeometryLabel& label, const OverusedFace& fault) {
+  const auto& [a, b, c] = fault.face;
+  const auto& [s, t, u] = fault.tetrahedra;
   throw Error(ErrorCode::SharedFace,
               nameOf(label) + ", tetrahedron " + std::to_string(u) + ": its face with vertices " +
                   std::to_string(a) + ", " + std::to_string(b) + " and " + std::to_string(c) +
                   " already belongs to tetrahedra " + std::to_string(s) + " and " +
                   std::to_string(t),
               label.id, u);
+}
+
+TetrahedralTopology checkedTopology(const GeometryLabel& label,
+                                    std::span<const Eigen::Vector3d> rest,
+                                    std::span<const Tetrahedron> tetrahedra,
+                                    std::span<const std::uint32_t> removed) {
+  checkTetrahedra(label, rest.size(), tetrahedra);
+  std::optional<OverusedFace> fault;
+  TetrahedralTopology topology = topologyOf(rest, tetrahedra, fault, removed);
+  if (fault) refuse(label, *fault);
+  return topology;
 }
 
 CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel& label, const std::string& element,

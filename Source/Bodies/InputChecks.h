@@ -26,8 +26,12 @@ Eigen::AlignedBox3d checkPositions(const GeometryLabel&, std::span<const Eigen::
 /// Returns a copy of the positions of a new topology.
 CountedVector<Eigen::Vector3d> checkedRest(const GeometryLabel&, std::span<const Eigen::Vector3d>);
 /// first: the id of the first triangle.
-void checkCounts(const GeometryLabel&, std::span<const Eigen::Vector3d>, std::span<const Triangle>,
+void checkCounts(const GeometryLabel&, std::size_t vertexCount, std::span<const Triangle>,
                  GeometryType, std::size_t first = 0);
+/// first: the id of the first tetrahedron.
+void checkTetrahedra(const GeometryLabel&, std::size_t vertexCount, std::span<const Tetrahedron>,
+                     std::size_t first = 0);
+[[noreturn]] void refuse(const GeometryLabel&, const OverusedFace&);
 /// removed: ascending; they count as absent.
 TetrahedralTopology checkedTopology(const GeometryLabel&, std::span<const Eigen::Vector3d> rest,
                                     std::span<const Tetrahedron>,

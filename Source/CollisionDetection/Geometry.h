@@ -18,6 +18,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <utility>
 
@@ -50,6 +51,15 @@ class GeometryMotion {
   RigidSearch m_search;
 };
 
+/// The smallest of some heights, which changes as heights are added and removed.
+struct SmallestHeight {
+  double value = std::numeric_limits<double>::infinity();  ///< L
+  std::size_t count = 0;                                   ///< of those that are as small
+  void add(double height);
+  void remove(double height);  ///< an added one; afterwards isKnown() may be false
+  bool isKnown() const { return count > 0 || value == std::numeric_limits<double>::infinity(); }
+};
+
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
 struct Geometry : CountedObject {
@@ -60,8 +70,8 @@ struct Geometry : CountedObject {
 
   Body body;
   CollisionFilter filter;
-  GeometryStep step;          ///< writes the positions of both ends
-  double smallestHeight = 0;  ///< L: of all triangles with area, in the shape at rest
+  GeometryStep step;              ///< writes the positions of both ends
+  SmallestHeight smallestHeight;  ///< of all triangles with area, in the shape at rest
   double shortEdge = 0;  ///< L: one edge in 16 is shorter at rest, before cuts; 0 without edges
   GeometryMotion motion;
   PieceMotion pieces;   ///< from one detection to the next, for KeptPairs

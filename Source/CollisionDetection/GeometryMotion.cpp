@@ -26,7 +26,7 @@ double extentOf(const Body& body) {
 
 GeometryInStep Geometry::inStep() const {
   return {body.mesh,
-          smallestHeight,
+          smallestHeight.value,
           motion.range(),
           motion.correction(),
           motion.arcDeviation(),

@@ -7,6 +7,7 @@
 #include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <cstring>
@@ -54,6 +55,8 @@ GeometryStep::CheckedBody GeometryStep::checkedBody(const GeometryLabel& label,
                                                     MotionRange* moved) {
   BodyMemory& free = freeBody();
   free.revision.reset();
+  if (positions.size() > free.positions->capacity())
+    free.positions->reserve(withSpare(positions.size()));
   free.positions->resize(positions.size());
   const auto bounds =
       checkPositions(label, positions, free.positions->data(), which, threads, from, moved);
@@ -80,32 +83,51 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
   checked.memory->revision = end.bodyRevision();
 }
 
-GeometryStep::LongerBodies GeometryStep::withNewVertices(
-    const TriangleMesh& mesh, std::span<const Eigen::Vector3d> positions) const {
-  const auto longer = [&](const Positions& end) {
-    auto body = std::make_shared<CountedVector<Eigen::Vector3d>>();
-    body->reserve(end.size() + positions.size());
-    body->assign(end.body().begin(), end.body().end());
-    body->insert(body->end(), positions.begin(), positions.end());
-    return Positions::Body(std::move(body));
-  };
-  LongerBodies bodies{longer(mesh.now)};
-  bodies[1] = mesh.before.hasSameBody(mesh.now) ? bodies[0] : longer(mesh.before);
-  bodies[2] = m_detected.hasSameBody(mesh.now)      ? bodies[0]
-              : m_detected.hasSameBody(mesh.before) ? bodies[1]
-                                                    : longer(m_detected);
-  return bodies;
+void GeometryStep::reserveNewVertices(TriangleMesh& mesh, std::size_t count) {
+  for (Positions* end : ends(mesh)) {
+    const Positions::Body body = end->sharedBody();
+    std::vector<Positions*> same;
+    for (Positions* other : ends(mesh))
+      if (other->sharedBody() == body) same.push_back(other);
+    if (end != same.front()) continue;
+    const auto own = std::find_if(m_bodies.begin(), m_bodies.end(),
+                                  [&](const auto& memory) { return memory->positions == body; });
+    const std::size_t size = body->size() + count;
+    // These ends, the memory itself, and `body`.
+    if (own != m_bodies.end() && body.use_count() == static_cast<long>(same.size()) + 2) {
+      reserveAmortized(*(*own)->positions, size);
+      for (Positions* other : same) other->findData();
+      continue;
+    }
+    BodyMemory& free = freeBody();
+    free.revision.reset();
+    free.positions->reserve(withSpare(size));
+    free.positions->assign(body->begin(), body->end());
+    for (Positions* other : same) other->moveBody(free.positions);
+    free.revision = end->bodyRevision();
+  }
 }
 
-void GeometryStep::append(TriangleMesh& mesh, const LongerBodies& bodies) noexcept {
-  const std::array<Positions*, 3> ends{&mesh.now, &mesh.before, &m_detected};
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const auto same = static_cast<std::size_t>(std::find(bodies.begin(), bodies.end(), bodies[i]) -
-                                               bodies.begin());
-    if (same < i)
-      ends[i]->setBodyOf(*ends[same]);
-    else
-      ends[i]->setBody(bodies[i], m_revisions.next());
+void GeometryStep::appendVertices(TriangleMesh& mesh,
+                                  std::span<const Eigen::Vector3d> positions) noexcept {
+  Eigen::AlignedBox3d added;
+  for (const Eigen::Vector3d& p : positions) added.extend(p);
+  std::array<Positions*, 3> all = ends(mesh);
+  for (auto end = all.begin(); end != all.end(); ++end) {
+    const auto same = std::find_if(
+        all.begin(), end, [&](const Positions* other) { return other->hasSameBody(**end); });
+    if (same != end) {
+      (*end)->setBodyOf(**same);
+      continue;
+    }
+    const auto own = std::find_if(m_bodies.begin(), m_bodies.end(), [&](const auto& memory) {
+      return memory->positions == (*end)->sharedBody();
+    });
+    PALPATE_ASSERT(own != m_bodies.end());
+    BodyMemory& memory = **own;
+    memory.positions->insert(memory.positions->end(), positions.begin(), positions.end());
+    memory.revision = m_revisions.next();
+    (*end)->setBody(memory.positions, (*end)->bounds().merged(added), *memory.revision);
   }
 }
 

@@ -51,11 +51,11 @@ class GeometryStep {
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
                     const std::optional<Pose>& before, const Pose& now);
-  /// All positions with those of new vertices behind them: `now`, `before`, and detected().
-  using LongerBodies = std::array<Positions::Body, 3>;
-  LongerBodies withNewVertices(const TriangleMesh&, std::span<const Eigen::Vector3d>) const;
-  /// The new vertices are at rest in this step.
-  void append(TriangleMesh&, const LongerBodies&) noexcept;
+  /// Makes room for new vertices.
+  /// Cost     that of a copy of all positions where others use them, or where the room ends.
+  void reserveNewVertices(TriangleMesh&, std::size_t count);
+  /// Appends new vertices, for which there is room. They are at rest in this step.
+  void appendVertices(TriangleMesh&, std::span<const Eigen::Vector3d>) noexcept;
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
@@ -105,6 +105,9 @@ class GeometryStep {
                           const Threads&, const Eigen::Vector3d* from = nullptr,
                           MotionRange* moved = nullptr);
   void setBody(TriangleMesh&, Positions& end, const CheckedBody&) noexcept;
+  std::array<Positions*, 3> ends(TriangleMesh& mesh) {
+    return {&mesh.now, &mesh.before, &m_detected};
+  }
   void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
 
   Positions m_detected;

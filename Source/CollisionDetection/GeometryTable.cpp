@@ -3,7 +3,7 @@
 #include "CollisionDetection/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
-#include "Mesh/TopologyCut.h"
+#include "Mesh/TetrahedraCut.h"
 #include "Math/StableLength.h"
 #include "Core/Assert.h"
 
@@ -37,10 +37,10 @@ double heightOf(const Triangle& triangle, std::span<const Eigen::Vector3d> rest)
 }
 
 /// Computed in the body's frame, so that it does not depend on the transform.
-double smallestHeight(std::span<const Triangle> triangles, std::span<const Eigen::Vector3d> rest) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const Triangle& triangle : triangles)
-    smallest = std::min(smallest, heightOf(triangle, rest));
+SmallestHeight smallestHeight(std::span<const Triangle> triangles,
+                              std::span<const Eigen::Vector3d> rest) {
+  SmallestHeight smallest;
+  for (const Triangle& triangle : triangles) smallest.add(heightOf(triangle, rest));
   return smallest;
 }
 
@@ -56,6 +56,19 @@ double shortEdge(const MeshTopology& topology, std::span<const Eigen::Vector3d> 
 }
 
 }  // namespace
+
+void SmallestHeight::add(double height) {
+  if (height < value) {
+    value = height;
+    count = 0;
+  }
+  count += height == value;
+}
+
+void SmallestHeight::remove(double height) {
+  PALPATE_ASSERT(height >= value && (height > value || count > 0));
+  count -= height == value;
+}
 
 /// L: how far the octree's boxes may lag behind the positions; 0: not at all.
 static double lagFor(const Geometry& geometry) {
@@ -106,7 +119,7 @@ GeometryId GeometryTable::add(std::span<const Eigen::Vector3d> positions,
                               std::span<const Triangle> triangles, GeometryType type,
                               std::span<const double> radii) {
   const GeometryId id = nextId();
-  checkCounts(id, positions, triangles, type);
+  checkCounts(id, positions.size(), triangles, type);
   checkRadii(id, radii);
   MeshTopology topology(positions.size(), triangles);
   topology.type = type;
@@ -161,7 +174,7 @@ GeometryId GeometryTable::add(const CollisionProblem::Geometry& given) {
     return given.tetrahedra.empty() ? add(positions, std::span<const Triangle>(given.triangles))
                                     : add(positions, given.tetrahedra);
   CountedVector<Eigen::Vector3d> rest = checkedRest(id, positions);
-  checkCounts(id, positions, given.triangles, GeometryType::Triangles);
+  checkCounts(id, positions.size(), given.triangles, GeometryType::Triangles);
   const auto removed = checkedRemoval(id, "triangle", given.triangles.size(), {}, given.removed);
   MeshTopology topology(positions.size(), given.triangles, removed);
   std::unique_ptr<Solid> solid;
@@ -302,7 +315,7 @@ void GeometryTable::setTriangles(GeometryId id, std::span<const Eigen::Vector3d>
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "setTriangles()");
   checkMeshType(geometry.body, false, "setTriangles() is for triangle meshes");
-  checkCounts(geometry, positions, triangles, GeometryType::Triangles);
+  checkCounts(geometry, positions.size(), triangles, GeometryType::Triangles);
   setTopology(geometry, checkedRest(geometry, positions), {positions.size(), triangles}, {},
               prepare);
   ++m_state;
@@ -326,7 +339,7 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
                                 MeshTopology topology, std::unique_ptr<Solid> solid,
                                 const Preparation& prepare) {
   auto body = std::make_shared<const CountedVector<Eigen::Vector3d>>(rest);
-  prepare(topology, rest);
+  if (prepare) prepare(topology, rest);
   const double shortest = shortEdge(topology, rest);
   // Nothing below throws.
   geometry.body.mesh.rest = std::move(rest);
@@ -346,41 +359,39 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
 
 /// A change of topology that keeps what belongs to other elements.
 struct GeometryTable::Cut {
-  /// Checks the new vertices.
-  Cut(Geometry& newGeometry, const NewVertices& added)
-      : geometry(newGeometry), positions(added.positions.size()) {
-    const CountedVector<Eigen::Vector3d>& before = geometry.body.mesh.rest;
+  /// Checks the new vertices, and appends them to those at rest. If the cut is not applied, they
+  /// are removed again.
+  Cut(Geometry& newGeometry, const NewVertices& given)
+      : geometry(newGeometry), verticesBefore(rest().size()), positions(given.positions.size()) {
     const auto check = [&](std::span<const Eigen::Vector3d> from, const char* which,
                            Eigen::Vector3d* out) {
-      checkPositions(geometry, from, out, which, Threads(1), nullptr, nullptr, before.size());
+      checkPositions(geometry, from, out, which, Threads(1), nullptr, nullptr, verticesBefore);
     };
-    check(added.positions, "", positions.data());
-    if (!added.rest.empty() && added.rest.size() != positions.size())
+    check(given.positions, "", positions.data());
+    if (!given.rest.empty() && given.rest.size() != positions.size())
       throw Error(ErrorCode::WrongPositionCount,
-                  nameOf(geometry) + ": " + std::to_string(added.rest.size()) +
+                  nameOf(geometry) + ": " + std::to_string(given.rest.size()) +
                       " positions at rest given for " + std::to_string(positions.size()) +
                       " new vertices",
                   geometry.body.id);
-    rest.reserve(before.size() + positions.size());
-    rest.assign(before.begin(), before.end());
-    rest.resize(before.size() + positions.size());
-    check(added.rest.empty() ? added.positions : added.rest, " at rest",
-          rest.data() + before.size());
+    CountedVector<Eigen::Vector3d> newRest(positions.size());
+    check(given.rest.empty() ? given.positions : given.rest, " at rest", newRest.data());
+    reserveAmortized(rest(), verticesBefore + newRest.size());
+    rest().insert(rest().end(), newRest.begin(), newRest.end());
   }
-  /// Whether the cut removes no triangle that has it.
-  bool keepsSmallestHeight() const {
-    const TriangleMesh& mesh = geometry.body.mesh;
-    return std::none_of(topology.removed.begin(), topology.removed.end(), [&](std::uint32_t id) {
-      return id < mesh.topology.elements.size() &&
-             heightOf(mesh.topology.elements[id], mesh.rest) <= geometry.smallestHeight;
-    });
+  Cut(const Cut&) = delete;
+  Cut& operator=(const Cut&) = delete;
+  ~Cut() {
+    if (!isApplied) rest().resize(verticesBefore);
   }
+  CountedVector<Eigen::Vector3d>& rest() const { return geometry.body.mesh.rest; }
+
   Geometry& geometry;
+  const std::size_t verticesBefore;
   CountedVector<Eigen::Vector3d> positions;  ///< of the new vertices
-  CountedVector<Eigen::Vector3d> rest;       ///< of all vertices
-  MeshTopology topology{};
-  std::unique_ptr<Solid> solid{};
-  CountedVector<std::uint32_t> tags{};  ///< TriangleMesh::tags
+  std::span<const std::uint32_t> removed{};  ///< triangles, ascending
+  std::span<const Triangle> added{};
+  bool isApplied = false;
 };
 
 namespace {
@@ -395,12 +406,6 @@ CountedVector<Element> joined(const CountedVector<Element>& before,
   all.insert(all.end(), added.begin(), added.end());
   return all;
 }
-CountedVector<std::uint32_t> joinedTags(const CountedVector<std::uint32_t>& before,
-                                        std::size_t added) {
-  const std::vector<std::uint32_t> zeros(before.empty() ? 0 : added, 0);
-  return joined<std::uint32_t>(before, zeros);
-}
-
 std::vector<std::uint32_t> idsFrom(std::size_t first, std::size_t count) {
   std::vector<std::uint32_t> ids(count);
   std::iota(ids.begin(), ids.end(), static_cast<std::uint32_t>(first));
@@ -420,11 +425,11 @@ std::vector<std::uint32_t> GeometryTable::replaceTriangles(GeometryId id, Ids re
   const std::size_t count = mesh.topology.elements.size();
   Cut cut(geometry, vertices);
   const auto sorted = checkedRemoval(geometry, "triangle", count, mesh.topology.removed, removed);
-  checkCounts(geometry, cut.rest, added, GeometryType::Triangles, count);
+  checkCounts(geometry, mesh.rest.size(), added, GeometryType::Triangles, count);
   auto ids = idsFrom(count, added.size());
-  cut.topology = cutTopology(mesh.topology, sorted, added, cut.rest.size());
-  cut.tags = joinedTags(mesh.tags, added.size());
-  apply(std::move(cut), prepare);
+  cut.removed = sorted;
+  cut.added = added;
+  apply(cut, prepare);
   ++m_state;
   return ids;
 }
@@ -436,50 +441,83 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "replaceTetrahedra()");
   checkMeshType(geometry.body, true, "replaceTetrahedra() is for tetrahedral meshes");
-  const Solid& solid = *geometry.body.solid;
-  const std::size_t count = solid.topology.tetrahedra.size();
+  Solid& solid = *geometry.body.solid;
+  TriangleMesh& mesh = geometry.body.mesh;
+  const std::size_t count = solid.topology.tetrahedra.size(), faces = mesh.topology.elements.size();
   Cut cut(geometry, vertices);
-  const Ids before = solid.topology.removed;
-  const auto sorted = checkedRemoval(geometry, "tetrahedron", count, before, removed);
-  CountedVector<std::uint32_t> allRemoved(before.size() + sorted.size());
-  std::merge(before.begin(), before.end(), sorted.begin(), sorted.end(), allRemoved.begin());
+  const auto sorted =
+      checkedRemoval(geometry, "tetrahedron", count, solid.topology.removed, removed);
+  checkTetrahedra(geometry, cut.rest().size(), added, count);
   auto ids = idsFrom(count, added.size());
-  cut.solid = std::make_unique<Solid>();
-  cut.solid->topology =
-      checkedTopology(geometry, cut.rest, joined(solid.topology.tetrahedra, added), allRemoved);
-  cut.solid->tags = joinedTags(solid.tags, added.size());
-  const MeshTopology& surface = geometry.body.mesh.topology;
-  CountedVector<std::uint32_t> gone;
-  for (const std::uint32_t face : keepSurfaceIds(surface.elements, cut.solid->topology))
-    if (!surface.isRemoved(face)) gone.push_back(face);
-  cut.topology = cutTopology(
-      surface, gone, std::span(cut.solid->topology.surface).subspan(surface.elements.size()),
-      cut.rest.size());
-  cut.tags = tagsOfSurface(cut.solid->topology, cut.solid->tags);
-  apply(std::move(cut), prepare);
+  if (TetrahedraCut::isPossible(solid.topology, cut.rest(), added)) {
+    TetrahedraCut ofSolid(solid.topology, cut.rest(), sorted, added);
+    if (ofSolid.fault()) refuse(geometry, *ofSolid.fault());
+    reserveAmortized(solid.tags, count + added.size());
+    cut.removed = ofSolid.goneFaces();
+    cut.added = ofSolid.newFaces();
+    apply(cut, prepare);
+    // Nothing below throws.
+    ofSolid.apply();
+    if (!solid.tags.empty()) {
+      solid.tags.resize(count + added.size(), 0);
+      const auto setTag = [&](std::uint32_t face) {
+        mesh.tags[face] = solid.tags[solid.topology.surfaceOwner[face]];
+      };
+      for (const std::uint32_t face : ofSolid.passedFaces()) setTag(face);
+      for (std::size_t face = faces; face < mesh.tags.size(); ++face)
+        setTag(static_cast<std::uint32_t>(face));
+    }
+  } else {
+    const Ids before = solid.topology.removed;
+    CountedVector<std::uint32_t> allRemoved(before.size() + sorted.size());
+    std::merge(before.begin(), before.end(), sorted.begin(), sorted.end(), allRemoved.begin());
+    TetrahedralTopology topology =
+        checkedTopology(geometry, cut.rest(), joined(solid.topology.tetrahedra, added), allRemoved);
+    CountedVector<std::uint32_t> gone;
+    for (const std::uint32_t face : keepSurfaceIds(mesh.topology.elements, topology))
+      if (!mesh.topology.isRemoved(face)) gone.push_back(face);
+    CountedVector<std::uint32_t> tags = solid.tags;
+    if (!tags.empty()) tags.resize(count + added.size(), 0);
+    CountedVector<std::uint32_t> ofSurface = tagsOfSurface(topology, tags);
+    cut.removed = gone;
+    cut.added = std::span(topology.surface).subspan(faces);
+    apply(cut, prepare);
+    // Nothing below throws.
+    solid.topology = std::move(topology);
+    solid.tags = std::move(tags);
+    mesh.tags = std::move(ofSurface);
+  }
   ++m_state;
   return ids;
 }
 
-void GeometryTable::apply(Cut cut, const Preparation& prepare) {
+void GeometryTable::apply(Cut& cut, const Preparation& prepare) {
   Geometry& geometry = cut.geometry;
   Body& body = geometry.body;
   TriangleMesh& mesh = body.mesh;
-  GeometryStep::LongerBodies bodies;
-  if (!cut.positions.empty()) bodies = geometry.step.withNewVertices(mesh, cut.positions);
-  prepare(cut.topology, cut.rest);
-  const bool stays = cut.keepsSmallestHeight();
+  SmallestHeight smallest = geometry.smallestHeight;
+  for (const std::uint32_t t : cut.removed)
+    smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
+  for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
+  reserveAmortized(mesh.tags, mesh.topology.elements.size() + cut.added.size());
+  if (!cut.positions.empty()) {
+    geometry.pieces.forget();  // it uses the positions, and is of fewer vertices
+    geometry.step.reserveNewVertices(mesh, cut.positions.size());
+  }
+  if (prepare) {
+    MeshTopology topology = mesh.topology;
+    topology.cut(cut.removed, cut.added, mesh.rest.size());
+    prepare(topology, mesh.rest);
+    mesh.topology = std::move(topology);
+  } else {
+    mesh.topology.cut(cut.removed, cut.added, mesh.rest.size());
+  }
   // Nothing below throws.
-  const std::size_t count = mesh.topology.elements.size();
-  mesh.rest = std::move(cut.rest);
-  mesh.topology = std::move(cut.topology);
-  mesh.tags = std::move(cut.tags);
-  if (cut.solid) body.solid = std::move(cut.solid);
-  if (!cut.positions.empty()) geometry.step.append(mesh, bodies);
-  const std::span<const Triangle> elements = mesh.topology.elements;
+  cut.isApplied = true;
+  if (!mesh.tags.empty()) mesh.tags.resize(mesh.topology.elements.size(), 0);
+  if (!cut.positions.empty()) geometry.step.appendVertices(mesh, cut.positions);
   geometry.smallestHeight =
-      stays ? std::min(geometry.smallestHeight, smallestHeight(elements.subspan(count), mesh.rest))
-            : smallestHeight(elements, mesh.rest);
+      smallest.isKnown() ? smallest : smallestHeight(mesh.topology.elements, mesh.rest);
   BodyRevisions& revisions = body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})

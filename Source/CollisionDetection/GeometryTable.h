@@ -62,7 +62,7 @@ class GeometryTable {
   void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now,
                         const Threads&);
   /// Receives a new topology and its positions at rest before they are set. What it throws leaves
-  /// the geometry as it was.
+  /// the geometry as it was. Null if nothing is to be prepared.
   using Preparation = std::function<void(const MeshTopology&, std::span<const Eigen::Vector3d>)>;
   void setTriangles(GeometryId, std::span<const Eigen::Vector3d> positions,
                     std::span<const Triangle>, const Preparation&);
@@ -133,7 +133,7 @@ class GeometryTable {
   static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
                           std::unique_ptr<Solid>, const Preparation&);
   struct Cut;
-  static void apply(Cut, const Preparation&);
+  static void apply(Cut&, const Preparation&);
 
   CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;

@@ -96,10 +96,13 @@ struct OctreeBasedCD::Implementation {
     return withinLimit([&] {
       countCandidates();
       IndexLists near;
-      auto result = call([&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
-        near = pairs.nearAtRest(geometry, topology, rest, isCut, threads);
-      });
-      pairs.setNearAtRest(geometry, std::move(near));
+      GeometryTable::Preparation prepare;
+      if (pairs.needsNearAtRest(geometry))
+        prepare = [&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
+          near = pairs.nearAtRest(geometry, topology, rest, isCut, threads);
+        };
+      auto result = call(prepare);
+      if (prepare) pairs.setNearAtRest(geometry, std::move(near));
       return result;
     });
   }

@@ -277,21 +277,23 @@ void checkPredicate(const PairRecord& record, const SupportedPairs& support) {
 
 }  // namespace
 
+bool PairTable::needsNearAtRest(GeometryId id) const {
+  const auto found = m_byIds.find(keyOf(id, id));
+  return found != m_byIds.end() && found->second->pair.settings.restDistance > 0.0;
+}
+
 IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
                                  std::span<const Eigen::Vector3d> rest, bool isCut,
                                  const Threads& threads) const {
-  const auto found = m_byIds.find(keyOf(id, id));
-  const double distance = found == m_byIds.end() ? 0.0 : found->second->pair.settings.restDistance;
-  if (!(distance > 0.0)) return {};
-  const PairRecord& record = *found->second;
+  const PairRecord& record = *m_byIds.at(keyOf(id, id));
+  const double distance = record.pair.settings.restDistance;
   return isCut ? verticesWithin(topology, rest, distance, record.nearAtRest,
                                 record.a->body.mesh.topology, threads)
                : verticesWithin(topology, rest, distance, threads);
 }
 
 void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
-  if (const auto found = m_byIds.find(keyOf(id, id)); found != m_byIds.end())
-    found->second->nearAtRest = std::move(lists);
+  m_byIds.find(keyOf(id, id))->second->nearAtRest = std::move(lists);
 }
 
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,

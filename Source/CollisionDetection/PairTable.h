@@ -181,9 +181,10 @@ class PairTable {
   /// A table without pairs, whose revisions differ from all of this one.
   PairTable successor() const;
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
-  /// PairSettings::restDistance: the vertices that are near at rest, in a new topology of a
-  /// geometry. Empty if no pair needs them. isCut: it differs from the topology now in a part, and
-  /// vertices that stay are at rest where they were. Throws TooLarge.
+  /// Whether a pair of the geometry with itself has a restDistance.
+  bool needsNearAtRest(GeometryId) const;
+  /// If so: the vertices that are near at rest, in a new topology. isCut: it differs from the
+  /// topology now in a part, and vertices that stay are at rest where they were. Throws TooLarge.
   IndexLists nearAtRest(GeometryId, const MeshTopology&, std::span<const Eigen::Vector3d> rest,
                         bool isCut, const Threads&) const;
   void setNearAtRest(GeometryId, IndexLists) noexcept;

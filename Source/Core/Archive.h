@@ -164,7 +164,7 @@ void itemsOf(File& file, auto& list, std::size_t least, F&& describe) {
   if constexpr (File::kReads) {
     for (auto& item : list) describe(item);
   } else {
-    const std::size_t begin = file.size();
+    [[maybe_unused]] const std::size_t begin = file.size();  // of an assertion
     for (auto& item : list) describe(item);
     // A reader refuses more items than fit into the rest.
     PALPATE_ASSERT(file.size() - begin >= least * list.size());

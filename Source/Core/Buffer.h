@@ -44,6 +44,15 @@ void resizeSparingly(Buffer<T>& buffer, std::size_t size) {
   buffer.resize(size);
 }
 
+/// The capacity for so many elements to which a cut may add some.
+constexpr std::size_t withSpare(std::size_t size) { return size + size / 16; }
+
+/// reserve() for elements that are added again and again.
+template <class T>
+void reserveAmortized(CountedVector<T>& vector, std::size_t size) {
+  if (size > vector.capacity()) vector.reserve(size + size / 2);
+}
+
 /// Gives back most of the memory beyond the contents. Without memory for a smaller copy it does
 /// nothing.
 template <class T, class Allocator>

@@ -47,6 +47,13 @@ class ReusableMemory {
       return elements;
     }
   }
+  /// The elements that start() returned last, as so many; others behind them have indeterminate
+  /// values. Empty if there is no memory for more.
+  template <class T>
+  std::span<T> resized(std::span<T> elements, std::size_t count) {
+    PALPATE_ASSERT(static_cast<void*>(elements.data()) == m_memory);
+    return count * sizeof(T) <= m_bytes ? std::span<T>(elements.data(), count) : std::span<T>();
+  }
   /// All elements are lost.
   void release() {
     freeCounted(std::exchange(m_memory, nullptr), std::exchange(m_bytes, 0), kAlignment);

@@ -157,14 +157,21 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
   }
 }
 
+/// Self-collision: whether the edges are in the order in which they are tested.
+bool areInOrder(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
+  return !pair.self() || pair.a.topology.precedes(edgeA, edgeB);
+}
+
 void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
                   ContactBuffers& out) {
   const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
   const Features<ImpactQuery::Kind::EdgeEdge> features{pair.a, pair.b};
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample) {
-    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.excludesEdges(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+    for (std::uint32_t j = 0; j < b.size(); ++j) {
+      if (!areInOrder(pair, i, j) || pair.excludesEdges(i, j) ||
+          pair.b.topology.edgeTriangles[j].empty())
+        continue;
       EdgeEdgeDistance answer = finiteEdgeEdgeDistance(pair.a.now[a[i][0]], pair.a.now[a[i][1]],
                                                        pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
@@ -208,14 +215,16 @@ bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>&
     for (const std::uint32_t b : edgesOf(pair.b.topology, features[1])) {
       std::array<std::uint32_t, 2> ids{a, b};
       std::array<MeshFeature, 2> shared = features;
-      if (pair.self() && b < a) {
+      if (pair.self() && !areInOrder(pair, a, b)) {
         std::swap(ids[0], ids[1]);
         std::swap(shared[0], shared[1]);
       }
       const std::optional<NearbyEdges> other = measureEdges(pair, ids[0], ids[1]);
       if (!other) continue;
       if (other->features != shared) return false;
-      lowest = std::min(lowest, ids);
+      if (ids[0] == lowest[0] ? pair.b.topology.precedes(ids[1], lowest[1])
+                              : pair.a.topology.precedes(ids[0], lowest[0]))
+        lowest = ids;
     }
   return lowest == edges;
 }
@@ -225,8 +234,8 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
   const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
   StepCheck check(pair, out);
   for (const std::uint32_t i : sample)
-    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < b.size(); ++j) {
-      if (pair.b.topology.edgeTriangles[j].empty()) continue;
+    for (std::uint32_t j = 0; j < b.size(); ++j) {
+      if (!areInOrder(pair, i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
       const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
       if (!nearby ||
@@ -271,8 +280,10 @@ void forEachFeaturePair(const MeshPair& pair, const FeatureLists& lists, Contact
   }
   const auto edgeCount = static_cast<std::uint32_t>(pair.b.topology.edges.size());
   for (const std::uint32_t i : lists.edgesOfA)
-    for (std::uint32_t j = pair.self() ? i + 1 : 0; j < edgeCount; ++j) {
-      if (pair.excludesEdges(i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
+    for (std::uint32_t j = 0; j < edgeCount; ++j) {
+      if (!areInOrder(pair, i, j) || pair.excludesEdges(i, j) ||
+          pair.b.topology.edgeTriangles[j].empty())
+        continue;
       ++out.featurePairs;
       f(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, i, j, false);
     }

@@ -54,10 +54,10 @@ struct BoxArrays {
 
   std::array<Buffer<float>, 3> lower, upper;
 
-  void resize(std::size_t size) {
+  void resize(std::size_t size) {  ///< its values are indeterminate
     for (int k = 0; k < 3; ++k) {
-      lower[k].resize(size + kPadding);
-      upper[k].resize(size + kPadding);
+      resizeSparingly(lower[k], size + kPadding);
+      resizeSparingly(upper[k], size + kPadding);
     }
   }
   void releaseMemory() {

@@ -31,7 +31,7 @@ void PieceMotion::advanceTo(const Positions& now) {
 IndexLists piecesOf(std::span<const Triangle> elements,
                     std::span<const std::pair<std::uint32_t, std::uint32_t>> ranges,
                     std::size_t vertexCount) {
-  IndexLists lists;
+  CountedVector<std::uint32_t> offsets{0}, items;
   CountedVector<std::size_t> lastRange(vertexCount / PieceMotion::kPiece + 1, 0);
   std::size_t number = 0;
   for (const auto& [begin, end] : ranges) {
@@ -40,11 +40,11 @@ IndexLists piecesOf(std::span<const Triangle> elements,
     for (std::uint32_t i = begin; i < end; ++i)
       for (const std::uint32_t vertex : elements[i]) {
         const std::uint32_t piece = vertex / static_cast<std::uint32_t>(PieceMotion::kPiece);
-        if (std::exchange(lastRange[piece], number) != number) lists.items.push_back(piece);
+        if (std::exchange(lastRange[piece], number) != number) items.push_back(piece);
       }
-    lists.offsets.push_back(static_cast<std::uint32_t>(lists.items.size()));
+    offsets.push_back(static_cast<std::uint32_t>(items.size()));
   }
-  return lists;
+  return {offsets, std::move(items)};
 }
 
 }  // namespace palpate

@@ -95,6 +95,13 @@ class Positions {
   /// In the body's frame, which is the world unless isPlaced().
   std::span<const Eigen::Vector3d> body() const { return *m_body; }
   bool hasSameBody(const Positions& other) const { return m_body == other.m_body; }
+  const Body& sharedBody() const { return m_body; }
+  void findData() noexcept { m_data = m_body->data(); }  ///< call after the body has moved
+  /// The body is a copy of the one now.
+  void moveBody(Body copy) noexcept {
+    m_body = std::move(copy);
+    findData();
+  }
   /// bounds: of the positions.
   void setBody(Body body, const Eigen::AlignedBox3d& bounds, Revision revision) noexcept {
     PALPATE_ASSERT(body != nullptr && bounds.isEmpty() == body->empty());

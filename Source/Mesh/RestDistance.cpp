@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -42,13 +41,14 @@ struct EdgeLists {
 
   EdgeLists(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest, double distance)
       : offsets(topology.vertexCount + 1, 0) {
-    CountedVector<double> lengths(topology.edges.size());
+    CountedVector<double> lengths(topology.edges.size(), kUnreached);
     const auto forEachShort = [&](auto&& f) {
       for (std::size_t e = 0; e < lengths.size(); ++e)
         if (lengths[e] < distance) f(topology.edges[e], lengths[e]);
     };
-    for (std::size_t e = 0; e < lengths.size(); ++e)
+    topology.forEachEdge([&](std::uint32_t e) {
       lengths[e] = lengthOf(rest[topology.edges[e][0]] - rest[topology.edges[e][1]]);
+    });
     forEachShort([&](const Segment& edge, double length) {
       for (const std::uint32_t end : edge) ++offsets[end + 1];
       longest = std::max(longest, length);
@@ -153,11 +153,10 @@ void markReached(const MeshTopology& mesh, const MeshTopology& other,
   const double reach = distance * (1.0 + 0x1p-30);
   const EdgeLists edges(mesh, rest, reach);
   ShortestPaths paths(edges, reach);
-  CountedVector<Segment> changed;
-  std::set_difference(mesh.edges.begin(), mesh.edges.end(), other.edges.begin(), other.edges.end(),
-                      std::back_inserter(changed));
   CountedVector<std::uint32_t> ends;
-  for (const Segment& edge : changed) ends.insert(ends.end(), edge.begin(), edge.end());
+  mesh.forEachEdge([&](std::uint32_t e) {
+    if (!other.hasEdge(e)) ends.insert(ends.end(), mesh.edges[e].begin(), mesh.edges[e].end());
+  });
   std::sort(ends.begin(), ends.end());
   ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
   for (const std::uint32_t end : ends)
@@ -171,8 +170,7 @@ IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d
   PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
   const EdgeLists edges(topology, rest, distance);
   const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
-  IndexLists lists;
-  lists.offsets.resize(count + 1);
+  CountedVector<std::uint32_t> offsets(count + 1, 0);
   CountedVector<CountedVector<std::uint32_t>> found(tasks);
   std::atomic<std::size_t> nextTask = 0, pairs = 0;
   threads.forEach(std::min(tasks, static_cast<std::size_t>(threads.count())), [&](std::size_t) {
@@ -185,7 +183,7 @@ IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d
           found[task].insert(found[task].end(), list->begin(), list->end());
         else
           paths.addReached(static_cast<std::uint32_t>(v), found[task]);
-        lists.offsets[v + 1] = static_cast<std::uint32_t>(found[task].size() - before);
+        offsets[v + 1] = static_cast<std::uint32_t>(found[task].size() - before);
       }
       pairs += found[task].size();
     }
@@ -193,14 +191,15 @@ IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d
   if (pairs > kMaxPairs)
     throw Error(ErrorCode::TooLarge,
                 "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
-  for (std::size_t v = 0; v < count; ++v) lists.offsets[v + 1] += lists.offsets[v];
-  PALPATE_ASSERT(lists.offsets.back() == pairs);
-  lists.items.reserve(pairs);
+  for (std::size_t v = 0; v < count; ++v) offsets[v + 1] += offsets[v];
+  PALPATE_ASSERT(offsets.back() == pairs);
+  CountedVector<std::uint32_t> items;
+  items.reserve(pairs);
   for (CountedVector<std::uint32_t>& part : found) {
-    lists.items.insert(lists.items.end(), part.begin(), part.end());
+    items.insert(items.end(), part.begin(), part.end());
     part = {};
   }
-  return lists;
+  return {offsets, std::move(items)};
 }
 
 }  // namespace
@@ -213,7 +212,7 @@ IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::V
 IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
                           double distance, const IndexLists& before, const MeshTopology& old,
                           const Threads& threads) {
-  PALPATE_ASSERT(before.offsets.size() == old.vertexCount + 1);
+  PALPATE_ASSERT(before.size() == old.vertexCount);
   CountedVector<std::uint8_t> isReached(topology.vertexCount, 0);
   markReached(old, topology, rest.first(old.vertexCount), distance, isReached);
   markReached(topology, old, rest, distance, isReached);

@@ -63,7 +63,7 @@ CountedVector<std::uint32_t> opposites(const TetrahedralTopology& topology, std:
 
 /// For each tetrahedron, whether its corners as given are wound as if its volume were positive.
 CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
-                                     const TetrahedralTopology& topology,
+                                     TetrahedralTopology& topology,
                                      std::span<const std::uint32_t> beyond) {
   const CountedVector<Tetrahedron>& tetrahedra = topology.tetrahedra;
   CountedVector<bool> positive(tetrahedra.size(), true), known(tetrahedra.size(), true);
@@ -76,7 +76,8 @@ CountedVector<bool> findOrientations(std::span<const Eigen::Vector3d> rest,
     known[t] = sign != 0;
     if (sign != 0) queue.push_back(t);
   });
-  if (queue.size() == tetrahedra.size() - topology.removed.size()) return positive;
+  topology.hasFlat = queue.size() < tetrahedra.size() - topology.removed.size();
+  if (!topology.hasFlat) return positive;
   // Tetrahedra without volume follow from their neighbours: two sides of one face are wound in
   // opposite directions.
   const auto propagate = [&] {

@@ -31,6 +31,12 @@ struct TetrahedralTopology {
   /// that fits its neighbours.
   CountedVector<bool> isPositive;
   CountedVector<std::uint32_t> removed{};  ///< tetrahedra that cuts removed, ascending
+  bool hasFlat = false;                    ///< some tetrahedron has no volume at rest
+
+  // Of TetrahedraCut, which makes them when it first needs them:
+  IndexLists vertexTetrahedra{};  ///< ascending, without removed ones
+  /// For each tetrahedron, the surface triangles at its faces; kNoElement where there is none.
+  CountedVector<std::array<std::uint32_t, 4>> faceIds{};
 
   /// Calls f(tetrahedron) for those that were not removed, ascending.
   template <class F>

@@ -1,11 +1,9 @@
-#include "Mesh/TopologyCut.h"
+#include "Mesh/TriangleMesh.h"
 
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <iterator>
 #include <utility>
-#include <vector>
 
 namespace palpate {
 
@@ -19,310 +17,283 @@ void sortUnique(CountedVector<T>& list) {
   list.erase(std::unique(list.begin(), list.end()), list.end());
 }
 
-Segment edgeOf(std::uint32_t p, std::uint32_t q) { return {std::min(p, q), std::max(p, q)}; }
-
 template <class F>
 void forEachEdge(const Triangle& t, F&& f) {
-  for (std::size_t i = 0; i < 3; ++i)
-    if (t[i] != t[(i + 1) % 3]) f(edgeOf(t[i], t[(i + 1) % 3]));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t p = t[i], q = t[(i + 1) % 3];
+    if (p != q) f(Segment{std::min(p, q), std::max(p, q)}, i);
+  }
 }
 
-/// Elements by a vertex or an edge that they hold.
-template <class Key>
-class Holders {
- public:
-  void add(const Key& key, std::uint32_t element) { m_all.push_back({key, element}); }
-  void sort() { sortUnique(m_all); }
-  /// Those of a key, ascending.
-  std::span<const std::pair<Key, std::uint32_t>> of(const Key& key) const {
-    const auto begin = std::lower_bound(m_all.begin(), m_all.end(), std::pair(key, 0u));
-    auto end = begin;
-    while (end != m_all.end() && end->first == key) ++end;
-    return {begin, end};
-  }
+}  // namespace
 
- private:
-  CountedVector<std::pair<Key, std::uint32_t>> m_all;
-};
-
-/// Some elements, by their vertices and edges.
-struct Elements {
-  Holders<std::uint32_t> byVertex;
-  Holders<Segment> byEdge;
-  void add(const Triangle& t, std::uint32_t element) {
-    for (const std::uint32_t v : t) byVertex.add(v, element);
-    forEachEdge(t, [&](const Segment& edge) { byEdge.add(edge, element); });
-  }
-  void sort() { byVertex.sort(), byEdge.sort(); }
-};
-
-/// Lists of which some are replaced.
-class ListCopy {
- public:
-  ListCopy(const IndexLists& from, std::size_t lists, std::size_t items) : m_from(from) {
-    m_to.offsets.clear();
-    m_to.offsets.reserve(lists + 1);
-    m_to.offsets.push_back(0);
-    m_to.items.reserve(items);
-  }
-  /// Copies lists [begin, end).
-  void copy(std::size_t begin, std::size_t end) {
-    if (begin >= end) return;
-    const std::uint32_t first = m_from.offsets[begin],
-                        shift = static_cast<std::uint32_t>(m_to.items.size()) - first;
-    m_to.items.insert(m_to.items.end(), m_from.items.begin() + first,
-                      m_from.items.begin() + m_from.offsets[end]);
-    for (std::size_t i = begin; i < end; ++i) m_to.offsets.push_back(m_from.offsets[i + 1] + shift);
-  }
-  void append(std::span<const std::uint32_t> list) {
-    m_to.items.insert(m_to.items.end(), list.begin(), list.end());
-    m_to.offsets.push_back(static_cast<std::uint32_t>(m_to.items.size()));
-  }
-  IndexLists take() { return std::move(m_to); }
-
- private:
-  const IndexLists& m_from;
-  IndexLists m_to;
-};
-
+/// All that may throw comes before apply().
 class TopologyCut {
  public:
-  TopologyCut(const MeshTopology& before, std::span<const std::uint32_t> removed,
+  TopologyCut(MeshTopology& mesh, std::span<const std::uint32_t> removed,
               std::span<const Triangle> added, std::size_t vertexCount)
-      : m_before(before), m_removed(removed), m_added(added) {
-    m_next.type = before.type;
-    m_next.vertexCount = vertexCount;
+      : m_mesh(mesh),
+        m_removed(removed),
+        m_added(added),
+        m_firstAdded(static_cast<std::uint32_t>(mesh.elements.size())),
+        m_firstNewVertex(mesh.vertexCount),
+        m_vertexCount(vertexCount) {
+    findAffected();
+    findLists();
+    reserve();
   }
 
-  MeshTopology run() {
+  void apply() noexcept {
+    setOwners();  // takes them from the elements before the cut
     replaceElements();
-    findAffected();
     replaceEdges();
     replaceLists();
-    replaceOwners();
+    setOwners();
     findClosedStars();
-    return std::move(m_next);
   }
 
  private:
-  std::uint32_t firstAdded() const { return static_cast<std::uint32_t>(m_before.elements.size()); }
+  /// Elements by a vertex or an edge that they hold.
+  template <class Key>
+  class Holders {
+   public:
+    void add(const Key& key, std::uint32_t element) { m_all.push_back({key, element}); }
+    void sort() { sortUnique(m_all); }
+    /// Those of a key, ascending.
+    std::span<const std::pair<Key, std::uint32_t>> of(const Key& key) const {
+      const auto begin = std::lower_bound(m_all.begin(), m_all.end(), std::pair(key, 0u));
+      auto end = begin;
+      while (end != m_all.end() && end->first == key) ++end;
+      return {begin, end};
+    }
+
+   private:
+    CountedVector<std::pair<Key, std::uint32_t>> m_all;
+  };
+
+  /// Some elements, by their vertices and edges.
+  struct Elements {
+    Holders<std::uint32_t> byVertex;
+    Holders<Segment> byEdge;
+    void add(const Triangle& t, std::uint32_t element) {
+      for (const std::uint32_t v : t) byVertex.add(v, element);
+      forEachEdge(t, [&](const Segment& edge, std::size_t) { byEdge.add(edge, element); });
+    }
+    void sort() { byVertex.sort(), byEdge.sort(); }
+  };
+
+  struct Vertex {
+    std::uint32_t id;
+    bool isUsed = false;  ///< afterwards
+    Ids list{};           ///< enabled elements afterwards
+  };
+  struct Edge {
+    Segment vertices;
+    std::uint32_t id;
+    bool stays = false;
+    Ids list{};
+  };
+
   bool isRemoved(std::uint32_t t) const {
     return std::binary_search(m_removed.begin(), m_removed.end(), t);
   }
+  std::uint32_t idOf(const Segment& vertices) const {
+    return std::lower_bound(m_edges.begin(), m_edges.end(), vertices,
+                            [](const Edge& edge, const Segment& v) { return edge.vertices < v; })
+        ->id;
+  }
+
+  /// The vertices and edges of elements that are removed or added.
+  void findAffected() {
+    Ids vertices;
+    CountedVector<Segment> edges;
+    const auto add = [&](const Triangle& t) {
+      vertices.insert(vertices.end(), t.begin(), t.end());
+      forEachEdge(t, [&](const Segment& edge, std::size_t) { edges.push_back(edge); });
+    };
+    for (const std::uint32_t t : m_removed) add(m_mesh.elements[t]);
+    for (const Triangle& t : m_added) add(t);
+    for (std::size_t v = m_firstNewVertex; v < m_vertexCount; ++v)
+      vertices.push_back(static_cast<std::uint32_t>(v));
+    sortUnique(vertices);
+    sortUnique(edges);
+    for (const std::uint32_t v : vertices) m_vertices.push_back({v});
+    auto newId = static_cast<std::uint32_t>(m_mesh.edges.size());
+    for (const Segment& edge : edges) {
+      const std::uint32_t known = m_mesh.findEdge(edge);
+      m_edges.push_back({edge, known == kNoEdge ? newId++ : known});
+    }
+  }
+
+  void findLists() {
+    Elements added;
+    for (std::size_t i = 0; i < m_added.size(); ++i)
+      added.add(m_added[i], m_firstAdded + static_cast<std::uint32_t>(i));
+    for (const std::uint32_t t : m_mesh.disabled)
+      if (!isRemoved(t)) m_disabled.add(m_mesh.elements[t], t);
+    added.sort(), m_disabled.sort();
+    const auto listAfter = [&](const IndexLists& before, std::uint32_t id, const auto& addedTo) {
+      Ids list;
+      if (id < before.size())
+        for (const std::uint32_t t : before[id])
+          if (!isRemoved(t)) list.push_back(t);
+      for (const auto& [key, t] : addedTo) list.push_back(t);
+      return list;
+    };
+    for (Vertex& v : m_vertices) {
+      v.list = listAfter(m_mesh.vertexTriangles, v.id, added.byVertex.of(v.id));
+      v.isUsed = !v.list.empty() || !m_disabled.byVertex.of(v.id).empty();
+    }
+    for (Edge& e : m_edges) {
+      e.list = listAfter(m_mesh.edgeTriangles, e.id, added.byEdge.of(e.vertices));
+      e.stays = !e.list.empty() || !m_disabled.byEdge.of(e.vertices).empty();
+    }
+  }
+
+  void reserve() {
+    const std::size_t elements = m_firstAdded + m_added.size(),
+                      edges = m_mesh.edges.size() + m_edges.size();
+    reserveAmortized(m_mesh.elements, elements);
+    reserveAmortized(m_mesh.triangleEdges, elements);
+    reserveAmortized(m_mesh.owned, elements);
+    reserveAmortized(m_mesh.isDisabled, elements);
+    reserveAmortized(m_mesh.removed, m_mesh.removed.size() + m_removed.size());
+    reserveAmortized(m_mesh.isUsed, m_vertexCount);
+    reserveAmortized(m_mesh.hasClosedStar, m_vertexCount);
+    reserveAmortized(m_mesh.edges, edges);
+    reserveAmortized(m_mesh.m_isGone, edges);
+    reserveAmortized(m_mesh.m_addedEdges, m_mesh.m_addedEdges.size() + m_edges.size());
+    const auto reserveLists = [](IndexLists& lists, std::size_t size, const auto& affected) {
+      std::size_t items = 0;
+      for (const auto& one : affected) items += one.list.size();
+      lists.reserveMore(size - lists.size(), items);
+    };
+    reserveLists(m_mesh.vertexTriangles, m_vertexCount, m_vertices);
+    reserveLists(m_mesh.edgeTriangles, edges, m_edges);
+  }
+
+  /// Takes the affected vertices and edges from their owners, or gives them to new ones.
+  void setOwners() {
+    const auto flip = [&](const IndexLists& lists, std::uint32_t id, const auto& heldBy,
+                          auto&& bitOf) {
+      if (id >= lists.size() || lists[id].empty()) return;
+      const std::uint32_t owner = lists[id].front();
+      const auto& held = heldBy[owner];
+      const auto place = std::find(held.begin(), held.end(), id) - held.begin();
+      PALPATE_ASSERT(place < 3);
+      m_mesh.owned[owner] ^= static_cast<std::uint8_t>(bitOf(static_cast<int>(place)));
+    };
+    for (const Vertex& v : m_vertices)
+      flip(m_mesh.vertexTriangles, v.id, m_mesh.elements, MeshTopology::cornerBit);
+    for (const Edge& e : m_edges)
+      flip(m_mesh.edgeTriangles, e.id, m_mesh.triangleEdges, MeshTopology::edgeBit);
+  }
 
   void replaceElements() {
-    const std::size_t size = m_before.elements.size() + m_added.size();
-    m_next.elements.reserve(size);
-    m_next.elements = m_before.elements;
-    m_next.elements.insert(m_next.elements.end(), m_added.begin(), m_added.end());
-    for (const std::uint32_t t : m_removed) m_next.elements[t] = {0, 0, 0};
-    std::merge(m_before.removed.begin(), m_before.removed.end(), m_removed.begin(), m_removed.end(),
-               std::back_inserter(m_next.removed));
-    std::set_difference(m_before.disabled.begin(), m_before.disabled.end(), m_removed.begin(),
-                        m_removed.end(), std::back_inserter(m_next.disabled));
-    if (m_next.removed.empty() && m_next.disabled.empty()) return;
-    m_next.isDisabled = m_before.isDisabled;
-    m_next.isDisabled.resize(size, false);
-    for (const std::uint32_t t : m_removed) m_next.isDisabled[t] = true;
-  }
-
-  /// The vertices and edges of triangles that are removed or added.
-  void findAffected() {
-    const auto add = [&](const Triangle& t) {
-      m_vertices.insert(m_vertices.end(), t.begin(), t.end());
-      forEachEdge(t, [&](const Segment& edge) { m_edges.push_back(edge); });
-    };
-    for (const std::uint32_t t : m_removed) add(m_before.elements[t]);
-    for (const Triangle& t : m_added) add(t);
-    for (std::size_t v = m_before.vertexCount; v < m_next.vertexCount; ++v)
-      m_vertices.push_back(static_cast<std::uint32_t>(v));
-    sortUnique(m_vertices);
-    sortUnique(m_edges);
-    for (const Segment& edge : m_edges) m_edgesBefore.push_back(m_before.edgeOf(edge));
-    for (std::size_t i = 0; i < m_added.size(); ++i)
-      m_addedBy.add(m_added[i], firstAdded() + static_cast<std::uint32_t>(i));
-    for (const std::uint32_t t : m_next.disabled) m_disabledBy.add(m_next.elements[t], t);
-    m_addedBy.sort(), m_disabledBy.sort();
-  }
-
-  /// The enabled triangles of a list that is affected, after the cut.
-  template <class Added>
-  Ids listAfter(std::span<const std::uint32_t> before, const Added& added) const {
-    Ids list;
-    for (const std::uint32_t t : before)
-      if (!isRemoved(t)) list.push_back(t);
-    for (const auto& [key, t] : added) list.push_back(t);
-    return list;
+    const std::size_t size = m_firstAdded + m_added.size();
+    if (!m_removed.empty()) m_mesh.isDisabled.resize(m_firstAdded, false);
+    if (!m_mesh.isDisabled.empty()) m_mesh.isDisabled.resize(size, false);
+    for (const std::uint32_t t : m_removed) {
+      m_mesh.elements[t] = {0, 0, 0};
+      m_mesh.triangleEdges[t] = {kNoEdge, kNoEdge, kNoEdge};
+      m_mesh.isDisabled[t] = true;
+      m_mesh.removed.insert(std::lower_bound(m_mesh.removed.begin(), m_mesh.removed.end(), t), t);
+    }
+    std::erase_if(m_mesh.disabled, [&](std::uint32_t t) { return isRemoved(t); });
+    for (const Triangle& t : m_added) {
+      m_mesh.elements.push_back(t);
+      auto& edges = m_mesh.triangleEdges.emplace_back();
+      edges = {kNoEdge, kNoEdge, kNoEdge};
+      forEachEdge(t, [&](const Segment& edge, std::size_t side) { edges[side] = idOf(edge); });
+    }
+    m_mesh.owned.resize(size, 0);
   }
 
   void replaceEdges() {
-    for (std::size_t i = 0; i < m_edges.size(); ++i) {
-      const std::uint32_t before = m_edgesBefore[i];
-      m_edgeLists.push_back(listAfter(
-          before == kNoEdge ? std::span<const std::uint32_t>() : m_before.edgeTriangles[before],
-          m_addedBy.byEdge.of(m_edges[i])));
-      m_stays.push_back(!m_edgeLists.back().empty() || !m_disabledBy.byEdge.of(m_edges[i]).empty());
-    }
-    // Edges between those that are affected keep their order.
-    Ids numbers(m_before.edges.size());  // the new number of each edge
-    m_next.edges.reserve(m_before.edges.size() + m_edges.size());
-    std::size_t from = 0;
-    const auto copyTo = [&](std::size_t end) {
-      const auto shift = static_cast<std::uint32_t>(m_next.edges.size() - from);
-      m_next.edges.insert(m_next.edges.end(),
-                          m_before.edges.begin() + static_cast<std::ptrdiff_t>(from),
-                          m_before.edges.begin() + static_cast<std::ptrdiff_t>(end));
-      for (; from < end; ++from) numbers[from] = static_cast<std::uint32_t>(from) + shift;
-    };
-    for (std::size_t i = 0; i < m_edges.size(); ++i) {
-      copyTo(static_cast<std::size_t>(
-          std::lower_bound(m_before.edges.begin() + static_cast<std::ptrdiff_t>(from),
-                           m_before.edges.end(), m_edges[i]) -
-          m_before.edges.begin()));
-      const auto number = static_cast<std::uint32_t>(m_next.edges.size());
-      if (m_stays[i]) m_next.edges.push_back(m_edges[i]);
-      if (m_edgesBefore[i] != kNoEdge) numbers[from++] = m_stays[i] ? number : kNoEdge;
-    }
-    copyTo(m_before.edges.size());
-    PALPATE_ASSERT(std::is_sorted(m_next.edges.begin(), m_next.edges.end()));
-
-    m_next.triangleEdges.reserve(m_next.elements.size());
-    for (const auto& edges : m_before.triangleEdges) {
-      auto& next = m_next.triangleEdges.emplace_back(edges);
-      for (std::uint32_t& edge : next)
-        if (edge != kNoEdge) edge = numbers[edge];
-    }
-    for (const std::uint32_t t : m_removed) m_next.triangleEdges[t] = {kNoEdge, kNoEdge, kNoEdge};
-    for (const Triangle& t : m_added) {
-      auto& edges = m_next.triangleEdges.emplace_back();
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::uint32_t p = t[i], q = t[(i + 1) % 3];
-        edges[i] = p == q ? kNoEdge : m_next.edgeOf(palpate::edgeOf(p, q));
+    for (const Edge& e : m_edges) {
+      if (e.id >= m_mesh.edges.size()) {
+        m_mesh.edges.push_back(e.vertices);
+        m_mesh.m_addedEdges.insert(
+            std::lower_bound(m_mesh.m_addedEdges.begin(), m_mesh.m_addedEdges.end(), e.vertices,
+                             [&](std::uint32_t other, const Segment& vertices) {
+                               return m_mesh.edges[other] < vertices;
+                             }),
+            e.id);
       }
+      if (!e.stays && m_mesh.m_isGone.empty()) m_mesh.m_isGone.resize(m_mesh.edges.size(), false);
+      if (m_mesh.m_isGone.empty()) continue;
+      m_mesh.m_isGone.resize(m_mesh.edges.size(), false);
+      m_mesh.m_isGone[e.id] = !e.stays;
     }
   }
 
   void replaceLists() {
-    const std::size_t items = 3 * m_added.size();
-    ListCopy vertices(m_before.vertexTriangles, m_next.vertexCount,
-                      m_before.vertexTriangles.items.size() + items);
-    std::size_t from = 0;
-    for (const std::uint32_t v : m_vertices) {
-      vertices.copy(from, std::min<std::size_t>(v, m_before.vertexCount));
-      m_vertexLists.push_back(listAfter(
-          v < m_before.vertexCount ? m_before.vertexTriangles[v] : std::span<const std::uint32_t>(),
-          m_addedBy.byVertex.of(v)));
-      vertices.append(m_vertexLists.back());
-      from = v + std::size_t{1};
-    }
-    vertices.copy(from, m_before.vertexCount);
-    m_next.vertexTriangles = vertices.take();
-
-    ListCopy edges(m_before.edgeTriangles, m_next.edges.size(),
-                   m_before.edgeTriangles.items.size() + items);
-    from = 0;
-    for (std::size_t i = 0; i < m_edges.size(); ++i) {
-      const auto place = static_cast<std::size_t>(
-          std::lower_bound(m_before.edges.begin() + static_cast<std::ptrdiff_t>(from),
-                           m_before.edges.end(), m_edges[i]) -
-          m_before.edges.begin());
-      edges.copy(from, place);
-      if (m_stays[i]) edges.append(m_edgeLists[i]);
-      from = place + (m_edgesBefore[i] != kNoEdge);
-    }
-    edges.copy(from, m_before.edges.size());
-    m_next.edgeTriangles = edges.take();
-  }
-
-  void replaceOwners() {
-    m_next.owned.reserve(m_next.elements.size());
-    m_next.owned = m_before.owned;
-    m_next.owned.resize(m_next.elements.size(), 0);
-    const auto flip = [&](std::uint32_t owner, const auto& held, std::uint32_t item, auto&& bitOf) {
-      const auto place = std::find(held.begin(), held.end(), item) - held.begin();
-      PALPATE_ASSERT(place < 3);
-      m_next.owned[owner] ^= static_cast<std::uint8_t>(bitOf(static_cast<int>(place)));
+    const auto replace = [](IndexLists& lists, const auto& affected) {
+      for (const auto& one : affected)
+        if (one.id < lists.size())
+          lists.replace(one.id, one.list);
+        else
+          lists.append(one.list);
     };
-    m_next.isUsed = m_before.isUsed;
-    m_next.isUsed.resize(m_next.vertexCount, false);
-    m_next.untestedVertices = m_before.untestedVertices;
-    for (std::size_t i = 0; i < m_vertices.size(); ++i) {
-      const std::uint32_t v = m_vertices[i];
-      const Ids& list = m_vertexLists[i];
-      const bool isNew = v >= m_before.vertexCount;
-      const auto before = isNew ? std::span<const std::uint32_t>() : m_before.vertexTriangles[v];
-      m_next.untestedVertices += list.empty();
-      m_next.untestedVertices -= !isNew && before.empty();
-      m_next.isUsed[v] = !list.empty() || !m_disabledBy.byVertex.of(v).empty();
-      if (!before.empty())
-        flip(before.front(), m_before.elements[before.front()], v, MeshTopology::cornerBit);
-      if (!list.empty())
-        flip(list.front(), m_next.elements[list.front()], v, MeshTopology::cornerBit);
+    for (const Vertex& v : m_vertices) {
+      const bool isNew = v.id >= m_firstNewVertex;
+      m_mesh.untestedVertices += v.list.empty();
+      m_mesh.untestedVertices -= !isNew && m_mesh.vertexTriangles[v.id].empty();
     }
-    for (std::size_t i = 0; i < m_edges.size(); ++i) {
-      if (const std::uint32_t e = m_edgesBefore[i]; e != kNoEdge)
-        if (const auto before = m_before.edgeTriangles[e]; !before.empty())
-          flip(before.front(), m_before.triangleEdges[before.front()], e, MeshTopology::edgeBit);
-      if (m_edgeLists[i].empty()) continue;
-      const std::uint32_t owner = m_edgeLists[i].front();
-      flip(owner, m_next.triangleEdges[owner], m_next.edgeOf(m_edges[i]), MeshTopology::edgeBit);
-    }
+    replace(m_mesh.vertexTriangles, m_vertices);
+    replace(m_mesh.edgeTriangles, m_edges);
+    m_mesh.vertexCount = m_vertexCount;
+    m_mesh.isUsed.resize(m_vertexCount, false);
+    for (const Vertex& v : m_vertices) m_mesh.isUsed[v.id] = v.isUsed;
   }
 
   bool isClosed(std::uint32_t edge) const {
-    const auto held = m_next.edgeTriangles[edge];
+    const auto held = m_mesh.edgeTriangles[edge];
     if (held.size() != 2) return false;
     const auto isForward = [&](std::uint32_t t) {
-      const auto& sides = m_next.triangleEdges[t];
+      const auto& sides = m_mesh.triangleEdges[t];
       const auto side = std::find(sides.begin(), sides.end(), edge) - sides.begin();
-      return m_next.elements[t][static_cast<std::size_t>(side)] == m_next.edges[edge][0];
+      return m_mesh.elements[t][static_cast<std::size_t>(side)] == m_mesh.edges[edge][0];
     };
     return isForward(held[0]) != isForward(held[1]);
   }
 
   void findClosedStars() {
-    m_next.hasClosedStar.reserve(m_next.vertexCount);
-    m_next.hasClosedStar = m_before.hasClosedStar;
-    m_next.hasClosedStar.resize(m_next.vertexCount, 1);
+    m_mesh.hasClosedStar.resize(m_vertexCount, 1);
     // Every end of an affected edge is an affected vertex.
-    for (std::size_t i = 0; i < m_vertices.size(); ++i) {
-      const std::uint32_t v = m_vertices[i];
+    for (const Vertex& v : m_vertices) {
       const auto areClosed = [&](std::uint32_t t) {
-        return std::all_of(
-            m_next.triangleEdges[t].begin(), m_next.triangleEdges[t].end(), [&](std::uint32_t e) {
-              return e == kNoEdge || (m_next.edges[e][0] != v && m_next.edges[e][1] != v) ||
-                     isClosed(e);
-            });
+        const auto& sides = m_mesh.triangleEdges[t];
+        return std::all_of(sides.begin(), sides.end(), [&](std::uint32_t e) {
+          return e == kNoEdge || (m_mesh.edges[e][0] != v.id && m_mesh.edges[e][1] != v.id) ||
+                 isClosed(e);
+        });
       };
-      const auto disabled = m_disabledBy.byVertex.of(v);
-      m_next.hasClosedStar[v] =
-          std::all_of(m_vertexLists[i].begin(), m_vertexLists[i].end(), areClosed) &&
+      const auto disabled = m_disabled.byVertex.of(v.id);
+      m_mesh.openStars -= m_mesh.hasClosedStar[v.id] == 0;
+      m_mesh.hasClosedStar[v.id] =
+          std::all_of(v.list.begin(), v.list.end(), areClosed) &&
           std::all_of(disabled.begin(), disabled.end(),
                       [&](const auto& held) { return areClosed(held.second); });
+      m_mesh.openStars += m_mesh.hasClosedStar[v.id] == 0;
     }
-    m_next.hasOnlyClosedStars = std::find(m_next.hasClosedStar.begin(), m_next.hasClosedStar.end(),
-                                          0) == m_next.hasClosedStar.end();
   }
 
-  const MeshTopology& m_before;
+  MeshTopology& m_mesh;
   std::span<const std::uint32_t> m_removed;
   std::span<const Triangle> m_added;
-  MeshTopology m_next;
-  Ids m_vertices;                       ///< affected, ascending
-  CountedVector<Segment> m_edges;       ///< affected, ascending
-  Ids m_edgesBefore;                    ///< of m_edges: their numbers before the cut, or kNoEdge
-  CountedVector<std::uint8_t> m_stays;  ///< of m_edges: whether there is such an edge afterwards
-  CountedVector<Ids> m_vertexLists, m_edgeLists;  ///< of both: enabled triangles after the cut
-  Elements m_addedBy, m_disabledBy;
+  const std::uint32_t m_firstAdded;
+  const std::size_t m_firstNewVertex, m_vertexCount;
+  CountedVector<Vertex> m_vertices;  ///< affected, by their ids
+  CountedVector<Edge> m_edges;       ///< affected, by their vertices
+  Elements m_disabled;               ///< disabled ones that stay
 };
 
-}  // namespace
-
-MeshTopology cutTopology(const MeshTopology& before, std::span<const std::uint32_t> removed,
-                         std::span<const Triangle> added, std::size_t vertexCount) {
-  PALPATE_ASSERT(std::is_sorted(removed.begin(), removed.end()));
-  PALPATE_ASSERT(vertexCount >= before.vertexCount);
-  return TopologyCut(before, removed, added, vertexCount).run();
+void MeshTopology::cut(std::span<const std::uint32_t> newlyRemoved, std::span<const Triangle> added,
+                       std::size_t newVertexCount) {
+  PALPATE_ASSERT(std::is_sorted(newlyRemoved.begin(), newlyRemoved.end()));
+  PALPATE_ASSERT(newVertexCount >= vertexCount);
+  TopologyCut(*this, newlyRemoved, added, newVertexCount).apply();
 }
 
 }  // namespace palpate

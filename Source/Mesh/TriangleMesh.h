@@ -15,30 +15,50 @@ namespace palpate {
 
 constexpr std::uint32_t kNoEdge = 0xffffffffu;
 
-/// Lists of different lengths in one array: list i is items[offsets[i]] to items[offsets[i + 1]].
-struct IndexLists {
-  CountedVector<std::uint32_t> offsets{0};
-  CountedVector<std::uint32_t> items;
+/// Lists of different lengths in one array.
+class IndexLists {
+ public:
+  IndexLists() = default;
+  /// List i is items[offsets[i]] to items[offsets[i + 1]].
+  IndexLists(std::span<const std::uint32_t> offsets, CountedVector<std::uint32_t> items);
+
+  std::size_t size() const { return m_ranges.size(); }
   std::span<const std::uint32_t> operator[](std::size_t i) const {
-    PALPATE_ASSERT(i + 1 < offsets.size());
-    return std::span(items).subspan(offsets[i], offsets[i + 1] - offsets[i]);
+    PALPATE_ASSERT(i < m_ranges.size());
+    return std::span(m_items).subspan(m_ranges[i].begin, m_ranges[i].size);
   }
+  std::size_t itemCount() const { return m_items.size() - m_lost; }
+  std::size_t bytes() const;
+
+  /// Makes room, so that append() and replace() of so many lists and items do not throw.
+  /// Cost     linear from time to time, amortized by the lists and items that are added.
+  void reserveMore(std::size_t lists, std::size_t items);
+  void append(std::span<const std::uint32_t> list);
+  void replace(std::size_t i, std::span<const std::uint32_t> list);
+
+ private:
+  struct Range {
+    std::uint32_t begin, size;
+  };
+  CountedVector<Range> m_ranges;
+  CountedVector<std::uint32_t> m_items;
+  std::size_t m_lost = 0;  ///< items of lists that were replaced
 };
 
 /// Builds lists per key from (key, item) incidences, which must come in ascending order of items.
 template <class ForEach>
 IndexLists listsByKey(std::size_t keyCount, ForEach&& forEachIncidence) {
-  IndexLists lists;
-  lists.offsets.assign(keyCount + 1, 0);
-  forEachIncidence([&](std::uint32_t key, std::uint32_t) { ++lists.offsets[key + 1]; });
-  for (std::size_t i = 0; i < keyCount; ++i) lists.offsets[i + 1] += lists.offsets[i];
-  lists.items.resize(lists.offsets.back());
-  CountedVector<std::uint32_t> next(lists.offsets.begin(), lists.offsets.end() - 1);
+  CountedVector<std::uint32_t> offsets(keyCount + 1, 0);
+  forEachIncidence([&](std::uint32_t key, std::uint32_t) { ++offsets[key + 1]; });
+  for (std::size_t i = 0; i < keyCount; ++i) offsets[i + 1] += offsets[i];
+  CountedVector<std::uint32_t> items, next(offsets.begin(), offsets.end() - 1);
+  items.reserve(withSpare(offsets.back()));
+  items.resize(offsets.back());
   forEachIncidence([&](std::uint32_t key, std::uint32_t item) {
-    PALPATE_ASSERT(next[key] == lists.offsets[key] || lists.items[next[key] - 1] <= item);
-    lists.items[next[key]++] = item;
+    PALPATE_ASSERT(next[key] == offsets[key] || items[next[key] - 1] <= item);
+    items[next[key]++] = item;
   });
-  return lists;
+  return {offsets, std::move(items)};
 }
 
 /// Calls f(id) for the ids below `size`, ascending, without those of the list, which ascends.
@@ -52,7 +72,8 @@ void forEachWithout(std::size_t size, std::span<const std::uint32_t> without, F&
       f(id);
 }
 
-/// The connectivity of a mesh, which follows from its elements alone and is computed once.
+/// The connectivity of a mesh, which follows from its elements alone. It is computed once, and
+/// changed where a cut changes the elements.
 ///
 /// Each vertex and each edge is owned by the lowest enabled triangle that contains it. Exactly one
 /// of all the triangle pairs that contain a feature pair therefore tests it. (Curtis et al., Fast
@@ -66,7 +87,9 @@ struct MeshTopology {
   GeometryType type = GeometryType::Triangles;
   std::size_t vertexCount = 0;
   CountedVector<Triangle> elements;  ///< triangle {p, q, r}, segment {p, q, q}, point {p, p, p}
-  CountedVector<Segment> edges;      ///< unique, lower vertex first, sorted
+  /// Unique, lower vertex first, and sorted, but for those that cuts added behind them. An edge
+  /// keeps its number, also while no element has it: see forEachEdge().
+  CountedVector<Segment> edges;
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge if both are the same vertex.
   CountedVector<std::array<std::uint32_t, 3>> triangleEdges;
   CountedVector<std::uint8_t> owned;  ///< per triangle: its cornerBit()s and edgeBit()s
@@ -76,13 +99,23 @@ struct MeshTopology {
   CountedVector<bool> isUsed;         ///< per vertex: in a triangle that is there, enabled or not
   /// Per vertex: each of its edges is in exactly two enabled triangles, in opposite directions.
   CountedVector<std::uint8_t> hasClosedStar;
-  bool hasOnlyClosedStars = true;  ///< the enabled triangles are a closed surface
+  std::size_t openStars = 0;  ///< vertices of which hasClosedStar is 0
   /// Elements that cuts removed, ascending. They have corners 0, no edges, are in no list and no
   /// octree, and count as disabled.
   CountedVector<std::uint32_t> removed{};
   CountedVector<std::uint32_t> disabled{};  ///< disabled elements that were not removed, ascending
   CountedVector<bool> isDisabled{};  ///< per triangle, with removed ones; empty if there are none
 
+  /// The elements after a cut: these are removed, in ascending order, and others are added. The
+  /// topology equals one that is constructed anew, but for the numbers of edges. Changes nothing if
+  /// it throws.
+  /// Cost     searches for what is around the cut. It is linear only where elements are disabled,
+  ///          and, amortized by what is added, where arrays have to grow.
+  void cut(std::span<const std::uint32_t> removed, std::span<const Triangle> added,
+           std::size_t newVertexCount);
+
+  /// Whether the enabled triangles are a closed surface.
+  bool hasOnlyClosedStars() const { return openStars == 0; }
   std::size_t count() const { return elements.size() - removed.size(); }  ///< without removed ones
   bool isRemoved(std::uint32_t element) const {
     return std::binary_search(removed.begin(), removed.end(), element);
@@ -102,6 +135,22 @@ struct MeshTopology {
 
   /// The index of an edge, whose lower vertex comes first; kNoEdge if there is no such edge.
   std::uint32_t edgeOf(const Segment& edge) const;
+  /// Calls f(edge) for the edges of elements that were not removed, disabled or not.
+  template <class F>
+  void forEachEdge(F&& f) const {
+    for (std::uint32_t e = 0; e < edges.size(); ++e)
+      if (hasEdge(e)) f(e);
+  }
+  bool hasEdge(std::uint32_t edge) const {
+    return edge < edges.size() && (m_isGone.empty() || !m_isGone[edge]);
+  }
+  bool hasAddedEdges() const {
+    return !m_addedEdges.empty();
+  }  ///< then precedes() is not the order of numbers
+  /// Whether the vertices of edge e come before those of edge f, in lexicographic order.
+  bool precedes(std::uint32_t e, std::uint32_t f) const {
+    return std::max(e, f) < sortedEdges() ? e < f : edges[e] < edges[f];
+  }
   /// Whether elements have faces. Vertices of other meshes are tested only against triangles with
   /// faces.
   bool hasFaces() const { return type == GeometryType::Triangles; }
@@ -113,7 +162,14 @@ struct MeshTopology {
   bool ownsEdge(std::uint32_t triangle, int edge) const { return owned[triangle] & edgeBit(edge); }
 
  private:
+  friend class TopologyCut;
   void findOwners(const CountedVector<bool>& isDisabled);
+  std::size_t sortedEdges() const { return edges.size() - m_addedEdges.size(); }
+  /// The index of an edge, also of one that is gone.
+  std::uint32_t findEdge(const Segment& edge) const;
+
+  CountedVector<std::uint32_t> m_addedEdges;  ///< those of cuts, in the order of their vertices
+  CountedVector<bool> m_isGone;  ///< per edge: no element has it; empty if there is none
 };
 
 /// Whether the vertices of one mesh of a pair are tested against the other mesh's elements.

@@ -108,7 +108,8 @@ class ContactFinder {
   template <Kind kind>
   bool operator()(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
                   bool swapped) {
-    PALPATE_ASSERT(!m_pair.self() || kind == Kind::VertexTriangle || firstId < secondId);
+    PALPATE_ASSERT(!m_pair.self() || kind == Kind::VertexTriangle ||
+                   m_pair.a.topology.precedes(firstId, secondId));
     const ImpactQuery query = features.query(firstId, secondId);
     const ImpactResult answer =
         m_pair.keepsApart ? findNearing(query, radiiOf(m_pair, features, firstId, secondId),

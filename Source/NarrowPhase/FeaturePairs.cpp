@@ -414,6 +414,9 @@ void findFeaturePairs(const MeshTopology& a, const MeshTopology& b, const FloatP
   PALPATE_ASSERT(!floats || (!floats->a == !floats->b && !floats->beforeA == !floats->beforeB &&
                              floats->upTo >= 0.0f && floats->upTo <= 1.0f));
   HWY_DYNAMIC_DISPATCH(findFeaturePairsKernel)(a, b, floats ? *floats : FloatPair{}, pairs, out);
+  if (&a == &b && a.hasAddedEdges())
+    for (FeaturePair& edges : out.edgeEdge)
+      if (a.precedes(edges.b, edges.a)) std::swap(edges.a, edges.b);
   PALPATE_ASSERT(out.vertexTriangle.size() + out.triangleVertex.size() + out.edgeEdge.size() <=
                  out.owned);
 }

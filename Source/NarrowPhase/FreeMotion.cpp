@@ -170,7 +170,7 @@ class FreeMotionFinder {
   }
 
   void edges(std::uint32_t edgeA, std::uint32_t edgeB) {
-    if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
+    if (m_pair.self() && m_pair.a.topology.precedes(edgeB, edgeA)) std::swap(edgeA, edgeB);
     const Segment &ofA = m_pair.a.topology.edges[edgeA], &ofB = m_pair.b.topology.edges[edgeB];
     const FeatureCorners p(m_pair.a, m_motions.a, ofA), q(m_pair.b, m_motions.b, ofB);
     bound(

@@ -128,7 +128,7 @@ class IntersectionContacts {
 
   void addEdges(int i, int j) {
     std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
-    if (m_self && edgeB < edgeA) std::swap(edgeA, edgeB);
+    if (m_self && m_a.mesh.topology.precedes(edgeB, edgeA)) std::swap(edgeA, edgeB);
     if (rejectsEdges(m_pair, edgeA, edgeB)) return;
     const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
     const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;

@@ -39,14 +39,15 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
   return allEdgesAt(pair.a.topology, features[0], [&](std::uint32_t a) {
     return allEdgesAt(pair.b.topology, features[1], [&](std::uint32_t b) {
       if (a == edgeA && b == edgeB) return true;
-      const bool swapped = pair.self() && b < a;
+      const bool swapped = pair.self() && pair.a.topology.precedes(b, a);
       const std::uint32_t first = swapped ? b : a, second = swapped ? a : b;
       const std::optional<NearbyEdges> other = measureEdges(pair, first, second);
       if (!other) return true;
       out.exactDecisions += other->centres.exact;
       auto otherFeatures = other->features;
       if (swapped) std::swap(otherFeatures[0], otherFeatures[1]);
-      return otherFeatures == features && std::pair(edgeA, edgeB) < std::pair(first, second);
+      return otherFeatures == features && (edgeA == first ? pair.b.topology.precedes(edgeB, second)
+                                                          : pair.a.topology.precedes(edgeA, first));
     });
   });
 }

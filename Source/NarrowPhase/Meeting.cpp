@@ -55,7 +55,7 @@ class Piercer {
     return sides.both();
   }
   bool isInPlane() const { return m_sides[0] == 0 && m_sides[1] == 0 && m_sides[2] == 0; }
-  bool isClosed() const { return m_topology.hasFaces() && m_topology.hasOnlyClosedStars; }
+  bool isClosed() const { return m_topology.hasFaces() && m_topology.hasOnlyClosedStars(); }
 
   /// Rules (2) and (3). bothClosed: for both surfaces.
   bool piercesByStar(bool bothClosed) const {

@@ -257,7 +257,7 @@ class ProximityFinder {
     if (ofA == kTriangle) return m_verticesOfB.test(b.elements[candidate.b][ofB], candidate.a);
     std::uint32_t edgeA = a.triangleEdges[candidate.a][edgeNumber(ofA)];
     std::uint32_t edgeB = b.triangleEdges[candidate.b][edgeNumber(ofB)];
-    if (m_pair.self() && edgeB < edgeA) std::swap(edgeA, edgeB);
+    if (m_pair.self() && b.precedes(edgeB, edgeA)) std::swap(edgeA, edgeB);
     PALPATE_ASSERT(edgeA != kNoEdge && edgeB != kNoEdge);
     if (m_pair.has(GeometryType::Lines)) return testLineEdges(m_pair, edgeA, edgeB, m_check, m_out);
     testEdges(m_pair, edgeA, edgeB, m_check, m_out);

@@ -38,7 +38,9 @@ class Star {
 
   bool isAtEnd() const { return m_time == 0.0 || m_time == 1.0; }
   /// Whether the winding normals point out of a body.
-  bool isOfBody() const { return m_mesh.topology.hasFaces() && m_mesh.topology.hasOnlyClosedStars; }
+  bool isOfBody() const {
+    return m_mesh.topology.hasFaces() && m_mesh.topology.hasOnlyClosedStars();
+  }
 
   /// Calls f(normal) with the unit winding normal of each triangle with area. most: of about so
   /// many triangles, evenly chosen.

@@ -36,7 +36,7 @@ void Octree::reset(std::size_t size, std::span<const std::uint32_t> without) {
   m_nodes.groupNodes.clear();
   m_nodes.pool.start(0);
   m_boxes.resize(size);
-  m_order.reserve(size + BoxArrays::kPadding);  // read in whole vectors
+  m_order.reserve(withSpare(size + BoxArrays::kPadding));  // read in whole vectors
   m_order.resize(size);
   if (without.empty()) return std::iota(m_order.begin(), m_order.end(), 0u);
   auto next = without.begin();
@@ -102,43 +102,79 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   m_stage = Stage::LaidOut;
 }
 
-void Octree::replace(std::span<const std::uint32_t> places, std::span<const Joining> joining) {
-  PALPATE_ASSERT(isBuilt());
+CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> places,
+                                            std::span<const Joining> joining) {
+  PALPATE_ASSERT(isBuilt() && !places.empty());
   m_stage = Stage::Empty;
   m_dops.directions = 3;
   ++m_layout;
-  const std::size_t newSize = size() - places.size() + joining.size();
-  Buffer<std::uint32_t> order, newPlaces(size() + 1);  // the latter of where groups begin
-  order.reserve(newSize + BoxArrays::kPadding);        // read in whole vectors
+  Buffer<std::uint32_t>& groups = m_nodes.groups;
+  const auto groupOf = [&](std::uint32_t place) {
+    return static_cast<std::uint32_t>(std::upper_bound(groups.begin(), groups.end(), place) -
+                                      groups.begin() - 1);
+  };
+  /// From an old place on, ranges begin so much further behind.
+  struct Shift {
+    std::uint32_t place, by;  ///< modulo 2^32
+  };
+  CountedVector<Move> moves;
+  CountedVector<Shift> shifts;
+  CountedVector<std::uint32_t> joined, changed;  // new places of joining elements; groups
+  std::uint32_t from = 0, to = 0;
+  const auto moveUpTo = [&](std::uint32_t end) {
+    if (from != to && from != end) moves.push_back({from, to, end - from});
+    to += end - from;
+    from = end;
+  };
   auto gone = places.begin();
-  auto joins = joining.begin();
-  for (std::uint32_t g = 0; g < m_nodes.groupNodes.size(); ++g) {
-    std::uint32_t& begin = m_nodes.groups[g];
-    const std::uint32_t end = m_nodes.groups[g + 1];
-    newPlaces[begin] = static_cast<std::uint32_t>(order.size());
-    for (std::uint32_t from = begin;; ++gone) {
-      const std::uint32_t to = gone != places.end() && *gone < end ? *gone : end;
-      order.insert(order.end(), m_order.begin() + from, m_order.begin() + to);
-      if (to == end) break;
-      from = to + 1;
+  for (auto joins = joining.begin(); joins != joining.end() || gone != places.end();) {
+    if (joins != joining.end() && (gone == places.end() || groups[joins->group + 1] <= *gone)) {
+      moveUpTo(groups[joins->group + 1]);
+      joined.push_back(to++);
+      changed.push_back(joins++->group);
+    } else {
+      changed.push_back(groupOf(*gone));
+      moveUpTo(*gone++);
+      ++from;
     }
-    begin = newPlaces[begin];
-    for (; joins != joining.end() && joins->group == g; ++joins) order.push_back(joins->element);
-    PALPATE_ASSERT(order.size() > begin);
+    shifts.push_back({from, to - from});
+  }
+  moveUpTo(static_cast<std::uint32_t>(size()));
+
+  const auto newSize = static_cast<std::uint32_t>(size() - places.size() + joining.size());
+  PALPATE_ASSERT(to == newSize);
+  const std::size_t oldSize = size(), capacity = newSize + BoxArrays::kPadding;
+  if (m_order.capacity() < capacity) m_order.reserve(withSpare(capacity));
+  m_order.resize(std::max<std::size_t>(oldSize, newSize));
+  move(m_order.data(), moves);
+  m_order.resize(newSize);
+  for (std::size_t i = 0; i < joined.size(); ++i) m_order[joined[i]] = joining[i].element;
+
+  // Where any slot begins, also one without own elements, a group begins, or all end.
+  const std::uint32_t first = shifts.front().place, last = shifts.back().place;
+  const auto shifted = [&](std::uint32_t begin) {
+    if (begin < first) return begin;
+    if (begin >= last) return begin + shifts.back().by;
+    const auto next = std::upper_bound(
+        shifts.begin(), shifts.end(), begin,
+        [](std::uint32_t place, const Shift& shift) { return place < shift.place; });
+    return begin + std::prev(next)->by;
+  };
+  for (auto begin = std::lower_bound(groups.begin(), groups.end(), first); begin != groups.end();
+       ++begin)
+    *begin = shifted(*begin);
+  for (std::size_t block = 0; block < m_nodes.pool.used(); ++block)
+    for (std::uint32_t& begin : m_nodes.pool[block].begin) begin = shifted(begin);
+  for (const std::uint32_t g : changed) {
+    PALPATE_ASSERT(groups[g + 1] > groups[g]);
     const OctreeNode node = m_nodes.groupNodes[g];
     OctreeBlock& block = m_nodes.pool[blockOf(node)];
     if (block.isLeaf(slotOf(node)))
-      block.child[slotOf(node)] =
-          OctreeBlock::kLeaf | (static_cast<std::uint32_t>(order.size()) - begin);
+      block.child[slotOf(node)] = OctreeBlock::kLeaf | (groups[g + 1] - groups[g]);
   }
-  newPlaces.back() = m_nodes.groups.back() = static_cast<std::uint32_t>(order.size());
-  PALPATE_ASSERT(gone == places.end() && joins == joining.end() && order.size() == newSize);
-  // Where any slot begins, also one without own elements, a group begins, or all end.
-  for (std::size_t block = 0; block < m_nodes.pool.used(); ++block)
-    for (std::uint32_t& begin : m_nodes.pool[block].begin) begin = newPlaces[begin];
-  m_order = std::move(order);
   m_boxes.resize(newSize);
   m_stage = Stage::LaidOut;
+  return moves;
 }
 
 void Octree::fit(const Threads& threads) {

@@ -165,11 +165,28 @@ class Octree {
   struct Joining {
     std::uint32_t group, element;
   };
+  /// Elements [from, from + size) of an order go to `to`.
+  struct Move {
+    std::uint32_t from, to, size;
+  };
   /// Of a built octree: removes the elements at these places of the order, and adds others at the
   /// ends of their groups. Both ascend. Each group must keep an element. As after build(), order()
   /// is then new, and no box is known; nodes may hold elements that a build would put elsewhere.
-  /// Cost     copies of the order and of the nodes' ranges.
-  void replace(std::span<const std::uint32_t> places, std::span<const Joining> joining);
+  /// Returns the moves of the elements that stay, for move().
+  /// Cost     moves of the order behind the first place, and one look at each node.
+  CountedVector<Move> replace(std::span<const std::uint32_t> places,
+                              std::span<const Joining> joining);
+  /// Makes the moves that replace() returned, of elements in the old order.
+  template <class T>
+  static void move(T* elements, std::span<const Move> moves) {
+    // Neither the sources nor the targets overlap each other, and both ascend.
+    for (auto m = moves.rbegin(); m != moves.rend(); ++m)
+      if (m->to > m->from)
+        std::copy_backward(elements + m->from, elements + m->from + m->size,
+                           elements + m->to + m->size);
+    for (const Move& m : moves)
+      if (m.to < m.from) std::copy_n(elements + m.from, m.size, elements + m.to);
+  }
   /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
   /// Of a built octree: the same for groups [first, last), whose boxes in groupBoxes() are new.

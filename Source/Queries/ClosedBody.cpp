@@ -17,7 +17,7 @@ void makeClosedBody(const TriangleMeshView& mesh, const Threads& threads, Body& 
 }
 
 void makeCheckedBody(const TriangleMeshView& mesh, const Threads& threads, Body& out) {
-  checkCounts(out, mesh.positions, mesh.triangles, GeometryType::Triangles);
+  checkCounts(out, mesh.positions.size(), mesh.triangles, GeometryType::Triangles);
   const CountedVector<Eigen::Vector3d> positions = checkedRest(out, mesh.positions);
   if (mesh.triangles.empty())
     throw Error(ErrorCode::NotClosed, nameOf(out) + " has no triangles", out.id);

@@ -208,7 +208,7 @@ bool hasClosedSurface(const Body& body) {
       isPlain = isPlain && a != b && b != c && c != a;
     });
     prepared.isClosed =
-        isPlain ? topology.hasOnlyClosedStars : findMeshDefects(topology.elements).closed();
+        isPlain ? topology.hasOnlyClosedStars() : findMeshDefects(topology.elements).closed();
     prepared.closedVersion.commit(body.revisions.elements.topology);
   }
   return prepared.isClosed;

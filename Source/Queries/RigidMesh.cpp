@@ -76,7 +76,7 @@ RigidMesh::RigidMesh(std::span<const Eigen::Vector3d> positions,
                      std::span<const Triangle> triangles)
     : m_implementation(std::make_unique<Implementation>()) {
   Body& body = m_implementation->body;
-  checkCounts(body, positions, triangles, GeometryType::Triangles);
+  checkCounts(body, positions.size(), triangles, GeometryType::Triangles);
   body.mesh.rest = checkedRest(body, positions);
   body.mesh.topology = MeshTopology(positions.size(), triangles);
   body.mesh.now.setBody(std::make_shared<const CountedVector<Eigen::Vector3d>>(body.mesh.rest),

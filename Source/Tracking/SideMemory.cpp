@@ -73,10 +73,10 @@ bool mayTouch(const MeshPair& pair, const VertexSide& of, std::uint32_t vertex,
 }
 bool mayTouch(const MeshPair& pair, const Segment& a, const Segment& b) {
   std::uint32_t p = pair.a.topology.edgeOf(a), q = pair.b.topology.edgeOf(b);
-  if (pair.self() && q < p) std::swap(p, q);
-  return p != kNoEdge && q != kNoEdge && !pair.a.topology.edgeTriangles[p].empty() &&
-         !pair.b.topology.edgeTriangles[q].empty() && !pair.excludesEdges(p, q) &&
-         !rejectsEdges(pair, p, q);
+  if (p == kNoEdge || q == kNoEdge) return false;
+  if (pair.self() && pair.a.topology.precedes(q, p)) std::swap(p, q);
+  return !pair.a.topology.edgeTriangles[p].empty() && !pair.b.topology.edgeTriangles[q].empty() &&
+         !pair.excludesEdges(p, q) && !rejectsEdges(pair, p, q);
 }
 
 /// Calls f(edge, isTurned) for the enabled edges that have a common vertex with this one. isTurned:

@@ -39,14 +39,14 @@ void expectTopology(std::size_t vertexCount, std::span<const Triangle> triangles
   }
 
   EXPECT_EQ(mesh.untestedVertices, vertexCount - trianglesOfVertex.size());
-  ASSERT_EQ(mesh.vertexTriangles.offsets.size(), vertexCount + 1);
+  ASSERT_EQ(mesh.vertexTriangles.size(), vertexCount);
   for (std::uint32_t v = 0; v < vertexCount; ++v) {
     const auto& expected = trianglesOfVertex[v];
     EXPECT_EQ(listed(mesh.vertexTriangles, v), Ids(expected.begin(), expected.end())) << v;
   }
 
   ASSERT_EQ(mesh.edges.size(), trianglesOfEdge.size());
-  ASSERT_EQ(mesh.edgeTriangles.offsets.size(), mesh.edges.size() + 1);
+  ASSERT_EQ(mesh.edgeTriangles.size(), mesh.edges.size());
   std::size_t e = 0;
   for (const auto& [edge, holders] :
        trianglesOfEdge) {  // the order of the map is the order of the mesh
