@@ -33,6 +33,7 @@ GeometryInStep Geometry::inStep() const {
           extentOf(body),
           body.revisions.elements,
           step.detected(),
+          step.cutsSinceDetection(),
           body.field.get()};
 }
 

@@ -83,7 +83,9 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
   checked.memory->revision = end.bodyRevision();
 }
 
-void GeometryStep::reserveNewVertices(TriangleMesh& mesh, std::size_t count) {
+void GeometryStep::reserveCut(TriangleMesh& mesh, std::size_t count) {
+  m_cuts.positions.reserve(m_cuts.positions.size() + ends(mesh).size());
+  if (count == 0) return;
   for (Positions* end : ends(mesh)) {
     const Positions::Body body = end->sharedBody();
     std::vector<Positions*> same;
@@ -108,8 +110,19 @@ void GeometryStep::reserveNewVertices(TriangleMesh& mesh, std::size_t count) {
   }
 }
 
-void GeometryStep::appendVertices(TriangleMesh& mesh,
-                                  std::span<const Eigen::Vector3d> positions) noexcept {
+void GeometryStep::cut(TriangleMesh& mesh, std::span<const Eigen::Vector3d> newVertices,
+                       const ElementsState& before, std::size_t count,
+                       const ElementsState& after) noexcept {
+  if (m_cuts.after != before) {
+    m_cuts.before = before;
+    m_cuts.firstAdded = static_cast<std::uint32_t>(count);
+    m_cuts.positions.clear();
+  }
+  m_cuts.after = after;
+  if (!newVertices.empty()) append(mesh, newVertices);
+}
+
+void GeometryStep::append(TriangleMesh& mesh, std::span<const Eigen::Vector3d> positions) noexcept {
   Eigen::AlignedBox3d added;
   for (const Eigen::Vector3d& p : positions) added.extend(p);
   std::array<Positions*, 3> all = ends(mesh);
@@ -127,6 +140,7 @@ void GeometryStep::appendVertices(TriangleMesh& mesh,
     BodyMemory& memory = **own;
     memory.positions->insert(memory.positions->end(), positions.begin(), positions.end());
     memory.revision = m_revisions.next();
+    m_cuts.append((*end)->bodyRevision(), *memory.revision);
     (*end)->setBody(memory.positions, (*end)->bounds().merged(added), *memory.revision);
   }
 }

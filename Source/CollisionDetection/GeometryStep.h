@@ -51,11 +51,14 @@ class GeometryStep {
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
                     const std::optional<Pose>& before, const Pose& now);
-  /// Makes room for new vertices.
+  /// Makes room for new vertices, and for a cut.
   /// Cost     that of a copy of all positions where others use them, or where the room ends.
-  void reserveNewVertices(TriangleMesh&, std::size_t count);
-  /// Appends new vertices, for which there is room. They are at rest in this step.
-  void appendVertices(TriangleMesh&, std::span<const Eigen::Vector3d>) noexcept;
+  void reserveCut(TriangleMesh&, std::size_t newVertices);
+  /// After a cut of elements from `before` to `after`, of which there were `count`: appends new
+  /// vertices, for which there is room. They are at rest in this step.
+  void cut(TriangleMesh&, std::span<const Eigen::Vector3d> newVertices, const ElementsState& before,
+           std::size_t count, const ElementsState& after) noexcept;
+  const CutsSince& cutsSinceDetection() const { return m_cuts; }
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
@@ -65,7 +68,10 @@ class GeometryStep {
   void releaseMemory();  ///< frees arrays that only the next calls need
 
   /// A detection has used the end `now`.
-  void recordDetection(const TriangleMesh& mesh) noexcept { m_detected = mesh.now; }
+  void recordDetection(const TriangleMesh& mesh) noexcept {
+    m_detected = mesh.now;
+    m_cuts.after = {};
+  }
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }
   bool isNew() const { return m_isNew; }
@@ -105,12 +111,14 @@ class GeometryStep {
                           const Threads&, const Eigen::Vector3d* from = nullptr,
                           MotionRange* moved = nullptr);
   void setBody(TriangleMesh&, Positions& end, const CheckedBody&) noexcept;
+  void append(TriangleMesh&, std::span<const Eigen::Vector3d>) noexcept;
   std::array<Positions*, 3> ends(TriangleMesh& mesh) {
     return {&mesh.now, &mesh.before, &m_detected};
   }
   void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
 
   Positions m_detected;
+  CutsSince m_cuts;
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
   Revision::Counter m_revisions;

@@ -495,15 +495,15 @@ void GeometryTable::apply(Cut& cut, const Preparation& prepare) {
   Geometry& geometry = cut.geometry;
   Body& body = geometry.body;
   TriangleMesh& mesh = body.mesh;
+  const std::size_t count = mesh.topology.elements.size();
   SmallestHeight smallest = geometry.smallestHeight;
   for (const std::uint32_t t : cut.removed)
     smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
   for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
-  reserveAmortized(mesh.tags, mesh.topology.elements.size() + cut.added.size());
-  if (!cut.positions.empty()) {
+  reserveAmortized(mesh.tags, count + cut.added.size());
+  if (!cut.positions.empty())
     geometry.pieces.forget();  // it uses the positions, and is of fewer vertices
-    geometry.step.reserveNewVertices(mesh, cut.positions.size());
-  }
+  geometry.step.reserveCut(mesh, cut.positions.size());
   if (prepare) {
     MeshTopology topology = mesh.topology;
     topology.cut(cut.removed, cut.added, mesh.rest.size());
@@ -514,14 +514,15 @@ void GeometryTable::apply(Cut& cut, const Preparation& prepare) {
   }
   // Nothing below throws.
   cut.isApplied = true;
+  const ElementsState before = body.revisions.elements;
   if (!mesh.tags.empty()) mesh.tags.resize(mesh.topology.elements.size(), 0);
-  if (!cut.positions.empty()) geometry.step.appendVertices(mesh, cut.positions);
   geometry.smallestHeight =
       smallest.isKnown() ? smallest : smallestHeight(mesh.topology.elements, mesh.rest);
   BodyRevisions& revisions = body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
     *revision = revisions.counter.next();
+  geometry.step.cut(mesh, cut.positions, before, count, revisions.elements);
   geometry.freeMotion.clear();
 }
 

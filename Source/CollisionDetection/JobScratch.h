@@ -33,7 +33,8 @@ struct JobScratch : CountedObject {
   TraversalStack stack;
   PairSink sink;
   Buffer<std::uint32_t> elements;
-  Buffer<ElementPair> kept;  ///< pairs of the present batch that passed the filters so far
+  Buffer<ElementPair> kept;     ///< pairs of the present batch that passed the filters so far
+  Buffer<ElementPair> unknown;  ///< those that the initial intersection check must test
   // Of KeptPairs:
   Buffer<ElementPair> near;
   Buffer<float> bounds;

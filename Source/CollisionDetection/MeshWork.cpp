@@ -12,6 +12,7 @@
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 namespace palpate {
@@ -265,6 +266,13 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
 void MeshWork::checkStart(const MeshPair& meshes, std::span<const ElementPair> pairs,
                           JobScratch& scratch) const {
   StepFacts& facts = scratch.contacts.facts;
+  const auto [ofA, ofB] = meshes.step.apartBelow;
+  if (ofA != 0 || ofB != 0) {
+    scratch.unknown.clear();
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(scratch.unknown),
+                 [&](const ElementPair& pair) { return pair.a >= ofA || pair.b >= ofB; });
+    pairs = scratch.unknown;
+  }
   if (!facts.startsPiercing())
     facts.atStart =
         std::max(facts.atStart, meetingOf(meshes, true, pairs, scratch.intersections).meeting);

@@ -1,5 +1,9 @@
 #pragma once
 
+#include "Core/CountedVector.h"
+
+#include <algorithm>
+#include <array>
 #include <cstdint>
 
 namespace palpate {
@@ -37,6 +41,27 @@ struct ElementsState {
 struct PositionsState {
   Revision body, transform;
   friend bool operator==(const PositionsState&, const PositionsState&) = default;
+};
+
+/// The cuts of a geometry since its last detection, as long as nothing else changed its elements.
+struct CutsSince {
+  ElementsState before, after;   ///< the elements before the first of these cuts, and now
+  std::uint32_t firstAdded = 0;  ///< elements from here on are new
+  /// Positions to which vertices were appended: their revisions now and before these cuts.
+  CountedVector<std::array<Revision, 2>> positions{};
+  Revision positionsBefore(Revision now) const {
+    for (const auto& known : positions)
+      if (known[0] == now) return known[1];
+    return now;
+  }
+  void append(Revision last, Revision now) {
+    const auto known = std::find_if(positions.begin(), positions.end(),
+                                    [&](const auto& each) { return each[0] == last; });
+    if (known != positions.end())
+      (*known)[0] = now;
+    else
+      positions.push_back({now, last});
+  }
 };
 
 /// The state that a derived value was computed from, of named revisions: the one place that

@@ -40,6 +40,8 @@ struct StepPlan {
   /// Auto: feature pairs that may have touched in the step are reported by their impact.
   bool reportsImpacts = false;
   bool checksStart = false;  ///< whether the initial intersection check runs
+  /// The elements of both meshes below these ids are known to be apart where the step starts.
+  std::array<std::uint32_t, 2> apartBelow{};
 };
 
 /// One pair of meshes in one frame.

@@ -24,6 +24,7 @@ struct GeometryInStep {
   double extent;           ///< L: of the geometry, along any axis of the world
   ElementsState elements;
   const Positions& detected;   ///< the end `now` of the last detection
+  const CutsSince& cuts;       ///< since then
   const DistanceField* field;  ///< null if there is none
   GeometryType type() const { return mesh.topology.type; }
 };

@@ -139,6 +139,25 @@ std::array<Trust::SurfaceState, 2> Trust::statesOf(const GeometryInStep& a, cons
   return {{{a.elements, ofA.state()}, {b.elements, ofB.state()}}};
 }
 
+Trust::SurfaceState Trust::beforeCuts(const GeometryInStep& of, const Positions& positions) {
+  if (of.cuts.after != of.elements) return {of.elements, positions.state()};
+  PositionsState state = positions.state();
+  state.body = of.cuts.positionsBefore(state.body);
+  return {of.cuts.before, state};
+}
+
+/// Whether what is left of both meshes after cuts is known to be apart where the step starts.
+bool Trust::wereApartBeforeCuts(const GeometryInStep& a, const GeometryInStep& b) const {
+  const auto isKnown = [&](const KnownState& known, const Positions& ofA, const Positions& ofB) {
+    return known.meeting == Meeting::Apart &&
+           known.version.isCurrent({beforeCuts(a, ofA), beforeCuts(b, ofB)});
+  };
+  return isKnown(m_atStart, a.mesh.before, b.mesh.before) ||
+         isKnown(m_atEnd, a.mesh.before, b.mesh.before) ||
+         (isKnown(m_atEnd, a.detected, b.detected) &&
+          largestMotion(a.correction, b.correction) < m_atEnd.clearance);
+}
+
 void Trust::forget() {
   m_topologies.invalidate();
   for (KnownState* known : {&m_atStart, &m_atEnd}) known->version.invalidate();
@@ -153,6 +172,10 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
 
   PALPATE_ASSERT(plan.step.motionWithRounding >= plan.step.motion);
   const auto before = statesOf(a, a.mesh.before, b, b.mesh.before);
+  const auto firstNew = [](const GeometryInStep& of) {
+    return of.cuts.after == of.elements ? of.cuts.firstAdded : kNoElement;
+  };
+  if (wereApartBeforeCuts(a, b)) plan.step.apartBelow = {firstNew(a), firstNew(b)};
   if (!m_atStart.version.isCurrent(before)) {
     m_atStart = {};
     if (m_atEnd.version.isCurrent(before)) {

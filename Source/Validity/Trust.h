@@ -38,6 +38,9 @@ class Trust {
   };
   static std::array<SurfaceState, 2> statesOf(const GeometryInStep& a, const Positions& ofA,
                                               const GeometryInStep& b, const Positions& ofB);
+  /// The same of what both were before the cuts since the last detection.
+  static SurfaceState beforeCuts(const GeometryInStep&, const Positions&);
+  bool wereApartBeforeCuts(const GeometryInStep& a, const GeometryInStep& b) const;
   /// One state of both geometries.
   struct KnownState {
     DerivedFrom<std::array<SurfaceState, 2>> version;
