@@ -210,6 +210,7 @@ TEST_P(CutSequence, IsAsIfTheMeshWereHandedOverAnew) {
         expectSameRows(Rows(found), Rows(truth));
         if (engine == Engine::Octree && cuts) {
           EXPECT_EQ(found.validity().trusted, truth.validity().trusted);
+          EXPECT_EQ(found.validity().startedApart, truth.validity().startedApart);
         } else if (engine == Engine::Octree) {
           EXPECT_LE(found.validity().trusted, truth.validity().trusted);
         }
@@ -368,6 +369,74 @@ TEST(CutSolids, AreAsIfHandedOverAnew) {
     }
     EXPECT_GT(contacts, 20u);
   }
+}
+
+/// Two sheets one above the other. Cuts of the lower one raise tips, some of them through the upper
+/// one, and remove others.
+TEST(Cuts, NewElementsAreCheckedWhereTheStepStarts) {
+  std::array<std::size_t, 2> started{};
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(40)); ++seed) {
+    Random random(seed);
+    const Mesh lower = sheet(5, 0.0, 0), upper = sheet(5, 0.2, 0);
+    const PairSettings settings{
+        .method = std::array{Method::Proximity, Method::Continuous, Method::Auto}[seed % 3],
+        .thickness = 0.05};
+    const auto setUp = [&](const Positions& rest, const std::vector<Triangle>& triangles) {
+      OctreeBasedCD collisions;
+      const GeometryId a = collisions.addTriangleMesh(rest, triangles),
+                       b = addMesh(collisions, upper);
+      collisions.addCollisionPair(a, b, settings);
+      collisions.addCollisionPair(a, a, settings);
+      return collisions;
+    };
+    Model<Triangle> mesh{lower.positions, lower.positions, lower.positions, lower.triangles, {}};
+    OctreeBasedCD collisions = setUp(mesh.rest, mesh.elements);
+    const GeometryId a{0}, b{1};
+    collisions.detectCollision();
+    for (int step = 0; step < 20; ++step) {
+      if (random() % 4) collisions.advance(), mesh.before = mesh.now;
+      const std::size_t cuts = random() % 3;
+      for (std::size_t cut = 0; cut < cuts; ++cut) {
+        Difference change;
+        const Ids ids = mesh.ids();
+        change.removed.push_back(ids[random() % ids.size()]);
+        const Triangle t = mesh.elements[change.removed[0]];
+        if (const auto height = random() % 4; height > 0) {
+          const Vector3d tip = (mesh.now[t[0]] + mesh.now[t[1]] + mesh.now[t[2]]) / 3 +
+                               Vector3d(0, 0, 0.07 * height);
+          change.positions = change.rest = {tip};
+          const auto m = static_cast<std::uint32_t>(mesh.now.size());
+          change.added = {{t[0], t[1], m}, {t[1], t[2], m}, {t[2], t[0], m}};
+        }
+        collisions.replaceTriangles(a, change.removed, change.added, change.positions, change.rest);
+        mesh.apply(change.removed, change.added, change.positions, change.rest);
+      }
+      for (Vector3d& p : mesh.now) p += randomPoint(random, -1e-3, 1e-3);
+      if (random() % 4 == 0) {
+        for (Vector3d& p : mesh.before) p += randomPoint(random, -1e-3, 1e-3);
+        collisions.setPositions(a, mesh.before, mesh.now);
+      } else {
+        collisions.setPositions(a, mesh.now);
+      }
+      collisions.detectCollision();
+      OctreeBasedCD anew = setUp(mesh.rest, mesh.left());
+      anew.setPositions(a, mesh.before, mesh.now);
+      anew.detectCollision();
+      for (const GeometryId other : {a, b}) {
+        const Validity &found = collisions.collisionData(a, other).validity(),
+                       &truth = anew.collisionData(a, other).validity();
+        if (cuts > 0) {
+          EXPECT_EQ(found.startedApart, truth.startedApart) << seed << " " << step;
+          EXPECT_EQ(found.trusted, truth.trusted);
+          ++started[found.startedApart];
+        } else {
+          EXPECT_LE(found.startedApart, truth.startedApart) << seed << " " << step;
+        }
+      }
+    }
+  }
+  EXPECT_GT(started[0], 50u);
+  EXPECT_GT(started[1], 50u);
 }
 
 TEST(Cuts, NewVerticesAreAtRestInTheStepOfTheCut) {
