@@ -417,7 +417,7 @@ std::vector<std::uint32_t> idsFrom(std::size_t first, std::size_t count) {
 std::vector<std::uint32_t> GeometryTable::replaceTriangles(GeometryId id, Ids removed,
                                                            std::span<const Triangle> added,
                                                            const NewVertices& vertices,
-                                                           const Preparation& prepare) {
+                                                           const CutPreparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "replaceTriangles()");
   checkMeshType(geometry.body, false, "replaceTriangles() is for triangle meshes");
@@ -437,7 +437,7 @@ std::vector<std::uint32_t> GeometryTable::replaceTriangles(GeometryId id, Ids re
 std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids removed,
                                                             std::span<const Tetrahedron> added,
                                                             const NewVertices& vertices,
-                                                            const Preparation& prepare) {
+                                                            const CutPreparation& prepare) {
   Geometry& geometry = at(id);
   checkShapeMayChange(geometry, "replaceTetrahedra()");
   checkMeshType(geometry.body, true, "replaceTetrahedra() is for tetrahedral meshes");
@@ -491,7 +491,7 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
   return ids;
 }
 
-void GeometryTable::apply(Cut& cut, const Preparation& prepare) {
+void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   Geometry& geometry = cut.geometry;
   Body& body = geometry.body;
   TriangleMesh& mesh = body.mesh;
@@ -504,14 +504,9 @@ void GeometryTable::apply(Cut& cut, const Preparation& prepare) {
   if (!cut.positions.empty())
     geometry.pieces.forget();  // it uses the positions, and is of fewer vertices
   geometry.step.reserveCut(mesh, cut.positions.size());
-  if (prepare) {
-    MeshTopology topology = mesh.topology;
-    topology.cut(cut.removed, cut.added, mesh.rest.size());
-    prepare(topology, mesh.rest);
-    mesh.topology = std::move(topology);
-  } else {
-    mesh.topology.cut(cut.removed, cut.added, mesh.rest.size());
-  }
+  std::function<void(const EdgeChange&)> prepareEdges;
+  if (prepare) prepareEdges = [&](const EdgeChange& change) { prepare(change, mesh.rest); };
+  mesh.topology.cut(cut.removed, cut.added, mesh.rest.size(), prepareEdges);
   // Nothing below throws.
   cut.isApplied = true;
   const ElementsState before = body.revisions.elements;

@@ -73,12 +73,15 @@ class GeometryTable {
   struct NewVertices {
     std::span<const Eigen::Vector3d> positions, rest;
   };
+  /// The same before a cut, with those at rest of new vertices.
+  using CutPreparation =
+      std::function<void(const EdgeChange&, std::span<const Eigen::Vector3d> rest)>;
   /// Returns the ids of what was added.
   std::vector<std::uint32_t> replaceTriangles(GeometryId, Ids removed, std::span<const Triangle>,
-                                              const NewVertices&, const Preparation&);
+                                              const NewVertices&, const CutPreparation&);
   std::vector<std::uint32_t> replaceTetrahedra(GeometryId, Ids removed,
                                                std::span<const Tetrahedron>, const NewVertices&,
-                                               const Preparation&);
+                                               const CutPreparation&);
   void setName(GeometryId, std::string name);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
@@ -133,7 +136,7 @@ class GeometryTable {
   static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
                           std::unique_ptr<Solid>, const Preparation&);
   struct Cut;
-  static void apply(Cut&, const Preparation&);
+  static void apply(Cut&, const CutPreparation&);
 
   CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;

@@ -266,11 +266,15 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
 void MeshWork::checkStart(const MeshPair& meshes, std::span<const ElementPair> pairs,
                           JobScratch& scratch) const {
   StepFacts& facts = scratch.contacts.facts;
-  const auto [ofA, ofB] = meshes.step.apartBelow;
-  if (ofA != 0 || ofB != 0) {
+  if (const auto [ofA, ofB] = meshes.step.apartBelow; ofA != 0 || ofB != 0) {
+    const auto isUnknown = [a = ofA, b = ofB](const ElementPair& p) {
+      return static_cast<unsigned>(p.a >= a) | static_cast<unsigned>(p.b >= b);
+    };
+    unsigned any = 0;  // without branches: most batches have none
+    for (const ElementPair& pair : pairs) any |= isUnknown(pair);
+    if (any == 0) return;
     scratch.unknown.clear();
-    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(scratch.unknown),
-                 [&](const ElementPair& pair) { return pair.a >= ofA || pair.b >= ofB; });
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(scratch.unknown), isUnknown);
     pairs = scratch.unknown;
   }
   if (!facts.startsPiercing())

@@ -176,7 +176,7 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& before, const 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->changeTopology(geometry, false, [&](const auto& prepare) {
+  all->changeTopology(geometry, [&](const auto& prepare) {
     all->geometries.setTriangles(geometry, positions, triangles, prepare);
     return true;
   });
@@ -185,7 +185,7 @@ void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vec
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->changeTopology(geometry, false, [&](const auto& prepare) {
+  all->changeTopology(geometry, [&](const auto& prepare) {
     all->geometries.setTetrahedra(geometry, positions, tetrahedra, prepare);
     return true;
   });
@@ -195,7 +195,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTriangles(
     GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Triangle> added,
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->changeTopology(geometry, true, [&](const auto& prepare) {
+  return all->cutTopology(geometry, [&](const auto& prepare) {
     return all->geometries.replaceTriangles(geometry, removed, added, {newPositions, rest},
                                             prepare);
   });
@@ -205,7 +205,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTetrahedra(
     GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Tetrahedron> added,
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->changeTopology(geometry, true, [&](const auto& prepare) {
+  return all->cutTopology(geometry, [&](const auto& prepare) {
     return all->geometries.replaceTetrahedra(geometry, removed, added, {newPositions, rest},
                                              prepare);
   });

@@ -90,19 +90,35 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Returns call(prepare), which changes the topology of a geometry. isCut: only a part of it.
+  /// Returns call(prepare), which sets the topology of a geometry.
   template <class F>
-  auto changeTopology(GeometryId geometry, bool isCut, F&& call) {
+  auto changeTopology(GeometryId geometry, F&& call) {
     return withinLimit([&] {
       countCandidates();
       IndexLists near;
       GeometryTable::Preparation prepare;
       if (pairs.needsNearAtRest(geometry))
         prepare = [&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
-          near = pairs.nearAtRest(geometry, topology, rest, isCut, threads);
+          near = pairs.nearAtRest(geometry, topology, rest, threads);
         };
       auto result = call(prepare);
       if (prepare) pairs.setNearAtRest(geometry, std::move(near));
+      return result;
+    });
+  }
+  /// The same for a cut.
+  template <class F>
+  auto cutTopology(GeometryId geometry, F&& call) {
+    return withinLimit([&] {
+      countCandidates();
+      ChangedLists near;
+      GeometryTable::CutPreparation prepare;
+      if (pairs.needsNearAtRest(geometry))
+        prepare = [&](const EdgeChange& change, std::span<const Eigen::Vector3d> rest) {
+          near = pairs.changeNearAtRest(geometry, change, rest);
+        };
+      auto result = call(prepare);
+      if (prepare) pairs.setNearAtRest(geometry, near);
       return result;
     });
   }

@@ -3,7 +3,6 @@
 #include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
-#include "Mesh/RestDistance.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -283,17 +282,33 @@ bool PairTable::needsNearAtRest(GeometryId id) const {
 }
 
 IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
-                                 std::span<const Eigen::Vector3d> rest, bool isCut,
+                                 std::span<const Eigen::Vector3d> rest,
                                  const Threads& threads) const {
-  const PairRecord& record = *m_byIds.at(keyOf(id, id));
-  const double distance = record.pair.settings.restDistance;
-  return isCut ? verticesWithin(topology, rest, distance, record.nearAtRest,
-                                record.a->body.mesh.topology, threads)
-               : verticesWithin(topology, rest, distance, threads);
+  return verticesWithin(topology, rest, m_byIds.at(keyOf(id, id))->pair.settings.restDistance,
+                        threads);
 }
 
 void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
   m_byIds.find(keyOf(id, id))->second->nearAtRest = std::move(lists);
+}
+
+ChangedLists PairTable::changeNearAtRest(GeometryId id, const EdgeChange& change,
+                                         std::span<const Eigen::Vector3d> rest) {
+  PairRecord& record = *m_byIds.at(keyOf(id, id));
+  IndexLists& now = record.nearAtRest;
+  ChangedLists changed = verticesWithinAfterCut(record.a->body.mesh.topology, change, rest,
+                                                record.pair.settings.restDistance, now);
+  now.reserveMore(rest.size() - now.size(), changed.lists.itemCount());
+  return changed;
+}
+
+void PairTable::setNearAtRest(GeometryId id, const ChangedLists& changed) noexcept {
+  IndexLists& lists = m_byIds.find(keyOf(id, id))->second->nearAtRest;
+  for (std::size_t i = 0; i < changed.vertices.size(); ++i)
+    if (changed.vertices[i] < lists.size())
+      lists.replace(changed.vertices[i], changed.lists[i]);
+    else
+      lists.append(changed.lists[i]);
 }
 
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,

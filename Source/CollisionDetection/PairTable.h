@@ -11,6 +11,7 @@
 #include "Tracking/ContactTracker.h"
 #include "Tracking/SideMemory.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Mesh/RestDistance.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
@@ -183,11 +184,14 @@ class PairTable {
   void set(GeometryTable&, GeometryId a, GeometryId b, const PairSettings&, const Threads&);
   /// Whether a pair of the geometry with itself has a restDistance.
   bool needsNearAtRest(GeometryId) const;
-  /// If so: the vertices that are near at rest, in a new topology. isCut: it differs from the
-  /// topology now in a part, and vertices that stay are at rest where they were. Throws TooLarge.
+  /// If so: the vertices that are near at rest, in a new topology. Throws TooLarge.
   IndexLists nearAtRest(GeometryId, const MeshTopology&, std::span<const Eigen::Vector3d> rest,
-                        bool isCut, const Threads&) const;
+                        const Threads&) const;
   void setNearAtRest(GeometryId, IndexLists) noexcept;
+  /// If so: how a cut of the topology now changes them. rest: with new vertices. Throws TooLarge.
+  ChangedLists changeNearAtRest(GeometryId, const EdgeChange&,
+                                std::span<const Eigen::Vector3d> rest);
+  void setNearAtRest(GeometryId, const ChangedLists&) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.
   void checkRigid(const Geometry&) const;

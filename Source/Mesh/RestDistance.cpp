@@ -10,7 +10,6 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 namespace palpate {
 
@@ -62,9 +61,61 @@ struct EdgeLists {
       mean += length / static_cast<double>(edges.size()) * 2.0;
     });
   }
-  std::span<const Edge> operator[](std::uint32_t vertex) const {
-    return std::span(edges).subspan(offsets[vertex], offsets[vertex + 1] - offsets[vertex]);
+  /// Calls f(neighbour, length) for the edges of a vertex.
+  template <class F>
+  void forEach(std::uint32_t vertex, F&& f) const {
+    for (std::uint32_t i = offsets[vertex]; i < offsets[vertex + 1]; ++i)
+      f(edges[i].neighbour, edges[i].length);
   }
+};
+
+/// Edges around a cut, before it or afterwards.
+class CutEdges {
+ public:
+  CutEdges(const MeshTopology& before, const EdgeChange& change,
+           std::span<const Eigen::Vector3d> rest)
+      : m_before(before), m_change(change), m_rest(rest) {
+    for (const std::uint32_t t : before.disabled)
+      for (const std::uint32_t e : before.triangleEdges[t])
+        if (e != kNoEdge) addTo(m_disabled, before.edges[e]);
+    for (const Segment& edge : change.added) addTo(m_added, edge);
+    std::sort(m_disabled.begin(), m_disabled.end());
+    std::sort(m_added.begin(), m_added.end());
+  }
+  void setAfter(bool after) { m_isAfter = after; }
+
+  template <class F>
+  void forEach(std::uint32_t vertex, F&& f) const {
+    const auto visit = [&](std::uint32_t other) {
+      const Segment edge{std::min(vertex, other), std::max(vertex, other)};
+      if (m_isAfter && std::binary_search(m_change.gone.begin(), m_change.gone.end(), edge)) return;
+      f(other, lengthOf(m_rest[edge[0]] - m_rest[edge[1]]));
+    };
+    const auto visitAll = [&](const CountedVector<Segment>& edges) {
+      for (auto e = std::lower_bound(edges.begin(), edges.end(), Segment{vertex, 0});
+           e != edges.end() && (*e)[0] == vertex; ++e)
+        visit((*e)[1]);
+    };
+    if (vertex < m_before.vertexCount)
+      for (const std::uint32_t t : m_before.vertexTriangles[vertex])
+        for (const std::uint32_t other : m_before.elements[t])
+          if (other != vertex) visit(other);
+    visitAll(m_disabled);
+    if (m_isAfter) visitAll(m_added);
+  }
+
+ private:
+  /// From both ends.
+  static void addTo(CountedVector<Segment>& edges, const Segment& edge) {
+    edges.push_back(edge);
+    edges.push_back({edge[1], edge[0]});
+  }
+
+  const MeshTopology& m_before;
+  const EdgeChange& m_change;
+  std::span<const Eigen::Vector3d> m_rest;
+  CountedVector<Segment> m_disabled, m_added;
+  bool m_isAfter = false;
 };
 
 /// Shortest paths from one vertex after another. Vertices are visited in rings of path lengths, and
@@ -73,14 +124,19 @@ struct EdgeLists {
 /// Source   Meyer and Sanders, Delta-stepping: a parallelizable shortest path algorithm, Journal of
 ///          Algorithms 49 (2003). Difference: one thread for each search, and no distinction of
 ///          short and long edges.
+template <class Edges>
 class ShortestPaths {
  public:
-  ShortestPaths(const EdgeLists& edges, double distance)
+  /// ringWidth: any will do. longest: of the edges that are shorter than the distance.
+  ShortestPaths(const Edges& edges, std::size_t vertexCount, double distance, double ringWidth,
+                double longest)
       : m_edges(edges),
         m_distance(distance),
-        m_ringWidth(std::max(edges.mean / 2, edges.longest / kMostRings)),
-        m_rings(m_ringWidth > 0.0 ? static_cast<std::size_t>(edges.longest / m_ringWidth) + 3 : 1),
-        m_pathLength(edges.offsets.size() - 1, kUnreached) {}
+        m_ringWidth(ringWidth),
+        m_rings(ringWidth > 0.0 ? static_cast<std::size_t>(longest / ringWidth) + 3 : 1),
+        m_pathLength(vertexCount, kUnreached) {}
+
+  void setDistance(double distance) { m_distance = distance; }  ///< at most as large as before
 
   /// Appends the vertices behind `from` that are within the distance, ascending.
   void addReached(std::uint32_t from, CountedVector<std::uint32_t>& out) {
@@ -117,8 +173,9 @@ class ShortestPaths {
       for (std::size_t i = 0; i < entries.size(); ++i) {  // the ring may grow
         const auto [length, vertex] = entries[i];
         if (length != m_pathLength[vertex]) continue;  // a shorter path was found
-        for (const EdgeLists::Edge& edge : m_edges[vertex])
-          relax(edge.neighbour, length + edge.length);
+        m_edges.forEach(vertex, [&, from = length](std::uint32_t neighbour, double along) {
+          relax(neighbour, from + along);
+        });
       }
       m_waiting -= entries.size();
       entries.clear();
@@ -137,7 +194,7 @@ class ShortestPaths {
     double length;
     std::uint32_t vertex;
   };
-  const EdgeLists& m_edges;
+  const Edges& m_edges;
   double m_distance, m_ringWidth;
   CountedVector<CountedVector<Entry>> m_rings;  ///< of path lengths, used in turn
   CountedVector<double> m_pathLength;
@@ -145,28 +202,16 @@ class ShortestPaths {
   std::size_t m_waiting = 0;  ///< entries of all rings
 };
 
-/// The vertices that an edge of one mesh, and not of the other, may bring within the distance of
-/// another vertex. Sums from the other end of a path are rounded otherwise.
-void markReached(const MeshTopology& mesh, const MeshTopology& other,
-                 std::span<const Eigen::Vector3d> rest, double distance,
-                 CountedVector<std::uint8_t>& isReached) {
-  const double reach = distance * (1.0 + 0x1p-30);
-  const EdgeLists edges(mesh, rest, reach);
-  ShortestPaths paths(edges, reach);
-  CountedVector<std::uint32_t> ends;
-  mesh.forEachEdge([&](std::uint32_t e) {
-    if (!other.hasEdge(e)) ends.insert(ends.end(), mesh.edges[e].begin(), mesh.edges[e].end());
-  });
-  std::sort(ends.begin(), ends.end());
-  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
-  for (const std::uint32_t end : ends)
-    paths.forEachReached(end, [&](std::uint32_t v) { isReached[v] = 1; });
+void checkPairs(std::size_t pairs) {
+  if (pairs > kMaxPairs)
+    throw Error(ErrorCode::TooLarge,
+                "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
 }
 
-/// kept(vertex): its list, or null where it must be searched.
-template <class Kept>
-IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                   double distance, const Threads& threads, const Kept& kept) {
+}  // namespace
+
+IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
+                          double distance, const Threads& threads) {
   PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
   const EdgeLists edges(topology, rest, distance);
   const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
@@ -174,23 +219,19 @@ IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d
   CountedVector<CountedVector<std::uint32_t>> found(tasks);
   std::atomic<std::size_t> nextTask = 0, pairs = 0;
   threads.forEach(std::min(tasks, static_cast<std::size_t>(threads.count())), [&](std::size_t) {
-    ShortestPaths paths(edges, distance);
+    ShortestPaths paths(edges, count, distance,
+                        std::max(edges.mean / 2, edges.longest / kMostRings), edges.longest);
     for (std::size_t task; pairs <= kMaxPairs && (task = nextTask++) < tasks;) {
       const std::size_t end = std::min(count, (task + 1) * kGrain);
       for (std::size_t v = task * kGrain; v < end; ++v) {
         const std::size_t before = found[task].size();
-        if (const std::optional<std::span<const std::uint32_t>> list = kept(v))
-          found[task].insert(found[task].end(), list->begin(), list->end());
-        else
-          paths.addReached(static_cast<std::uint32_t>(v), found[task]);
+        paths.addReached(static_cast<std::uint32_t>(v), found[task]);
         offsets[v + 1] = static_cast<std::uint32_t>(found[task].size() - before);
       }
       pairs += found[task].size();
     }
   });
-  if (pairs > kMaxPairs)
-    throw Error(ErrorCode::TooLarge,
-                "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
+  checkPairs(pairs);
   for (std::size_t v = 0; v < count; ++v) offsets[v + 1] += offsets[v];
   PALPATE_ASSERT(offsets.back() == pairs);
   CountedVector<std::uint32_t> items;
@@ -202,24 +243,45 @@ IndexLists listsOf(const MeshTopology& topology, std::span<const Eigen::Vector3d
   return {offsets, std::move(items)};
 }
 
-}  // namespace
-
-IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                          double distance, const Threads& threads) {
-  return listsOf(topology, rest, distance, threads, [](std::size_t) { return std::nullopt; });
-}
-
-IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                          double distance, const IndexLists& before, const MeshTopology& old,
-                          const Threads& threads) {
-  PALPATE_ASSERT(before.size() == old.vertexCount);
-  CountedVector<std::uint8_t> isReached(topology.vertexCount, 0);
-  markReached(old, topology, rest.first(old.vertexCount), distance, isReached);
-  markReached(topology, old, rest, distance, isReached);
-  using List = std::optional<std::span<const std::uint32_t>>;
-  return listsOf(topology, rest, distance, threads, [&](std::size_t v) {
-    return v < old.vertexCount && !isReached[v] ? List(before[v]) : List();
-  });
+ChangedLists verticesWithinAfterCut(const MeshTopology& topology, const EdgeChange& change,
+                                    std::span<const Eigen::Vector3d> rest, double distance,
+                                    const IndexLists& before) {
+  PALPATE_ASSERT(distance > 0.0 && before.size() == topology.vertexCount &&
+                 rest.size() >= topology.vertexCount);
+  constexpr double kRings = 16.0;
+  // A search from the other end of a path adds its lengths in another order.
+  const double reach = distance * (1.0 + 0x1p-30);
+  CutEdges edges(topology, change, rest);
+  ShortestPaths paths(edges, rest.size(), reach, reach / kRings, reach);
+  ChangedLists changed;
+  const auto addReached = [&](const CountedVector<Segment>& from) {
+    CountedVector<std::uint32_t> ends;
+    for (const Segment& edge : from) ends.insert(ends.end(), edge.begin(), edge.end());
+    std::sort(ends.begin(), ends.end());
+    ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+    for (const std::uint32_t end : ends)
+      paths.forEachReached(end, [&](std::uint32_t v) { changed.vertices.push_back(v); });
+  };
+  addReached(change.gone);
+  edges.setAfter(true);
+  addReached(change.added);
+  for (std::size_t v = topology.vertexCount; v < rest.size(); ++v)
+    changed.vertices.push_back(static_cast<std::uint32_t>(v));
+  std::sort(changed.vertices.begin(), changed.vertices.end());
+  changed.vertices.erase(std::unique(changed.vertices.begin(), changed.vertices.end()),
+                         changed.vertices.end());
+  paths.setDistance(distance);
+  std::size_t pairs = before.itemCount();
+  CountedVector<std::uint32_t> list;
+  for (const std::uint32_t v : changed.vertices) {
+    list.clear();
+    paths.addReached(v, list);
+    changed.lists.append(list);
+    pairs += list.size();
+    if (v < before.size()) pairs -= before[v].size();
+    checkPairs(pairs);
+  }
+  return changed;
 }
 
 }  // namespace palpate

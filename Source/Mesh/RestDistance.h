@@ -16,11 +16,18 @@ namespace palpate {
 IndexLists verticesWithin(const MeshTopology&, std::span<const Eigen::Vector3d> rest,
                           double distance, const Threads&);
 
-/// The same after a cut. before, old: the lists of the topology that was cut.
-/// Cost     searches from the vertices within the distance of edges that are gone or new, and what
-///          is linear in the mesh: lengths of edges, and copies of the other lists.
-IndexLists verticesWithin(const MeshTopology&, std::span<const Eigen::Vector3d> rest,
-                          double distance, const IndexLists& before, const MeshTopology& old,
-                          const Threads&);
+/// Lists that a cut changes, by their vertices, ascending.
+struct ChangedLists {
+  CountedVector<std::uint32_t> vertices;
+  IndexLists lists;
+};
+
+/// How a cut changes the lists of a mesh, which has them as `before`. rest: with new vertices.
+/// Cost     searches from the ends of these edges, and from the vertices within the distance of
+///          them. What is linear is small: the path lengths of vertices, and disabled elements.
+/// Errors   as verticesWithin().
+ChangedLists verticesWithinAfterCut(const MeshTopology&, const EdgeChange&,
+                                    std::span<const Eigen::Vector3d> rest, double distance,
+                                    const IndexLists& before);
 
 }  // namespace palpate

@@ -43,6 +43,14 @@ class TopologyCut {
     reserve();
   }
 
+  EdgeChange edgeChange() const {
+    EdgeChange change;
+    for (const Edge& edge : m_edges)
+      if (edge.stays != m_mesh.hasEdge(edge.id))
+        (edge.stays ? change.added : change.gone).push_back(edge.vertices);
+    return change;
+  }
+
   void apply() noexcept {
     setOwners();  // takes them from the elements before the cut
     replaceElements();
@@ -290,10 +298,13 @@ class TopologyCut {
 };
 
 void MeshTopology::cut(std::span<const std::uint32_t> newlyRemoved, std::span<const Triangle> added,
-                       std::size_t newVertexCount) {
+                       std::size_t newVertexCount,
+                       const std::function<void(const EdgeChange&)>& prepare) {
   PALPATE_ASSERT(std::is_sorted(newlyRemoved.begin(), newlyRemoved.end()));
   PALPATE_ASSERT(newVertexCount >= vertexCount);
-  TopologyCut(*this, newlyRemoved, added, newVertexCount).apply();
+  TopologyCut cut(*this, newlyRemoved, added, newVertexCount);
+  if (prepare) prepare(cut.edgeChange());
+  cut.apply();
 }
 
 }  // namespace palpate

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -72,6 +73,11 @@ void forEachWithout(std::size_t size, std::span<const std::uint32_t> without, F&
       f(id);
 }
 
+/// The edges that a cut removes and adds, sorted.
+struct EdgeChange {
+  CountedVector<Segment> gone, added;
+};
+
 /// The connectivity of a mesh, which follows from its elements alone. It is computed once, and
 /// changed where a cut changes the elements.
 ///
@@ -107,12 +113,13 @@ struct MeshTopology {
   CountedVector<bool> isDisabled{};  ///< per triangle, with removed ones; empty if there are none
 
   /// The elements after a cut: these are removed, in ascending order, and others are added. The
-  /// topology equals one that is constructed anew, but for the numbers of edges. Changes nothing if
-  /// it throws.
+  /// topology equals one that is constructed anew, but for the numbers of edges. prepare: called
+  /// before anything changes; may throw. Changes nothing if it throws.
   /// Cost     searches for what is around the cut. It is linear only where elements are disabled,
   ///          and, amortized by what is added, where arrays have to grow.
   void cut(std::span<const std::uint32_t> removed, std::span<const Triangle> added,
-           std::size_t newVertexCount);
+           std::size_t newVertexCount,
+           const std::function<void(const EdgeChange&)>& prepare = nullptr);
 
   /// Whether the enabled triangles are a closed surface.
   bool hasOnlyClosedStars() const { return openStars == 0; }
