@@ -46,7 +46,9 @@ std::uint32_t vertexOf(const Body& body) {
 
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
+  TimeCheck check(stack.deadline, 256);
   const auto cornersAt = [&](std::size_t i) {
+    check();
     return cornersOf(outer.tree.ordered()[i], outer.mesh.before);
   };
   SignCounts counts;
@@ -79,14 +81,19 @@ void forEachPush(std::span<ContactBuffers* const> local, F&& f) {
 constexpr double kSameSide = 0.5;
 
 /// Whether all contacts push to where vertices do. They then separate the bodies.
-bool agree(std::span<ContactBuffers* const> local) {
+bool agree(std::span<ContactBuffers* const> local, const Deadline* deadline) {
+  TimeCheck check(deadline, 512);
   Vector3d sum = Vector3d::Zero();
   forEachPush(local, [&](const Vector3d& normal, bool ofEdges) {
+    check();
     if (!ofEdges) sum += normal;
   });
   bool all = sum != Vector3d::Zero();
   const double least = kSameSide * stableLength(sum);
-  forEachPush(local, [&](const Vector3d& normal, bool) { all &= normal.dot(sum) >= least; });
+  forEachPush(local, [&](const Vector3d& normal, bool) {
+    check();
+    all &= normal.dot(sum) >= least;
+  });
   return all;
 }
 
@@ -126,21 +133,29 @@ void forEachList(const TriangleMesh& a, const TriangleMesh& b, ContactBuffers& f
   pass(found.edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
 }
 
-bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step,
+               const Deadline* deadline) {
+  TimeCheck check(deadline, 128);
   bool any = false;
   for (ContactBuffers* found : step)
     forEachList(a, b, *found, [&](const auto& list, auto&& isLeaving) {
-      any = any || std::any_of(list.begin(), list.end(), isLeaving);
+      any = any || std::any_of(list.begin(), list.end(), [&](const auto& contact) {
+              check();
+              return isLeaving(contact);
+            });
     });
   return any;
 }
 
 /// Turns these impacts, so that they push the feature on out. Returns whether there were any.
-bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step,
+                 const Deadline* deadline) {
+  TimeCheck check(deadline, 128);
   bool any = false;
   for (ContactBuffers* found : step)
     forEachList(a, b, *found, [&](auto& list, auto&& isLeaving) {
       for (auto& contact : list) {
+        check();
         if (!isLeaving(contact)) continue;
         any = true;
         contact.normal = -contact.normal;
@@ -162,19 +177,21 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
   if (!mayBeBodies(record)) return false;
   const Body &a = record.a->body, &b = record.b->body;
   const bool meet = anyIntersecting(local);
-  if (meet && agree(local)) return false;
-  const bool overlapped =
-      startsIntersecting || meet || isInside(a, b, engine, stack) ||
-      isInside(b, a, engine, stack) ||
-      (anyLeaves(a.mesh, b.mesh, step) && (wasInside(a, b, stack) || wasInside(b, a, stack)));
+  if (meet && agree(local, deadline)) return false;
+  const bool overlapped = startsIntersecting || meet || isInside(a, b, engine, stack) ||
+                          isInside(b, a, engine, stack) ||
+                          (anyLeaves(a.mesh, b.mesh, step, deadline) &&
+                           (wasInside(a, b, stack) || wasInside(b, a, stack)));
   if (!overlapped) return false;
-  const Penetration found = penetrationOf(a, b, engine, m_scratch, kQuick);
-  if (found.intersecting) addContacts(record, engine, found, local);
-  if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step);
+  const BodyPair pair(a, b, engine, m_scratch.pair, kQuick.moved);
+  const Penetration found = penetrationOf(pair, m_scratch, kQuick);
+  if (isOver(deadline)) return false;
+  if (found.intersecting) addContacts(pair, found, record.pair.settings.thickness, local);
+  if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step, deadline);
   return found.intersecting;
 }
 
-void BodyContacts::addContacts(const PairRecord& record, Engine engine, const Penetration& found,
+void BodyContacts::addContacts(const BodyPair& pair, const Penetration& found, double thickness,
                                Buffers local) {
   auto& triangles = m_contacts.intersectingTriangles;
   for (const ContactBuffers* buffers : local)
@@ -184,9 +201,7 @@ void BodyContacts::addContacts(const PairRecord& record, Engine engine, const Pe
   if (triangles.empty())
     for (const BodyPair::IntersectingTriangles& both : m_scratch.intersecting)
       triangles.push_back({both.elementA, both.elementB});
-  const BodyPair pair(record.a->body, record.b->body, engine, m_scratch.pair);
-  for (const bool ofA : {true, false})
-    addVertices(pair, ofA, found, record.pair.settings.thickness);
+  for (const bool ofA : {true, false}) addVertices(pair, ofA, found, thickness);
   addEdges(found);
 }
 
@@ -200,6 +215,7 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
   const double end = penetration.depth + kExitSlack * pair.magnitude();
   for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
     if (own.triangleOf[v] == kNoElement) continue;
+    if (isOver(pair.deadline())) return;
     const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, end);
     if (!exit) continue;
     const Triangle& corners = pair.geometry(!ofA).mesh.topology.elements[exit->element];

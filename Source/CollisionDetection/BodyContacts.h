@@ -27,6 +27,7 @@ class BodyContacts {
   ///
   /// local    the contacts of Intersection at the end, with the triangles that intersect
   /// step     the other contacts
+  /// deadline where it is over, the answer means nothing, or OutOfTime is thrown; null: none
   /// Cost     of bodies that are deep in each other: that of penetrationOf(), on one thread
   bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step,
             const Deadline*);
@@ -37,7 +38,7 @@ class BodyContacts {
   bool hasTurned() const { return m_hasTurned; }
 
  private:
-  void addContacts(const PairRecord&, Engine, const Penetration&, Buffers local);
+  void addContacts(const BodyPair&, const Penetration&, double thickness, Buffers local);
   void addVertices(const BodyPair&, bool ofA, const Penetration&, double thickness);
   void addEdges(const Penetration&);
 

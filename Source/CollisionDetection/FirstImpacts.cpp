@@ -170,9 +170,11 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
               return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
                      std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
             });
-  for (std::size_t i = 1; i < m_entries.size(); ++i)
+  for (std::size_t i = 1; i < m_entries.size(); ++i) {
+    check();
     if (m_entries[i].features == m_entries[i - 1].features)
       m_dropped[m_entries[i].list][m_entries[i].index] = 1;
+  }
   forEachImpactList(contents, [&](auto& contacts, std::uint32_t list) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < contacts.size(); ++i) {

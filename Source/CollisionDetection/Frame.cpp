@@ -128,7 +128,8 @@ void Frame::runRounds(const Threads& threads, const Deadline* deadline, Trace* t
   }
 }
 
-/// Writes a pair's results and adds what its jobs counted.
+/// Writes a pair's results and adds what its jobs counted. Results are of use only if the deadline
+/// is not over then.
 void Frame::join(Pair& pair, const FrameJoin& join) {
   PALPATE_ASSERT(pair.firstJob + pair.jobCount <= m_jobs.size());
   const MemoryScope memory(MemoryStage::Results);
@@ -154,6 +155,7 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
               return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
             });
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
+  if (isOver(join.deadline)) return;
   record.followSides();
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   if (record.pair.settings.smoothNormals)
@@ -205,14 +207,12 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
   const auto finish = [&](Pair& pair) {
     PairRecord& record = *pair.record;
     const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
-    if (!pair.isOutOfTime) try {
-        checkTime(&deadline);
+    if (!pair.isOutOfTime && !deadline.isOver()) try {
         join(pair, {threads, Engine::Octree, statistics, m_results, &deadline});
-        checkTime(&deadline);
-        record.track(step);
-        record.isUnfinished = false;
+        record.isUnfinished = deadline.isOver();
       } catch (const OutOfTime&) {
       }
+    if (!record.isUnfinished) record.track(step);
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
     statistics.milliseconds.order += spent;

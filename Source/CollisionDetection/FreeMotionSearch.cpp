@@ -109,17 +109,14 @@ bool FreeMotionSearch::search(Engine engine, const Threads& threads, const Deadl
   std::atomic<bool> isComplete{true};
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Work& work = m_works[m_places[i].work];
-    try {
-      checkTime(deadline);
-      if (hasShape(*work.record))
-        withShape(work, engine, *m_scratch[i]);
-      else if (engine == Engine::BruteForce)
-        runByBruteForce(work, *m_scratch[i]);
-      else
-        run(work, m_places[i].job, *m_scratch[i], deadline);
-    } catch (const OutOfTime&) {
+    if (isOver())
       isComplete = false;
-    }
+    else if (hasShape(*work.record))
+      withShape(work, engine, *m_scratch[i]);
+    else if (engine == Engine::BruteForce)
+      runByBruteForce(work, *m_scratch[i]);
+    else if (!run(work, m_places[i].job, *m_scratch[i], deadline))
+      isComplete = false;
   });
   return isComplete;
 }
@@ -166,7 +163,7 @@ void FreeMotionSearch::startSearch(Work& work, bool divides) {
   work.grain = std::max<std::size_t>(1, (work.count + kSearchJobs - 1) / kSearchJobs);
 }
 
-void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
+bool FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
                            const Deadline* deadline) const {
   const std::size_t begin = job * work.grain, size = std::min(work.count - begin, work.grain);
   struct Context {
@@ -174,18 +171,23 @@ void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
     const double searchDistance;
     const FreeMotions motions;
     const Deadline* const deadline;
-  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record), deadline};
+    TraversalStack& stack;
+    bool isComplete = true;
+  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record), deadline,
+            scratch.stack};
   scratch.sink.start(
       [](void* opaque, std::span<const ElementPair> pairs) {
-        const Context& c = *static_cast<const Context*>(opaque);
-        forEachPart(c.deadline, pairs, [&](const auto& part) {
-          findFreeMotion(c.pair, c.searchDistance, part, c.motions);
-        });
+        Context& c = *static_cast<Context*>(opaque);
+        c.isComplete = c.isComplete && forEachPart(c.deadline, pairs, [&](const auto& part) {
+                         findFreeMotion(c.pair, c.searchDistance, part, c.motions);
+                       });
+        if (!c.isComplete) c.stack.stop();
       },
       &context, deadline);
   traverse(work.trees, std::span(m_nodePairs).subspan(work.first + begin, size), scratch.stack,
            scratch.sink);
   scratch.sink.flush();
+  return context.isComplete;
 }
 
 void FreeMotionSearch::runByBruteForce(const Work& work, Scratch& scratch) {

@@ -63,7 +63,8 @@ class FreeMotionSearch {
   bool search(Engine, const Threads&, const Deadline*);
   void start(const GeometryTable&, const PairTable&);
   void startSearch(Work&, bool divides);
-  void run(const Work&, std::size_t job, Scratch&, const Deadline*) const;
+  /// Returns whether the deadline left time for all.
+  bool run(const Work&, std::size_t job, Scratch&, const Deadline*) const;
   static void runByBruteForce(const Work&, Scratch&);
   static void withShape(const Work&, Engine, Scratch&);
 

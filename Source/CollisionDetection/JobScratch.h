@@ -49,6 +49,13 @@ struct JobScratch : CountedObject {
     isOutOfTime = false;
     milliseconds = narrowMilliseconds = 0;
   }
+  /// Calls use(part) for parts of the items until the job is out of time. A traversal that is in
+  /// progress then ends.
+  template <class Item, class Use>
+  void forEachPart(std::span<const Item> items, Use&& use) {
+    if (!isOutOfTime) isOutOfTime = !palpate::forEachPart(deadline, items, use);
+    if (isOutOfTime) stack.stop();
+  }
 };
 
 /// The jobs of one pair.

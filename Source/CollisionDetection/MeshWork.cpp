@@ -105,15 +105,15 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   // Those that meet at the step's start have boxes within the motion at its end, and are listed.
   if (meshes.step.checksStart)
     m_record->kept.forEachList(job, [&](std::span<const ElementPair> pairs) {
-      forEachPart(scratch.deadline, anyDisabled ? enabled(pairs, scratch.kept) : pairs,
-                  [&](const auto& part) { checkStart(meshes, part, scratch); });
+      scratch.forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
+                          [&](const auto& part) { checkStart(meshes, part, scratch); });
     });
   if (anyDisabled) {
     enabled(scratch.near, scratch.kept);
     scratch.near.swap(scratch.kept);
   }
-  forEachPart(scratch.deadline, std::span<const ElementPair>(scratch.near),
-              [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
+  scratch.forEachPart(std::span<const ElementPair>(scratch.near),
+                      [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
   scratch.narrowMilliseconds += watch.lap();
 }
 
@@ -229,14 +229,13 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
     if (round == 0) m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      forEachPart(scratch.deadline, pairs, [&](const auto& part) { detect(part, scratch); });
+      scratch.forEachPart(pairs, [&](const auto& part) { detect(part, scratch); });
     });
     scratch.candidateCount = scratch.sink.total();
   } else if (repeats(scratch)) {
     Stopwatch watch;
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      forEachPart(scratch.deadline, pairs,
-                  [&](const auto& part) { detectIntersections(part, scratch); });
+      scratch.forEachPart(pairs, [&](const auto& part) { detectIntersections(part, scratch); });
     });
     scratch.narrowMilliseconds += watch.lap();
   }
@@ -324,7 +323,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   for (const auto* buffers : {&found, &intersections})
     for (const ContactBuffers* each : *buffers) facts.add(each->facts);
   results.sortFacts(record);
-  checkTime(join.deadline);
+  if (isOver(join.deadline)) return;
   if (record.plan.step.reportsImpacts && facts.clearance == 0.0) {
     for (ContactBuffers* each : found)
       replaceByImpacts(record.meshes(), facts, *each, results.impacts);
@@ -341,18 +340,20 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
     preferred = intersections.size();
     found.insert(found.begin(), intersections.begin(), intersections.end());
   }
-  checkTime(join.deadline);
+  if (isOver(join.deadline)) return;
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
-  const std::size_t intersectionCount = results.order(record, preferBodies(join, preferred));
+  preferred = preferBodies(join, preferred);
+  if (isOver(join.deadline)) return;
+  const std::size_t intersectionCount = results.order(record, preferred);
   join.statistics.exactDecisions += pierced.exactDecisions;
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
   const bool nearby =
       std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });
-  checkTime(join.deadline);
+  if (isOver(join.deadline)) return;
   results.assess(record, nearby, join.statistics);
-  checkTime(join.deadline);
+  if (isOver(join.deadline)) return;
   // After assess(), which tests the triangles around every impact.
   const bool mixes = record.plan.step.reportsImpacts,
              continuous = record.plan.method == Method::Continuous;

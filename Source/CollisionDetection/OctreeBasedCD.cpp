@@ -326,8 +326,18 @@ void OctreeBasedCD::detectCollision() {
   all->withinLimit([&] { all->detect(nullptr); });
 }
 
+/// The first exception of a process takes 0.1 ms more than later ones.
+static bool throwOnce() {
+  try {
+    throw OutOfTime();
+  } catch (const OutOfTime&) {
+    return true;
+  }
+}
+
 bool OctreeBasedCD::detectCollision(std::chrono::microseconds budget) {
   if (!m_implementation) throwMovedFrom();
+  [[maybe_unused]] static const bool hasThrown = throwOnce();
   const Deadline::Clock& clock = m_implementation->clock;
   const Deadline::Time start = Deadline::now(clock);
   const Implementation::ChangeGuard all(m_implementation);

@@ -49,7 +49,7 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
     findWithShape(record, elements, scratch.contacts.shapes);
   };
   if (record.plan.kind == PairKind::MeshAndShape)
-    forEachPart(scratch.deadline, std::span<const std::uint32_t>(scratch.elements), find);
+    scratch.forEachPart(std::span<const std::uint32_t>(scratch.elements), find);
   else
     find({});
   scratch.narrowMilliseconds += watch.lap();

@@ -8,7 +8,8 @@
 
 namespace palpate {
 
-/// Thrown where work ends because its time is over.
+/// Thrown where work ends because its time is over. An exception takes 0.03 ms, as its tables are
+/// not in the caches: long loops end without one.
 struct OutOfTime {};
 
 /// The end of a detection's budget, or an earlier cancel. Once it is over, it stays over. Any
@@ -45,17 +46,22 @@ class Deadline {
   mutable std::atomic<bool> m_isOver{false};
 };
 
+/// Whether there is a deadline that is over.
+inline bool isOver(const Deadline* deadline) { return deadline && deadline->isOver(); }
+
 /// Throws OutOfTime if there is a deadline that is over.
 inline void checkTime(const Deadline* deadline) {
-  if (deadline && deadline->isOver()) throw OutOfTime();
+  if (isOver(deadline)) throw OutOfTime();
 }
 
-/// checkTime() in one of so many calls.
+/// Looks at the deadline in one of so many calls.
 class TimeCheck {
  public:
   TimeCheck(const Deadline* deadline, unsigned calls) : m_deadline(deadline), m_calls(calls) {}
+  bool isOver() { return m_deadline && ++m_count % m_calls == 0 && m_deadline->isOver(); }
+  /// Throws OutOfTime if it is over.
   void operator()() {
-    if (m_deadline && ++m_count % m_calls == 0) checkTime(m_deadline);
+    if (isOver()) throw OutOfTime();
   }
 
  private:
@@ -75,15 +81,20 @@ void sortUntil(const Deadline* deadline, Iterator begin, Iterator end, Less&& le
 }
 
 /// Calls use(part) for the items in order: for all at once, or with a deadline for few at a time,
-/// after checkTime(). use: its result must not depend on how items are divided.
+/// until it is over. Returns whether it was called for all. use: its result must not depend on how
+/// items are divided.
 template <class Span, class Use>
-void forEachPart(const Deadline* deadline, const Span& items, Use&& use) {
+bool forEachPart(const Deadline* deadline, const Span& items, Use&& use) {
   constexpr std::size_t kPart = 16;  // takes some microseconds
-  if (!deadline) return use(items);
+  if (!deadline) {
+    use(items);
+    return true;
+  }
   for (std::size_t begin = 0; begin < items.size(); begin += kPart) {
-    checkTime(deadline);
+    if (deadline->isOver()) return false;
     use(items.subspan(begin, begin + kPart < items.size() ? kPart : items.size() - begin));
   }
+  return true;
 }
 
 }  // namespace palpate

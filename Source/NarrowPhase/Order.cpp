@@ -44,10 +44,12 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
     }
   sortUntil(deadline, entries.begin(), entries.end(),
             [](const auto& l, const auto& r) { return l.key < r.key; });
-  entries.erase(
-      std::unique(entries.begin(), entries.end(),
-                  [](const auto& l, const auto& r) { return l.key.hasElementsOf(r.key); }),
-      entries.end());
+  entries.erase(std::unique(entries.begin(), entries.end(),
+                            [&](const auto& l, const auto& r) {
+                              check();
+                              return l.key.hasElementsOf(r.key);
+                            }),
+                entries.end());
   out.clear();
   out.reserve(entries.size());
   std::size_t count = 0;
@@ -59,7 +61,10 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
   if (!flags) return count;
   flags->clear();
   if (preferred > 0)
-    for (const auto& entry : entries) flags->push_back(entry.key.isPreferred());
+    for (const auto& entry : entries) {
+      check();
+      flags->push_back(entry.key.isPreferred());
+    }
   return count;
 }
 
@@ -87,7 +92,7 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
   for (const ContactBuffers* buffer : buffers)
     triangles.insert(triangles.end(), buffer->intersectingTriangles.begin(),
                      buffer->intersectingTriangles.end());
-  std::sort(triangles.begin(), triangles.end());
+  sortUntil(scratch.deadline, triangles.begin(), triangles.end(), std::less<>());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
   return count;
 }

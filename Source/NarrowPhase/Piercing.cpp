@@ -10,6 +10,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <functional>
 #include <tuple>
 
 namespace palpate {
@@ -194,18 +195,19 @@ void recordCrossings(const MeshPair& pair, bool atStart, const ElementPair& tria
 }
 
 void PiercingContacts::collect(std::span<ContactBuffers* const> found,
-                               Buffer<EdgeCrossing> ContactBuffers::*list) {
+                               Buffer<EdgeCrossing> ContactBuffers::*list,
+                               const Deadline* deadline) {
   m_crossings.clear();
   for (const ContactBuffers* buffers : found)
     m_crossings.insert(m_crossings.end(), (buffers->*list).begin(), (buffers->*list).end());
-  std::sort(m_crossings.begin(), m_crossings.end());
+  sortUntil(deadline, m_crossings.begin(), m_crossings.end(), std::less<>());
   m_crossings.erase(std::unique(m_crossings.begin(), m_crossings.end()), m_crossings.end());
 }
 
 void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
                             ContactBuffers& out) {
-  collect(found, &ContactBuffers::crossings);
-  findBehind(pair);
+  collect(found, &ContactBuffers::crossings, out.deadline);
+  findBehind(pair, out.deadline);
   addDepths(pair, false, out);
   TimeCheck check(out.deadline, 32);
   for (const ContactBuffers* buffers : found)
@@ -217,8 +219,8 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
 
 void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
                                    ContactBuffers& out) {
-  collect(found, &ContactBuffers::crossingsAtStart);
-  findBehind(pair);
+  collect(found, &ContactBuffers::crossingsAtStart, out.deadline);
+  findBehind(pair, out.deadline);
   addDepths(pair, true, out);
 }
 
@@ -242,9 +244,11 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
   }
 }
 
-void PiercingContacts::findBehind(const MeshPair& pair) {
+void PiercingContacts::findBehind(const MeshPair& pair, const Deadline* deadline) {
+  TimeCheck check(deadline, 64);
   m_behind.clear();
   for (auto first = m_crossings.begin(); first != m_crossings.end();) {
+    check();
     const auto end = std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
       return c.ofB != first->ofB || c.edge != first->edge;
     });
@@ -255,7 +259,7 @@ void PiercingContacts::findBehind(const MeshPair& pair) {
       if (leaves != 0 && first->lowerIsBehind == (leaves > 0))
         m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle});
   }
-  std::sort(m_behind.begin(), m_behind.end());
+  sortUntil(deadline, m_behind.begin(), m_behind.end(), std::less<>());
   m_behind.erase(std::unique(m_behind.begin(), m_behind.end()), m_behind.end());
 }
 
@@ -329,8 +333,10 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   sort(m_atEnd);
   sort(m_atStart);
   const bool drops = pair.reportsDistinct(), b = !pair.self();
+  TimeCheck check(atStart.deadline, 32);
   // ofB: the mesh of each vertex.
   const auto represents = [&](const auto& contact, const std::array<bool, 4>& ofB) {
+    check();
     if constexpr (requires { contact.vertex; }) {
       const Stencil all = stencil(contact), alone{all.vertices, {1.0, 0.0, 0.0, 0.0}};
       if (contact.timeOfImpact == 1.0 || ask(m_atEnd, all, ofB, contact.normal).isKnown)
@@ -343,6 +349,7 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   };
   // Turns a contact, or returns true if it is dropped.
   const auto settle = [&](auto& contact, const std::array<bool, 4>& ofB) {
+    check();
     const Stencil vertices = stencil(contact);
     Opinion opinion = ask(m_atEnd, vertices, ofB, contact.normal);
     if (drops && opinion.isKnown) return true;

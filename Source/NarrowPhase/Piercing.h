@@ -50,8 +50,9 @@ class PiercingContacts {
     std::uint32_t vertex, triangle;
     auto operator<=>(const Behind&) const = default;
   };
-  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list);
-  void findBehind(const MeshPair&);
+  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list,
+               const Deadline*);
+  void findBehind(const MeshPair&, const Deadline*);
   void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
@@ -76,7 +77,7 @@ class PiercingContacts {
 ///          vertices that leave do not disagree.
 class KnownSides {
  public:
-  /// atEnd, atStart: Intersection's contacts.
+  /// atEnd, atStart: Intersection's contacts. Ends at the deadline of atStart.
   void apply(const MeshPair&, std::span<ContactBuffers* const> atEnd, const ContactBuffers& atStart,
              std::span<ContactBuffers* const> others);
 

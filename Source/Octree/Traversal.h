@@ -110,6 +110,9 @@ void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 /// that a traversal that ended with an exception does not affect the next one.
 struct TraversalStack {
   Buffer<NodePair> pairs, level;
+
+  /// Ends a traversal from its sink's function, which may be called a few times more.
+  void stop() { pairs.clear(); }
 };
 
 /// Writes the node pairs to start from to stack.pairs. If the roots do not overlap there are none,

@@ -81,7 +81,8 @@ bool overlap(const BodyPair& pair, CountedVector<BodyPair::IntersectingTriangles
     pierce |= (both.found.edgesOfAThroughB | both.found.edgesOfBThroughA) != 0;
     return true;
   });
-  std::sort(intersecting.begin(), intersecting.end(),
+  if (isOver(pair.deadline())) return false;
+  sortUntil(pair.deadline(), intersecting.begin(), intersecting.end(),
             [](const BodyPair::IntersectingTriangles& l, const BodyPair::IntersectingTriangles& r) {
               return std::pair(l.elementA, l.elementB) < std::pair(r.elementA, r.elementB);
             });
@@ -101,7 +102,9 @@ bool isConvex(const BodyPair& pair, bool ofA) {
     const auto [a, b, c] = cornersOf(topology.elements[triangle], positions);
     return number * windingNormal(a, b, c).dot(p - a) <= most;
   };
+  TimeCheck check(pair.deadline(), 64);
   for (std::uint32_t e = 0; e < topology.edges.size(); ++e) {
+    check();
     const auto both = topology.edgeTriangles[e];
     if (both.size() != 2 || !isBehind(both[0], centre) || !isBehind(both[1], centre)) return false;
     for (std::size_t side = 0; side < 2; ++side)

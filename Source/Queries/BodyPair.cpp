@@ -17,10 +17,14 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
-void BodyVertices::assign(const Body& geometry) {
+void BodyVertices::assign(const Body& geometry, const Deadline* deadline) {
+  TimeCheck check(deadline, 512);
   const auto& now = geometry.mesh.now;
   positions.resize(now.size());
-  for (std::size_t v = 0; v < now.size(); ++v) positions[v] = now[v];
+  for (std::size_t v = 0; v < now.size(); ++v) {
+    check();
+    positions[v] = now[v];
+  }
   triangleOf.assign(now.size(), kNoElement);
   m_links.resize(now.size());
   std::iota(m_links.begin(), m_links.end(), 0u);
@@ -31,6 +35,7 @@ void BodyVertices::assign(const Body& geometry) {
   box.setEmpty();
   const auto& triangles = geometry.mesh.topology.elements;
   geometry.mesh.topology.forEachElement([&](std::uint32_t t) {
+    check();
     for (const std::uint32_t v : triangles[t]) {
       if (triangleOf[v] == kNoElement) triangleOf[v] = t, box.extend(positions[v]);
       const std::uint32_t first = root(triangles[t][0]), second = root(v);
@@ -48,10 +53,12 @@ double BodyVertices::magnitude() const {
 
 double unitOf(double magnitude) { return std::exp2(-std::ilogb(std::max(magnitude, 0x1p-1000))); }
 
-Vector3d BodyVertices::furthest(const Vector3d& direction) const {
+Vector3d BodyVertices::furthest(const Vector3d& direction, const Deadline* deadline) const {
+  TimeCheck check(deadline, 1024);
   double most = -std::numeric_limits<double>::infinity();
   std::size_t best = 0;
   for (std::size_t v = 0; v < positions.size(); ++v) {
+    check();
     const double height = direction[0] * positions[v][0] + direction[1] * positions[v][1] +
                           direction[2] * positions[v][2];
     if (triangleOf[v] == kNoElement || !(height > most)) continue;
@@ -68,8 +75,8 @@ BodyPair::BodyPair(const Body& a, const Body& b, Engine engine, BodyPairScratch&
       m_engine(engine),
       m_movesTransform(moved == Moved::Body && a.isPlaced()),
       m_scratch(scratch) {
-  scratch.a.assign(a);
-  scratch.b.assign(b);
+  scratch.a.assign(a, scratch.stack.deadline);
+  scratch.b.assign(b, scratch.stack.deadline);
   m_magnitude = std::max(scratch.a.magnitude(), scratch.b.magnitude());
 }
 
@@ -94,9 +101,9 @@ void BodyPair::forEachIntersecting(
     const Vector3d& shift, const std::function<bool(const IntersectingTriangles&)>& f) const {
   SignCounts counts;
   IntersectingTriangles both;
-  TimeCheck check(m_scratch.stack.deadline, 16);
+  TimeCheck check(deadline(), 16);
   const auto test = [&](std::uint32_t elementB) {
-    check();
+    if (check.isOver()) return false;
     both.elementB = elementB;
     both.b = cornersOfB(elementB);
     both.found = intersectTriangles(both.a, both.b, counts);
@@ -118,6 +125,7 @@ void BodyPair::forEachIntersecting(
     return;
   }
   if (!m_scratch.pairs) m_scratch.pairs = std::make_unique<PairScratch>();
+  m_scratch.pairs->deadline = deadline();
   PairBound bound;
   bound.distance = boxErrorOf(m_a, m_b);
   forNearElements(
@@ -136,7 +144,7 @@ void BodyPair::forEachIntersecting(
 }
 
 int BodyPair::windingNumberOf(bool ofA, const Vector3d& p) const {
-  checkTime(m_scratch.stack.deadline);
+  checkTime(deadline());
   return windingNumber(geometry(ofA), p, m_engine, m_scratch.stack);
 }
 
@@ -153,7 +161,9 @@ bool BodyPair::isInBoth(const Vector3d& p) const {
 /// must be tested.
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   SignCounts counts;
+  TimeCheck check(deadline(), 256);
   const auto cornersAt = [&](std::size_t i) {
+    check();
     return cornersOfA(m_a.tree.octree().order()[i], shift);
   };
   const int number = windingNumber(m_a.tree.octree().order().size(), cornersAt, p, counts);
@@ -186,7 +196,7 @@ bool BodyPair::areApart(const Vector3d& shift) const {
 
 std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& shift,
                                       const Vector3d& direction) const {
-  checkTime(m_scratch.stack.deadline);
+  checkTime(deadline());
   const Vector3d& p = vertices(part.ofA).positions[part.vertex];
   const Ray ray = part.ofA ? Ray{p + shift, direction} : Ray{p - shift, -direction};
   constexpr double kLargest = std::numeric_limits<double>::max();
@@ -200,7 +210,6 @@ std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& sh
 std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
                                                    const Vector3d& direction, double begin,
                                                    double end) const {
-  checkTime(m_scratch.stack.deadline);
   const Vector3d& p = vertices(vertex.ofA).positions[vertex.vertex];
   RayHits hits(geometry(!vertex.ofA), {p, direction, begin, end}, m_engine == Engine::BruteForce,
                m_scratch.met);

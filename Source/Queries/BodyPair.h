@@ -8,6 +8,7 @@
 #include "Octree/PointQueries.h"
 #include "Math/TriangleIntersection.h"
 #include "Core/CountedVector.h"
+#include "Core/Deadline.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -27,10 +28,10 @@ struct BodyVertices {
   CountedVector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
   Eigen::AlignedBox3d box;                   ///< of the vertices that are in triangles
 
-  void assign(const Body&);
+  void assign(const Body&, const Deadline* = nullptr);
   double magnitude() const;  ///< L: the largest coordinate
   /// The vertex that is furthest along a direction.
-  Eigen::Vector3d furthest(const Eigen::Vector3d& direction) const;
+  Eigen::Vector3d furthest(const Eigen::Vector3d& direction, const Deadline* = nullptr) const;
 
  private:
   CountedVector<std::uint32_t> m_links;  ///< per vertex: another vertex of its part, or itself
@@ -61,6 +62,8 @@ class BodyPair {
   const Body& geometry(bool ofA) const { return ofA ? m_a : m_b; }
   const BodyVertices& vertices(bool ofA) const { return ofA ? m_scratch.a : m_scratch.b; }
   double magnitude() const { return m_magnitude; }  ///< L: the largest coordinate
+  /// Of the scratch. Null: none. Searches that say nothing else throw OutOfTime.
+  const Deadline* deadline() const { return m_scratch.stack.deadline; }
 
   Corners cornersOfA(std::uint32_t element, const Eigen::Vector3d& shift) const;
   Corners cornersOfB(std::uint32_t element) const;
@@ -70,7 +73,7 @@ class BodyPair {
     Corners a, b;  ///< a moved
     TriangleIntersection found;
   };
-  /// Calls f for all that intersect, in any order, until it returns false.
+  /// Calls f for all that intersect, in any order, until it returns false or the deadline is over.
   void forEachIntersecting(const Eigen::Vector3d& shift,
                            const std::function<bool(const IntersectingTriangles&)>& f) const;
 
@@ -94,7 +97,7 @@ class BodyPair {
   std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& shift,
                               const Eigen::Vector3d& direction) const;
   /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
-  /// surface last. Both are L, from where it is.
+  /// surface last. Both are L, from where it is. Looks at no deadline.
   struct Exit {
     double distance;  ///< L, from where it is
     std::uint32_t element;

@@ -74,26 +74,35 @@ class Search {
     findInside(true, m_scratch.insideA);
     findInside(false, m_scratch.insideB);
     const HullSeparation hulls = separateHulls(
-        [&](const Vector3d& d) { return Vector3d(m_unit * m_pair.vertices(true).furthest(d)); },
-        [&](const Vector3d& d) { return Vector3d(m_unit * m_pair.vertices(false).furthest(d)); },
-        kExitSlack, m_scratch.difference);
+        [&](const Vector3d& d) { return furthest(true, d); },
+        [&](const Vector3d& d) { return furthest(false, d); }, kExitSlack, m_scratch.difference);
     if (hulls.direction != Vector3d::Zero()) improve(hulls.direction, kInfinity);
+    if (isOver()) return {};
     if (!m_best.separates || !isMinimal(hulls)) searchDirections();
+    if (isOver()) return {};
     Penetration out = result();
     out.minimal = isMinimal(hulls);
     return out;
   }
 
  private:
+  Vector3d furthest(bool ofA, const Vector3d& direction) const {
+    checkTime(m_pair.deadline());
+    return m_unit * m_pair.vertices(ofA).furthest(direction, m_pair.deadline());
+  }
+
+  bool isOver() const { return palpate::isOver(m_pair.deadline()); }
+
   // ---- One direction ----
 
+  /// Ends at the deadline without having separated the bodies, as follow() may end there.
   Translation translate(const Vector3d& direction, double limit) {
     Translation at;
     at.direction = direction;
     at.depth = 0;
     boundByRays(at, limit);
     double slack = m_slack;
-    for (int step = 0; step < kMostSteps && at.depth < limit; ++step) {
+    for (int step = 0; step < kMostSteps && at.depth < limit && !isOver(); ++step) {
       const double before = at.depth;
       if (!follow(at)) {
         at.separates = true;
@@ -119,7 +128,7 @@ class Search {
       return true;
     };
     m_pair.forEachIntersecting(shift, std::ref(takeIntersecting));  // a copy would allocate
-    if (any) return true;
+    if (any || isOver()) return true;
     const auto part = m_pair.findInsidePart(shift);
     if (!part) return false;
     takeHit(at, *part, start);
@@ -179,8 +188,11 @@ class Search {
     const BodyVertices& own = m_pair.vertices(ofA);
     const Eigen::AlignedBox3d& other = m_pair.vertices(!ofA).box;
     inside.clear();
-    for (std::uint32_t v = 0; v < own.positions.size(); ++v)
+    TimeCheck check(m_pair.deadline(), 1024);
+    for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
+      check();
       if (own.triangleOf[v] != kNoElement && other.contains(own.positions[v])) inside.push_back(v);
+    }
     const std::size_t stride = inside.size() / m_effort.inside + 1;
     std::size_t count = 0;
     for (std::size_t i = 0; i < inside.size(); i += stride)
@@ -225,7 +237,7 @@ class Search {
       const double length = stableLength(*next);
       if (!(length > 0) || !(length < (1.0 - kDepthGain) * std::min(depth, m_best.depth))) return;
       const Translation found = translate(*next / length, kWorthDescent * depth);
-      if (found.last.elementA == kNoElement) return;
+      if (found.last.elementA == kNoElement || isOver()) return;
       take(found);
       if (found.separates) depth = std::min(depth, found.depth);
       shortest.add(found.last.normal, found.last.normal.dot(found.depth * found.direction));
@@ -246,6 +258,7 @@ class Search {
       if (translations++ >= m_effort.translations && m_best.separates) break;
       if (!(seed.bound < m_best.depth)) break;
       improve(seed.direction, kWorthDescent * m_best.depth);
+      if (isOver()) return;
     }
   }
   double boundOf(const Vector3d& direction) {
@@ -263,7 +276,9 @@ class Search {
     m_scratch.seeds.push_back({direction, m_scratch.seeds.size()});
   }
   void addNormals() {
+    TimeCheck check(m_pair.deadline(), 16);
     const auto add = [&](bool ofA, std::uint32_t element) {
+      check();
       if (m_scratch.seeds.size() < kMostFaceNormals)
         addSeed(ofA ? Vector3d(-normalOf(true, element)) : normalOf(false, element));
     };
@@ -332,16 +347,24 @@ class Search {
 
 }  // namespace
 
+Penetration apart(GeometryId a, GeometryId b) {
+  const auto none = [](GeometryId id) {
+    return SurfacePoint{id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
+  };
+  return {false, Vector3d::Zero(), 0.0, none(a), none(b), true};
+}
+
 Penetration penetrationOf(const Body& a, const Body& b, Engine engine, PenetrationScratch& scratch,
                           const PenetrationEffort& effort) {
   PALPATE_ASSERT(!a.shape && !b.shape);
-  const auto none = [](const Body& geometry) {
-    return SurfacePoint{geometry.id, kNoElement, {}, Vector3d::Zero(), Vector3d::Zero(), 0.0};
-  };
-  const Penetration apart{false, Vector3d::Zero(), 0.0, none(a), none(b), true};
-  if (a.mesh.topology.count() == 0 || b.mesh.topology.count() == 0) return apart;
-  const BodyPair pair(a, b, engine, scratch.pair, effort.moved);
-  if (!overlap(pair, scratch.intersecting)) return apart;
+  if (a.mesh.topology.count() == 0 || b.mesh.topology.count() == 0) return apart(a.id, b.id);
+  return penetrationOf(BodyPair(a, b, engine, scratch.pair, effort.moved), scratch, effort);
+}
+
+Penetration penetrationOf(const BodyPair& pair, PenetrationScratch& scratch,
+                          const PenetrationEffort& effort) {
+  if (!overlap(pair, scratch.intersecting))
+    return apart(pair.geometry(true).id, pair.geometry(false).id);
   return Search(pair, scratch, effort).run();
 }
 

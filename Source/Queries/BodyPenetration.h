@@ -42,6 +42,9 @@ constexpr PenetrationEffort kThorough{24, 1024, true, Moved::Body};
 /// For contacts of bodies: a direction that leaves is enough. They are those of the positions.
 constexpr PenetrationEffort kQuick{2, 64, false, Moved::Positions};
 
+/// The answer for bodies that do not overlap.
+Penetration apart(GeometryId a, GeometryId b);
+
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).
 ///
 /// Method   A translation along one direction is decided by steps: where the surfaces meet, or a
@@ -52,5 +55,8 @@ constexpr PenetrationEffort kQuick{2, 64, false, Moved::Positions};
 ///          shortest translation that satisfies all contacts at which translations ended.
 Penetration penetrationOf(const Body& a, const Body& b, Engine, PenetrationScratch&,
                           const PenetrationEffort& = kThorough);
+/// The same of bodies with triangles. The pair must use scratch.pair and effort.moved. Where its
+/// deadline is over, the answer means nothing.
+Penetration penetrationOf(const BodyPair&, PenetrationScratch&, const PenetrationEffort&);
 
 }  // namespace palpate

@@ -103,7 +103,8 @@ class PairDescent {
         m_b(b, scratch.b),
         m_context(context),
         m_test(test),
-        m_waiting(scratch.waiting) {}
+        m_waiting(scratch.waiting),
+        m_timeCheck(scratch.deadline, 32) {}
 
   HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
@@ -112,6 +113,7 @@ class PairDescent {
                      {0, static_cast<std::uint32_t>(m_b.side().octree.size())}},
                     0.0f);
     for (decltype(PairScratch::waiting)::Entry entry; m_waiting.next(m_limit, entry);) {
+      if (m_timeCheck.isOver()) return;
       const auto& [a, b] = entry.node;
       const float lowestA = lowestOf(m_a, a), lowestB = lowestOf(m_b, b);
       if (lowestA + lowestB > m_lowest) continue;
@@ -278,6 +280,7 @@ class PairDescent {
   float m_limit = 0;   ///< of computed squared distances of boxes
   float m_lowest = 0;  ///< of computed sums of heights
   decltype(PairScratch::waiting)& m_waiting;
+  TimeCheck m_timeCheck;
 };
 
 HWY_ATTR void searchPairsKernel(const PairSide& a, const PairSide& b, const PairBound& bound,

@@ -21,15 +21,6 @@ SurfacePoint pointOfShape(GeometryId id, const Vector3d& position, double distan
   return {id, kNoElement, {}, Vector3d::Zero(), position, distance};
 }
 
-Penetration apart(GeometryId a, GeometryId b) {
-  return {false,
-          Vector3d::Zero(),
-          0.0,
-          pointOfShape(a, Vector3d::Zero(), 0.0),
-          pointOfShape(b, Vector3d::Zero(), 0.0),
-          true};
-}
-
 /// The same bodies in the other order.
 Penetration exchanged(Penetration p) {
   p.direction = -p.direction;

@@ -561,6 +561,70 @@ TEST(Deadline, KeptCandidates) {
   EXPECT_GT(most, 10);
 }
 
+/// The same for bodies that are deep in each other, at a share of the looks.
+TEST(Deadline, OverlappingBodies) {
+  const Mesh large = sphere(16, 24, {0, 0, 0}, 1.0), small = sphere(10, 14, {0, 0, 0}, 0.4);
+  OctreeBasedCD found({.threads = 1}), truth({.threads = 1});
+  std::array<GeometryId, 2> ids{};
+  for (OctreeBasedCD* each : {&found, &truth}) {
+    ids = {addMesh(*each, large), addMesh(*each, small)};
+    each->addCollisionPair(ids[0], ids[1], {.method = Method::Auto, .thickness = 0.02});
+    each->detectCollision();
+  }
+  LooksClock clock(found);
+  std::int64_t all = 0;
+  std::size_t stops = 0, deep = 0;
+  for (const double depth : {0.5, 0.95}) {  // within, and piercing
+    bool isComplete = false;
+    for (std::int64_t budget = 0, number = 0; !isComplete; ++number) {
+      auto positions = small.positions;
+      for (Vector3d& x : positions) x += Vector3d(depth, 0.1, 0.01 * std::sin(0.1 * number));
+      for (OctreeBasedCD* each : {&found, &truth}) {
+        each->advance();
+        each->setPositions(ids[1], positions);
+      }
+      truth.detectCollision();
+      const std::vector<Answer> before = answersOf(found), complete = answersOf(truth);
+      isComplete = found.detectCollision(microseconds(budget));
+      expectAnswers(found, before, complete, true);
+      const std::int64_t last = clock.looks();
+      found.detectCollision(microseconds::max());
+      all = clock.looks() - last;
+      EXPECT_EQ(answersOf(found), complete);
+      deep += implementationOf(found).pairs.records()[0]->byBodies;
+      ++stops;
+      budget += 1 + all / 200 * kShareOfCases;
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(stops, 100u / kShareOfCases);
+  EXPECT_GT(deep, stops / 2);
+}
+
+/// Loops over all vertices of a body look at the clock as well.
+TEST(Deadline, LargeBodiesThatOverlap) {
+  const Mesh large = sphere(100, 150, {0, 0, 0}, 1.0);
+  OctreeBasedCD collisions({.threads = 1});
+  const GeometryId a = addMesh(collisions, large),
+                   b = addMesh(collisions, sphere(6, 8, {0.4, 0.1, 0.2}, 0.1));
+  collisions.addCollisionPair(a, b, {.method = Method::Auto, .thickness = 0.02});
+  collisions.detectCollision();
+  const PairRecord& record = *implementationOf(collisions).pairs.records()[0];
+  std::size_t looks = 0;
+  const Deadline::Clock clock = [&] { return ++looks, Deadline::Time(); };
+  const std::atomic<bool> isCancelled = false;
+  const Deadline deadline(Deadline::Time::max(), isCancelled, clock);
+  PenetrationScratch scratch;
+  scratch.pair.stack.deadline = &deadline;
+  const BodyPair pair(record.a->body, record.b->body, Engine::Octree, scratch.pair, kQuick.moved);
+  const std::size_t vertices = large.positions.size(), loops = vertices / 1024;
+  EXPECT_GE(looks, (vertices + large.triangles.size()) / 512);
+  looks = 0;
+  const Vector3d direction(0, 0, 1);
+  pair.vertices(true).furthest(direction, &deadline);
+  EXPECT_EQ(looks, loops);
+}
+
 /// Queries, snapshots, guards and captures see the positions now, whatever pairs were not finished.
 TEST(Deadline, WhatElseReadsTheFrame) {
   Row row(3, {.method = Method::Continuous, .thickness = 0.02}, {.threads = 1}),
