@@ -171,6 +171,7 @@ struct OctreeBasedCD::Implementation {
   void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&);
 
   std::vector<std::byte> save() const;
+  mutable std::atomic<std::size_t> savedSize = 0;  ///< about that of the last state; any thread
   void restore(std::span<const std::byte>);
 
   /// Before a step ends: finds the crossings of pairs that changed since their last detection, for

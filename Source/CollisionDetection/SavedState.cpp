@@ -354,7 +354,7 @@ SavedGeometry savedOf(const Geometry& geometry) {
 }  // namespace
 
 std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
-  ArchiveWriter file(kStateTitle, kStateVersion);
+  ArchiveWriter file(kStateTitle, kStateVersion, savedSize);
   file.integer(geometries.lastId());
   file.integer(geometries.stepNumber());
   file.integer(audit.frame);
@@ -381,6 +381,7 @@ std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
   unfinished.unfinishedPairs = statistics.unfinishedPairs;
   unfinished.freeMotionUnfinished = statistics.freeMotionUnfinished;
   describeUnfinished(file, unfinished);
+  savedSize = file.size() + file.size() / 16;
   return file.bytes();
 }
 

@@ -17,20 +17,31 @@ std::uint64_t archiveChecksum(std::span<const std::byte> bytes) {
   constexpr std::uint64_t kPrime = 0x100000001b3u;
   // Processors compute four sums at once.
   std::array<std::uint64_t, 4> sums{1, 2, 3, 4};
-  for (std::size_t i = 0; i < bytes.size(); i += sizeof sums) {
-    std::array<std::uint64_t, 4> words{};
-    std::memcpy(words.data(), bytes.data() + i, std::min(sizeof words, bytes.size() - i));
+  std::array<std::uint64_t, 4> words{};
+  const auto add = [&] {
     for (std::size_t k = 0; k < sums.size(); ++k) {
       const std::uint64_t product = (sums[k] ^ words[k]) * kPrime;
       sums[k] = product ^ product >> 32;
     }
+  };
+  const std::size_t rest = bytes.size() % sizeof words, end = bytes.size() - rest;
+  for (std::size_t i = 0; i < end; i += sizeof words) {
+    std::memcpy(words.data(), bytes.data() + i, sizeof words);
+    add();
+  }
+  if (rest > 0) {
+    words = {};
+    std::memcpy(words.data(), bytes.data() + end, rest);
+    add();
   }
   std::uint64_t sum = bytes.size();
   for (const std::uint64_t each : sums) sum = (sum ^ each) * kPrime;
   return sum;
 }
 
-ArchiveWriter::ArchiveWriter(std::string_view title, std::uint32_t version) : m_bytes(4096) {
+ArchiveWriter::ArchiveWriter(std::string_view title, std::uint32_t version,
+                             std::size_t expectedSize)
+    : m_bytes(std::max<std::size_t>(4096, expectedSize)) {
   std::array<char, kTitleSize> padded{};
   std::copy_n(title.begin(), std::min(title.size(), padded.size()), padded.begin());
   append(padded.data(), padded.size());

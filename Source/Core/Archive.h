@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace palpate {
@@ -23,13 +24,20 @@ class ArchiveWriter {
  public:
   static constexpr bool kReads = false;
 
-  ArchiveWriter(std::string_view title, std::uint32_t version);
+  /// expectedSize: bytes. A close one spares copies.
+  ArchiveWriter(std::string_view title, std::uint32_t version, std::size_t expectedSize = 0);
   template <class Number>
   void integer(Number value) {
     static_assert(std::is_arithmetic_v<Number> || std::is_enum_v<Number>);
     append(&value, sizeof value);
   }
   void real(double value) { append(&value, sizeof value); }
+  /// The same as each of them.
+  template <class Number>
+  void numbers(std::span<const Number> values) requires(std::is_arithmetic_v<Number> &&
+                                                        !std::is_same_v<Number, bool>) {
+    append(values.data(), values.size_bytes());
+  }
   template <class Enumerator, std::size_t size>
   void word(Enumerator value, const std::array<std::string_view, size>&) {
     integer(static_cast<std::uint8_t>(value));
@@ -43,6 +51,7 @@ class ArchiveWriter {
 
  private:
   void append(const void* from, std::size_t size) {
+    if (size == 0) return;
     if (m_bytes.size() - m_size < size) m_bytes.resize(2 * m_bytes.size() + size);
     std::memcpy(m_bytes.data() + m_size, from, size);
     m_size += size;
@@ -119,6 +128,8 @@ void fieldOf(File& file, auto& value) {
     if constexpr (File::kReads) value = number != 0;
   } else if constexpr (std::is_integral_v<Value>) {
     file.integer(value);
+  } else if constexpr (requires { file.numbers(std::span(std::as_const(value).data(), 1)); }) {
+    file.numbers(std::span(std::as_const(value).data(), static_cast<std::size_t>(value.size())));
   } else {
     for (auto& part : value) fieldOf(file, part);
   }

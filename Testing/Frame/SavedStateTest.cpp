@@ -334,6 +334,36 @@ TEST(SavedState, ChangedBytesAreRefusedOrAState) {
   EXPECT_GT(refused, testing::leastOf(500));
 }
 
+/// The buffer of a state has the size of the last one and a little more, so that it does not grow.
+TEST(SavedState, ExpectsTheSizeOfTheLastOne) {
+  Sheets sheets(20);
+  run(sheets, 0, 3);
+  const Bytes first = sheets.detection.save(), second = sheets.detection.save();
+  EXPECT_EQ(first, second);
+  EXPECT_GT(first.size(), 50'000u);
+  EXPECT_LE(second.capacity(), first.size() + first.size() / 16);
+}
+
+TEST(SavedState, NumbersAreWrittenTogetherAsOneByOne) {
+  const std::vector<double> reals{0.0, -1.5, 1e300, 0x1p-1074}, none;
+  const std::vector<Triangle> triangles{{1, 2, 3}, {4, 5, 6}};
+  const auto bytesOf = [](auto&& write) {
+    ArchiveWriter file("numbers", 1);
+    write(file);
+    return file.bytes();
+  };
+  EXPECT_EQ(bytesOf([&](auto& file) {
+              description::fieldOf(file, reals);
+              description::fieldOf(file, triangles);
+              description::fieldOf(file, none);
+            }),
+            bytesOf([&](auto& file) {
+              for (const double value : reals) file.real(value);
+              for (const Triangle& triangle : triangles)
+                for (const std::uint32_t id : triangle) file.integer(id);
+            }));
+}
+
 TEST(SavedState, FailingAllocationsChangeNothing) {
   Sheets sheets(2);
   run(sheets, 0, 4);
