@@ -65,7 +65,7 @@ void PairRecord::track(std::uint64_t step) {
   const bool begins = tracker->startStep(step, Contents::of(data));
   if (!changes) {
     if (begins) tracker->keep();
-  } else if (collides() || tracker->hadContacts()) {
+  } else if (collides() || tracker->hadContacts(Contents::of(data))) {
     Contents& contents = Contents::of(next);
     contents.tracked.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
     tracker->track(meshes(), collides(), {a->body.revisions.elements, b->body.revisions.elements},
@@ -191,6 +191,7 @@ void PairRecord::commit() noexcept {
   PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
                  sizeOf(CollisionData::Contents::of(next)));
   std::swap(data, next);
+  if (tracker) tracker->hold(CollisionData::Contents::of(next));
   hasData = true;
   dataTopologies = topologies();
   if (sides) sides->commit();

@@ -12,17 +12,6 @@ namespace palpate {
 
 namespace {
 
-/// Calls f(kind, contacts, tracked) for each list, in the order of keys.
-template <class Contents, class F>
-void forEachTracked(Contents& contents, F&& f) {
-  auto& tracked = contents.tracked;
-  f(ContactKind::VertexTriangle, contents.vertexTriangle, tracked.vertexTriangle);
-  f(ContactKind::TriangleVertex, contents.triangleVertex, tracked.triangleVertex);
-  f(ContactKind::EdgeEdge, contents.edgeEdge, tracked.edgeEdge);
-  f(ContactKind::Shape, contents.shape, tracked.shape);
-  f(ContactKind::ShapeShape, contents.shapeShape, tracked.shapeShape);
-}
-
 bool precedes(const TrackedContact& contact, const ContactKey& key) { return contact.key < key; }
 
 /// Comparison of few numbers without a call, as most contacts last.
@@ -88,14 +77,6 @@ ContactKey ContactTracker::keyOf(ContactKind kind, const Contact& contact) {
   return key;
 }
 
-template <class Contact>
-Triangle ContactTracker::cornersOf(const Contact& contact) {
-  if constexpr (requires { contact.vertices; })
-    return contact.vertices;
-  else
-    return {};
-}
-
 ContactTracker::Vertices ContactTracker::verticesOf(const ContactKey& key,
                                                     const Triangle& corners) {
   constexpr Triangle kNone{kNoElement, kNoElement, kNoElement};
@@ -115,55 +96,68 @@ ContactTracker::Vertices ContactTracker::verticesOf(const ContactKey& key,
   return {kNone, kNone};
 }
 
-bool ContactTracker::startStep(std::uint64_t step, const Contents& last) {
+bool ContactTracker::startStep(std::uint64_t step, const Contents& last) noexcept {
   if (m_step == step) return false;
-  if (m_isDropped) {
-    m_isDropped = m_repeats = false;
-    m_step = step;
-    return true;
-  }
-  m_step = kNoStep;
-  m_before.clear();
-  forEachTracked(last, [&](ContactKind, const auto& contacts, const auto& tracked) {
-    PALPATE_ASSERT(tracked.empty() || tracked.size() == contacts.size());
-    const std::size_t first = m_before.size();
-    m_before.resize(first + tracked.size());
-    for (std::size_t i = 0; i < tracked.size(); ++i)
-      m_before[first + i] = {tracked[i].key, cornersOf(contacts[i]), tracked[i].age, false,
-                             tracked[i].userData};
-  });
+  m_step = step;
+  m_repeats = false;
+  if (std::exchange(m_isDropped, false)) return true;
+  m_isHeld = m_hasGrown = false;
   m_beforeOfSecond = last.tracked.elementsOfSecond;
   m_elementsBefore = m_elements;
-  m_repeats = false;
-  m_step = step;
   return true;
 }
 
+bool ContactTracker::hadContacts(const Contents& last) const {
+  bool any = false;
+  forEachTracked([&](ContactKind, const auto&, const auto& tracked) { any |= !tracked.empty(); },
+                 before(last));
+  return any;
+}
+
 /// Contacts of both answers grow older. Lists the others in m_ended and m_begun.
-void ContactTracker::match(Contents& next) {
+void ContactTracker::match(const Contents& last, Contents& next) {
   m_ended.clear();
   m_begun.clear();
-  Entry *before = m_before.data(), *const end = before + m_before.size();
   const bool otherElements = hasOtherElements(next);
-  forEachTracked(next, [&](ContactKind kind, const auto& contacts, auto& tracked) {
-    tracked.resize(contacts.size());
-    for (std::size_t i = 0; i < contacts.size(); ++i) {
-      const ContactKey key = keyOf(kind, contacts[i]);
-      const Triangle corners = cornersOf(contacts[i]);
-      PALPATE_ASSERT(i == 0 || tracked[i - 1].key < key);
-      while (before != end && !areSame(before->key, key) && before->key < key)
-        m_ended.push_back(before++);
-      if (before != end && areSame(before->key, key) && areSame(before->corners, corners) &&
-          !(otherElements && kind == ContactKind::Shape)) {
-        tracked[i] = {key, {}, before->age + 1, before->userData, ContactEnd::None};
-        ++before;
-      } else {
-        tracked[i] = {key, {}, 0, 0, ContactEnd::None};
-        m_begun.push_back({&tracked[i], corners, 0});
-      }
-    }
-  });
-  for (; before != end; ++before) m_ended.push_back(before);
+  const std::uint32_t grown = m_hasGrown ? 0 : 1;
+  forEachTracked(
+      [&](ContactKind kind, const auto& contactsBefore, const auto& contacts,
+          const auto& trackedBefore, auto& tracked) {
+        PALPATE_ASSERT(trackedBefore.empty() || trackedBefore.size() == contactsBefore.size());
+        tracked.resize(contacts.size());
+        const TrackedContact *before = trackedBefore.data(), *const end =
+                                                                 before + trackedBefore.size();
+        const auto cornersBefore = [&] {
+          return cornersOf(contactsBefore[static_cast<std::size_t>(before - trackedBefore.data())]);
+        };
+        const auto ends = [&] {
+          m_ended.push_back({before, verticesOf(before->key, cornersBefore()), false});
+          ++before;
+        };
+        for (std::size_t i = 0; i < contacts.size(); ++i) {
+          const ContactKey key = keyOf(kind, contacts[i]);
+          const Triangle corners = cornersOf(contacts[i]);
+          PALPATE_ASSERT(i == 0 || tracked[i - 1].key < key);
+          while (before != end && !areSame(before->key, key) && before->key < key) ends();
+          const bool lasts = before != end && areSame(before->key, key) &&
+                             areSame(cornersBefore(), corners) &&
+                             !(otherElements && kind == ContactKind::Shape);
+          // Member by member: a copy of the whole would wait for the stores to its parts.
+          TrackedContact& contact = tracked[i];
+          contact.key.kind = kind;
+          contact.key.ids = key.ids;
+          contact.predecessor.reset();
+          contact.age = lasts ? before->age + grown : 0;
+          contact.userData = lasts ? before->userData : 0;
+          contact.end = ContactEnd::None;
+          if (lasts)
+            ++before;
+          else
+            m_begun.push_back({&contact, verticesOf(key, corners), 0});
+        }
+        while (before != end) ends();
+      },
+      before(last), next);
 }
 
 /// Links the vertices of contacts that ended: those of the first geometry, with self of both sides.
@@ -172,7 +166,7 @@ void ContactTracker::linkVertices(bool self) {
   m_links.clear();
   m_heads.assign(std::bit_ceil(4 * m_ended.size()), kNone);
   for (std::uint32_t i = 0; i < m_ended.size(); ++i) {
-    const Vertices vertices = verticesOf(m_ended[i]->key, m_ended[i]->corners);
+    const Vertices& vertices = m_ended[i].vertices;
     for (int side = 0; side < (self ? 2 : 1); ++side)
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t vertex = vertices[side][k];
@@ -190,16 +184,16 @@ void ContactTracker::findSlides(bool self, bool otherElements) {
   m_slides.clear();
   for (Begun& begun : m_begun) {
     begun.firstSlide = m_slides.size();
-    const Vertices now = verticesOf(begun.contact->key, begun.corners);
+    const Vertices& now = begun.vertices;
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = now[0][k];
       if (k > 0 && vertex == now[0][k - 1]) continue;
       std::uint32_t link = m_heads[vertex & (m_heads.size() - 1)];
       for (; link < m_links.size(); link = m_links[link].next) {
         if (m_links[link].vertex != vertex) continue;
-        const Entry& entry = *m_ended[m_links[link].entry];
-        if (otherElements && entry.key.kind == ContactKind::Shape) continue;
-        const Vertices before = verticesOf(entry.key, entry.corners);
+        const Ended& ended = m_ended[m_links[link].entry];
+        if (otherElements && ended.contact->key.kind == ContactKind::Shape) continue;
+        const Vertices& before = ended.vertices;
         const auto shared = [&](int first) {
           const int a = sharedVertices(now[0], before[first]),
                     b = sharedVertices(now[1], before[1 - first]);
@@ -223,43 +217,46 @@ void ContactTracker::takePredecessors() {
       const std::size_t end = i + 1 < m_begun.size() ? m_begun[i + 1].firstSlide : m_slides.size();
       std::size_t lowest = m_ended.size();
       for (std::size_t s = m_begun[i].firstSlide; s < end; ++s)
-        if (m_slides[s].shared == shared && !m_ended[m_slides[s].entry]->isPredecessor)
+        if (m_slides[s].shared == shared && !m_ended[m_slides[s].entry].isPredecessor)
           lowest = std::min<std::size_t>(lowest, m_slides[s].entry);
       if (lowest == m_ended.size()) continue;
-      Entry& entry = *m_ended[lowest];
-      entry.isPredecessor = true;
-      contact.predecessor = entry.key;
-      contact.age = entry.age + 1;
-      contact.userData = entry.userData;
+      Ended& ended = m_ended[lowest];
+      ended.isPredecessor = true;
+      contact.predecessor = ended.contact->key;
+      contact.age = ageOf(ended) + 1;
+      contact.userData = ended.contact->userData;
     }
 }
 
 /// Contacts that began in this step keep what an earlier detection of it was given for them.
 void ContactTracker::takeUserData(const Contents& last) {
   for (const Begun& begun : m_begun)
-    forEachTracked(last, [&](ContactKind kind, const auto& contacts, const auto& tracked) {
-      const ContactKey& key = begun.contact->key;
-      if (kind != key.kind) return;
-      const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
-      if (found == tracked.end() || found->key != key) return;
-      const auto& contact = contacts[static_cast<std::size_t>(found - tracked.begin())];
-      if (cornersOf(contact) == begun.corners) begun.contact->userData = found->userData;
-    });
+    forEachTracked(
+        [&](ContactKind kind, const auto& contacts, const auto& tracked) {
+          const ContactKey& key = begun.contact->key;
+          if (kind != key.kind) return;
+          const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
+          if (found == tracked.end() || found->key != key) return;
+          const auto& contact = contacts[static_cast<std::size_t>(found - tracked.begin())];
+          if (verticesOf(key, cornersOf(contact)) == begun.vertices)
+            begun.contact->userData = found->userData;
+        },
+        last);
 }
 
-ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Entry& entry) const {
-  const auto& [kind, ids] = entry.key;
+ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Ended& ended) const {
+  const auto& [kind, ids] = ended.contact->key;
   const MeshTopology &a = pair.a.topology, &b = pair.b.topology;
   ContactEnd end = ContactEnd::None;
   bool filtered = !collides;
   switch (kind) {
     case ContactKind::VertexTriangle:
-      end = firstOf(endOfVertex(a, ids[0]), endOfElement(b, ids[1], entry.corners));
+      end = firstOf(endOfVertex(a, ids[0]), endOfElement(b, ids[1], ended.vertices[1]));
       if (end == ContactEnd::None)
         filtered = filtered || rejectsVertex(pair, ids[0], ids[1], false);
       break;
     case ContactKind::TriangleVertex:
-      end = firstOf(endOfElement(a, ids[0], entry.corners), endOfVertex(b, ids[1]));
+      end = firstOf(endOfElement(a, ids[0], ended.vertices[0]), endOfVertex(b, ids[1]));
       if (end == ContactEnd::None) filtered = filtered || rejectsVertex(pair, ids[1], ids[0], true);
       break;
     case ContactKind::EdgeEdge: {
@@ -279,7 +276,7 @@ ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides, const Entr
           end = endOfEdge(mesh, {ids[1], ids[2]});
           break;
         case ShapeElement::Face:
-          end = endOfElement(mesh, ids[1], entry.corners);
+          end = endOfElement(mesh, ids[1], ended.vertices[0]);
           break;
       }
       break;
@@ -297,8 +294,7 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   PALPATE_ASSERT(m_step != kNoStep);
   m_keeps = m_isDropped = false;
   m_elements = elements;
-  match(next);
-  for (Entry* entry : m_ended) entry->isPredecessor = false;
+  match(last, next);
   if (!m_begun.empty() && !m_ended.empty()) {
     linkVertices(pair.self());
     findSlides(pair.self(), hasOtherElements(next));
@@ -308,43 +304,66 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   next.tracked.ended.clear();
   const bool hasReasons =
       !collides || pair.predicate || pair.nearAtRest || m_elementsBefore != elements;
-  for (const Entry* entry : m_ended) {
-    if (entry->isPredecessor) continue;
-    const ContactEnd end = hasReasons ? endOf(pair, collides, *entry) : ContactEnd::Apart;
-    next.tracked.ended.push_back({entry->key, {}, entry->age, entry->userData, end});
+  for (const Ended& ended : m_ended) {
+    if (ended.isPredecessor) continue;
+    const ContactEnd end = hasReasons ? endOf(pair, collides, ended) : ContactEnd::Apart;
+    next.tracked.ended.push_back(
+        {ended.contact->key, {}, ageOf(ended), ended.contact->userData, end});
   }
 }
 
 void ContactTracker::commit(Contents& kept) noexcept {
   if (!std::exchange(m_keeps, false)) return;
-  const Entry* before = m_before.data();
-  forEachTracked(kept, [&](ContactKind, const auto&, auto& tracked) {
-    for (TrackedContact& contact : tracked) {
-      contact.predecessor.reset();
-      contact.age = before++->age + 1;
-    }
-  });
-  PALPATE_ASSERT(before == m_before.data() + m_before.size());
+  forEachTracked(
+      [](ContactKind, const auto&, auto& tracked) {
+        for (TrackedContact& contact : tracked) {
+          contact.predecessor.reset();
+          ++contact.age;
+        }
+      },
+      kept);
+  m_hasGrown = !m_isHeld;
   kept.tracked.ended.clear();
 }
 
-void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) {
+void ContactTracker::hold(Contents& before) noexcept {
+  if (std::exchange(m_isHeld, true)) return;
+  forEachTracked(
+      [](ContactKind, auto& contacts, auto& contactsBefore, auto& tracked, auto& trackedBefore) {
+        contacts.swap(contactsBefore);
+        tracked.swap(trackedBefore);
+      },
+      m_held, before);
+}
+
+void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) noexcept {
   if (m_step != step) {
     // Nothing slid or ended in this step.
-    forEachTracked(kept, [](ContactKind, const auto&, auto& tracked) {
-      for (TrackedContact& contact : tracked) contact.predecessor.reset();
-    });
+    forEachTracked(
+        [](ContactKind, const auto&, auto& tracked) {
+          for (TrackedContact& contact : tracked) contact.predecessor.reset();
+        },
+        kept);
     kept.tracked.ended.clear();
   }
   if (!drops) return;
   startStep(step, kept);
+  hold(kept);
   m_isDropped = true;
 }
 
 void ContactTracker::releaseMemory(Contents& contents) {
-  forEachTracked(contents, [](ContactKind, auto&, auto& tracked) { releaseSpare(tracked); });
+  forEachTracked([](ContactKind, auto&, auto& tracked) { releaseSpare(tracked); }, contents);
   releaseSpare(contents.tracked.ended);
-  releaseSpare(m_before);
+  if (m_isHeld)
+    forEachTracked(
+        [](ContactKind, auto& contacts, auto& tracked) {
+          releaseSpare(contacts);
+          releaseSpare(tracked);
+        },
+        m_held);
+  else
+    m_held = {};
   m_ended = {};
   m_begun = {};
   m_heads = {};
@@ -354,20 +373,29 @@ void ContactTracker::releaseMemory(Contents& contents) {
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {
   bool isFound = false;
-  forEachTracked(contents, [&](ContactKind kind, const auto& contacts, auto& tracked) {
-    if (kind != key.kind) return;
+  const auto find = [&](auto& tracked) {
     const auto found = std::lower_bound(tracked.begin(), tracked.end(), key, precedes);
-    if (found == tracked.end() || found->key != key) return;
-    found->userData = data;
-    isFound = true;
-    // Detections of this step that are repeated read it here.
-    const auto before =
-        std::lower_bound(m_before.begin(), m_before.end(), key,
-                         [](const Entry& e, const ContactKey& k) { return e.key < k; });
-    if (before != m_before.end() && before->key == key &&
-        before->corners == cornersOf(contacts[static_cast<std::size_t>(found - tracked.begin())]))
-      before->userData = data;
-  });
+    return found != tracked.end() && found->key == key ? &*found : nullptr;
+  };
+  const auto place = [](const auto& tracked, const TrackedContact* contact) {
+    return static_cast<std::size_t>(contact - tracked.data());
+  };
+  forEachTracked(
+      [&](ContactKind kind, const auto& contacts, const auto& contactsBefore, auto& tracked,
+          auto& trackedBefore) {
+        if (kind != key.kind) return;
+        TrackedContact* const found = find(tracked);
+        if (!found) return;
+        found->userData = data;
+        isFound = true;
+        if (!m_isHeld) return;
+        // Detections of this step that are repeated read it here.
+        TrackedContact* const before = find(trackedBefore);
+        if (before && cornersOf(contactsBefore[place(trackedBefore, before)]) ==
+                          cornersOf(contacts[place(tracked, found)]))
+          before->userData = data;
+      },
+      contents, m_held);
   return isFound;
 }
 

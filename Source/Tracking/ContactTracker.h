@@ -15,6 +15,17 @@
 
 namespace palpate {
 
+/// Calls f(kind, contacts, tracked) for each list, in the order of keys. Of two contents, f takes
+/// the contacts of both, then tracked of both.
+template <class F, class... Contents>
+void forEachTracked(F&& f, Contents&... all) {
+  f(ContactKind::VertexTriangle, all.vertexTriangle..., all.tracked.vertexTriangle...);
+  f(ContactKind::TriangleVertex, all.triangleVertex..., all.tracked.triangleVertex...);
+  f(ContactKind::EdgeEdge, all.edgeEdge..., all.tracked.edgeEdge...);
+  f(ContactKind::Shape, all.shape..., all.tracked.shape...);
+  f(ContactKind::ShapeShape, all.shapeShape..., all.tracked.shapeShape...);
+}
+
 /// The contacts of one pair over time (PairSettings::trackContacts). Docs/HowTo/ContactsOverTime.md
 /// has the rules. Its scratch remembers its peak.
 class ContactTracker : public CountedObject {
@@ -22,10 +33,9 @@ class ContactTracker : public CountedObject {
   using Contents = CollisionData::Contents;
 
   /// Takes over the contacts of the last detection if a step has begun since. Call before the
-  /// other functions. step: the number of the present one. Returns whether it did. If it throws,
-  /// nothing is taken over.
-  bool startStep(std::uint64_t step, const Contents& last);
-  bool hadContacts() const { return !m_before.empty(); }  ///< at the last advance()
+  /// other functions. step: the number of the present one. Returns whether it did.
+  bool startStep(std::uint64_t step, const Contents& last) noexcept;
+  bool hadContacts(const Contents& last) const;  ///< at the last advance()
 
   /// Writes Contents::tracked of an answer in this step. last: of the last detection, maybe in this
   /// step. collides: false if groups exclude the pair. elements: of the pair's geometries.
@@ -35,10 +45,13 @@ class ContactTracker : public CountedObject {
   void keep() { m_keeps = true; }
   bool keeps() const { return m_keeps; }
   void commit(Contents& kept) noexcept;
+  /// Another answer has replaced the last one. Takes the contacts of that one, which `before` has,
+  /// if they are those at the last advance().
+  void hold(Contents& before) noexcept;
   /// There is no answer in this step: `kept` is that of an earlier detection, whose contacts
   /// neither grow older nor end. drops: it will be cleared, as its elements are no more. The next
   /// answer is compared with it even so.
-  void skip(std::uint64_t step, bool drops, Contents& kept);
+  void skip(std::uint64_t step, bool drops, Contents& kept) noexcept;
 
   void releaseMemory(Contents&);  ///< keeps what contacts have been
 
@@ -54,17 +67,16 @@ class ContactTracker : public CountedObject {
   /// The vertices of a contact's two features, some of them twice. What has no vertices, as a
   /// shape, has kNoElement.
   using Vertices = std::array<std::array<std::uint32_t, 3>, 2>;
-  struct Entry {
-    ContactKey key;
-    Triangle corners;  ///< of the element that key does not describe; else 0
-    std::uint32_t age;
-    bool isPredecessor;  ///< of a contact of the answer at hand
-    std::uint64_t userData;
+  /// A contact at the last advance() that is not in the answer at hand.
+  struct Ended {
+    const TrackedContact* contact;
+    Vertices vertices;
+    bool isPredecessor;  ///< of a contact of that answer
   };
   /// A contact that began.
   struct Begun {
     TrackedContact* contact;
-    Triangle corners;
+    Vertices vertices;
     std::size_t firstSlide;
   };
   /// Vertices of m_ended, in lists by the vertex modulo the number of lists.
@@ -77,8 +89,14 @@ class ContactTracker : public CountedObject {
     int shared;
   };
 
+  /// Of the element that a contact's key does not describe; else 0.
   template <class Contact>
-  static Triangle cornersOf(const Contact&);
+  static Triangle cornersOf(const Contact& contact) {
+    if constexpr (requires { contact.vertices; })
+      return contact.vertices;
+    else
+      return {};
+  }
   template <class Contact>
   static ContactKey keyOf(ContactKind, const Contact&);
   static Vertices verticesOf(const ContactKey&, const Triangle& corners);
@@ -86,23 +104,31 @@ class ContactTracker : public CountedObject {
   bool hasOtherElements(const Contents& next) const {
     return next.tracked.elementsOfSecond != m_beforeOfSecond;
   }
-  void match(Contents& next);
+  /// The contacts at the last advance().
+  const Contents& before(const Contents& last) const { return m_isHeld ? m_held : last; }
+  std::uint32_t ageOf(const Ended& ended) const {  ///< at the last advance()
+    return ended.contact->age - (m_hasGrown ? 1 : 0);
+  }
+  void match(const Contents& last, Contents& next);
   void linkVertices(bool self);
   void findSlides(bool self, bool otherElements);
   void takePredecessors();
   void takeUserData(const Contents& last);
-  ContactEnd endOf(const MeshPair&, bool collides, const Entry&) const;
+  ContactEnd endOf(const MeshPair&, bool collides, const Ended&) const;
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
-  std::uint64_t m_step = kNoStep;                             ///< the one after m_before
-  Buffer<Entry> m_before;                                     ///< at the last advance(), by key
-  bool m_beforeOfSecond = false;                              ///< Tracked::elementsOfSecond
-  std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< of m_before; of the last answer
+  std::uint64_t m_step = kNoStep;  ///< the one after the last advance()
+  /// The contacts at the last advance(), if m_isHeld; else the last answer has them, one step older
+  /// if m_hasGrown.
+  Contents m_held;
+  bool m_isHeld = false, m_hasGrown = false;
+  bool m_beforeOfSecond = false;  ///< Tracked::elementsOfSecond of these contacts
+  std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< theirs; of the last answer
   bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
-  bool m_isDropped = false;                 ///< m_before is all that is left of the last answer
-  Buffer<Entry*> m_ended;                   ///< of m_before: not in the answer at hand
-  Buffer<Begun> m_begun;                    ///< in the answer at hand
-  Buffer<std::uint32_t> m_heads;            ///< of lists in m_links
+  bool m_isDropped = false;                 ///< m_held is all that is left of the last answer
+  Buffer<Ended> m_ended;
+  Buffer<Begun> m_begun;          ///< in the answer at hand
+  Buffer<std::uint32_t> m_heads;  ///< of lists in m_links
   Buffer<VertexLink> m_links;
   Buffer<Slide> m_slides;
 };

@@ -22,12 +22,28 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
                               bool isCurrent) {
   using namespace description;
   file.integer(m_step);
-  itemsOf(file, m_before, 1 + sizeof(ContactKey::ids) + sizeof(Triangle) + 12, [&](Entry& entry) {
+  /// A contact at the last advance(). corners: of the element that key does not describe; else 0.
+  struct Entry {
+    ContactKey key;
+    Triangle corners;
+    std::uint32_t age;
+    std::uint64_t userData;
+  };
+  std::vector<Entry> entries;
+  if constexpr (!File::kReads)
+    if (m_step != kNoStep)
+      forEachTracked(
+          [&](ContactKind, const auto& contacts, const auto& tracked) {
+            for (std::size_t i = 0; i < tracked.size(); ++i)
+              entries.push_back({tracked[i].key, cornersOf(contacts[i]),
+                                 tracked[i].age - (m_hasGrown ? 1 : 0), tracked[i].userData});
+          },
+          before(kept));
+  itemsOf(file, entries, 1 + sizeof(ContactKey::ids) + sizeof(Triangle) + 12, [&](Entry& entry) {
     description::contactKeyOf(file, entry.key);
     fieldOf(file, entry.corners);
     file.integer(entry.age);
     file.integer(entry.userData);
-    if constexpr (File::kReads) entry.isPredecessor = false;
   });
   fieldOf(file, m_beforeOfSecond);
   for (std::size_t i = 0; i < 2; ++i) {
@@ -36,15 +52,28 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
   }
   for (bool* flag : {&m_keeps, &m_repeats, &m_isDropped}) fieldOf(file, *flag);
   if constexpr (File::kReads) {
-    file.need(std::is_sorted(m_before.begin(), m_before.end(),
+    file.need(std::is_sorted(entries.begin(), entries.end(),
                              [](const Entry& l, const Entry& r) { return l.key < r.key; }),
               "tracked contacts are not in order");
-    // commit() writes to all contacts of the last answer.
+    m_held = {};
+    m_isHeld = true;
+    m_hasGrown = false;
+    forEachTracked(
+        [&](ContactKind kind, auto& contacts, auto& tracked) {
+          for (const Entry& entry : entries) {
+            if (entry.key.kind != kind) continue;
+            tracked.push_back({entry.key, {}, entry.age, entry.userData, ContactEnd::None});
+            auto& contact = contacts.emplace_back();
+            if constexpr (requires { contact.vertices; }) contact.vertices = entry.corners;
+          }
+        },
+        m_held);
+    // These lists are those of the last answer.
     const auto& t = kept.tracked;
     const std::size_t size = t.vertexTriangle.size() + t.triangleVertex.size() + t.edgeEdge.size() +
                              t.shape.size() + t.shapeShape.size();
-    file.need(!m_keeps || m_before.size() == size, "a number of tracked contacts is wrong");
-    file.need(!m_isDropped || !isCurrent || m_before.size() == size,
+    file.need(!m_keeps || entries.size() == size, "a number of tracked contacts is wrong");
+    file.need(!m_isDropped || !isCurrent || entries.size() == size,
               "tracked contacts are not those of the answer");
   }
 }
