@@ -44,6 +44,8 @@ constexpr double kAreaError = 6 * 0x1p-53;
 constexpr double kRootStep = 0x1p-51;
 /// Share of the step: brackets of roots start this wide to either side.
 constexpr double kNarrowestBracket = 0x1p-50;
+/// If a root is not in a bracket, the next one of findPassages() is wider by this factor.
+constexpr double kBracketGrowth = 64.0;
 /// Share of the step: brackets grow to at most this width. If a root is in none of them, it is
 /// found by bisection.
 constexpr double kWidestBracket = 0x1p-32;

@@ -93,7 +93,7 @@ std::optional<Interval> ImpactSearch<kind>::bracketRoot(const Interval& piece,
                                                         int signAfter) const {
   const double t = approximateRoot(m_cubic, piece.low, piece.high, signAfter);
   // The width applies to both sides, so half of the tolerance is the widest that is not too early.
-  for (double width = kNarrowestBracket; width <= 0.5 * m_tolerance; width *= 64.0) {
+  for (double width = kNarrowestBracket; width <= 0.5 * m_tolerance; width *= kBracketGrowth) {
     const Interval bracket{std::max(t - width, piece.low), std::min(t + width, piece.high)};
     if (signAfter * blossom(m_cubic, bracket.low, bracket.low, bracket.low) < -m_error &&
         signAfter * blossom(m_cubic, bracket.high, bracket.high, bracket.high) > m_error)

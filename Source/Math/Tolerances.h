@@ -68,6 +68,13 @@ constexpr double kBlossomError = 16 * 0x1p-53;
 /// step, relative to the sum of the two products' largest magnitudes: 8 u, and 6 u from
 /// restricting.
 constexpr double kCrossError = 32 * 0x1p-53;
+/// Share of the step: wider brackets of a root are left to findPassages().
+constexpr double kWidestPassage = 0x1p-43;
+/// Error of a component of a cross product in the middle of such a bracket, relative to the product
+/// of the largest magnitudes (PassageFilter.cpp): 16 w for the motion in a bracket of width w, and
+/// four times kCrossError. What is certain with it is so for all coefficients of kCrossError.
+constexpr double kPassageError = 0x1p-38;
+constexpr double kPassageUnderflow = 8 * kImpactUnderflow;
 /// Error of a corner's position along a direction, relative to the sum of the products' magnitudes:
 /// 1 u from the difference, 3 u from the dot product, 4 u from interpolating in time, and the same
 /// again for the value that it is compared with.

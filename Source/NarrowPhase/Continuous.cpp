@@ -2,6 +2,7 @@
 
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/Filters.h"
+#include "NarrowPhase/PassageFinder.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
@@ -102,7 +103,11 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candid
 class ContactFinder {
  public:
   ContactFinder(const MeshPair& pair, ContactBuffers& out)
-      : m_pair(pair), m_check(pair, out), m_out(out), m_settings(settingsOf(pair)) {}
+      : m_pair(pair),
+        m_check(pair, out),
+        m_out(out),
+        m_settings(settingsOf(pair)),
+        m_passages(pair, m_settings.timeTolerance, out) {}
 
   /// Returns whether the pair is a contact that passes all filters.
   template <Kind kind>
@@ -116,11 +121,13 @@ class ContactFinder {
                                         m_settings.timeTolerance)
                           : findImpact(query, m_settings);
     m_out.exactDecisions += answer.exact;
-    if (m_pair.findsPassages() && answer.impact)
-      addPassages(features, firstId, secondId, swapped, query);
+    if (m_pair.findsPassages() && answer.impact) m_passages.add<kind>(firstId, secondId, swapped);
     return answer.impact && boxesMeet(query, m_settings.minimumDistance) &&
            add(features, firstId, secondId, swapped, query, answer.time, true);
   }
+
+  /// Call after the last pair.
+  void finish() { m_passages.finish(); }
 
   /// Makes the contact of an impact and returns whether it passes all filters. store: the impact is
   /// recorded in the facts, and the contact is appended if it passes.
@@ -181,32 +188,6 @@ class ContactFinder {
   }
 
  private:
-  /// Appends the passages of two features, unless a filter suppresses them.
-  template <Kind kind>
-  void addPassages(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
-                   bool swapped, const ImpactQuery& query) {
-    const Passages passages = findPassages(query, m_settings.timeTolerance);
-    m_out.exactDecisions += passages.exact;
-    if (passages.count == 0) return;
-    Crossing crossing;
-    if constexpr (kind == Kind::VertexTriangle) {
-      if (rejectsVertex(m_pair, firstId, secondId, swapped)) return;
-      const bool ofSecond = swapped && !m_pair.self();
-      crossing.kind = ofSecond ? ContactKind::TriangleVertex : ContactKind::VertexTriangle;
-      crossing.ids = {firstId, secondId, kNoElement, kNoElement};
-      if (ofSecond) std::swap(crossing.ids[0], crossing.ids[1]);
-    } else {
-      if (rejectsEdges(m_pair, firstId, secondId)) return;
-      crossing.kind = ContactKind::EdgeEdge;
-      crossing.ids = features.vertices(firstId, secondId);
-    }
-    for (int i = 0; i < passages.count; ++i) {
-      crossing.time = passages.all[static_cast<std::size_t>(i)].time;
-      crossing.forward = passages.all[static_cast<std::size_t>(i)].forward;
-      m_out.passages.push_back(crossing);
-    }
-  }
-
   /// The radii with which features keep apart. Features that are near at rest have none, because
   /// the surfaces of a thread overlap there.
   template <Kind kind>
@@ -241,6 +222,7 @@ class ContactFinder {
   StepCheck m_check;
   ContactBuffers& m_out;
   const TimeOfImpactSettings m_settings;
+  PassageFinder m_passages;
 };
 
 /// Does the same, but only for pairs for which proximity at the step's end does not suffice.
@@ -255,6 +237,7 @@ class FastImpactFinder {
     if (!m_check.proximitySuffices(features, firstId, secondId))
       m_find(features, firstId, secondId, swapped);
   }
+  void finish() { m_find.finish(); }
 
  private:
   StepCheck m_check;
@@ -265,13 +248,18 @@ class FastImpactFinder {
 
 void findContinuous(const MeshPair& pair, std::span<const ElementPair> candidates,
                     ContactBuffers& out) {
-  forEachLikelyPair(pair, candidates, out, ContactFinder(pair, out));
+  ContactFinder finder(pair, out);
+  forEachLikelyPair(pair, candidates, out, finder);
+  finder.finish();
 }
 
 template <Kind kind>
 bool addImpact(const MeshPair& pair, const Features<kind>& features, std::uint32_t firstId,
                std::uint32_t secondId, bool swapped, ContactBuffers& out) {
-  return ContactFinder(pair, out)(features, firstId, secondId, swapped);
+  ContactFinder finder(pair, out);
+  const bool isContact = finder(features, firstId, secondId, swapped);
+  finder.finish();
+  return isContact;
 }
 template bool addImpact(const MeshPair&, const Features<Kind::VertexTriangle>&, std::uint32_t,
                         std::uint32_t, bool, ContactBuffers&);
@@ -280,7 +268,9 @@ template bool addImpact(const MeshPair&, const Features<Kind::EdgeEdge>&, std::u
 
 void findFastImpacts(const MeshPair& pair, std::span<const ElementPair> candidates,
                      ContactBuffers& out) {
-  forEachLikelyPair(pair, candidates, out, FastImpactFinder(pair, out));
+  FastImpactFinder finder(pair, out);
+  forEachLikelyPair(pair, candidates, out, finder);
+  finder.finish();
 }
 
 /// Boxes over a part of the step cost more than boxes over the whole step. Only if the part is

@@ -160,6 +160,22 @@ void ContactTracker::match(const Contents& last, Contents& next) {
       before(last), next);
 }
 
+/// Answers take turns with m_held. Their lists soon have the capacity of the largest one.
+void ContactTracker::reserveAs(const Contents& next) {
+  const auto reserve = [](const auto& list, auto& spare) {
+    if (spare.capacity() >= list.capacity()) return;
+    spare.clear();
+    spare.reserve(list.capacity());
+  };
+  forEachTracked(
+      [&](ContactKind, const auto& contacts, auto& spareContacts, const auto& tracked,
+          auto& spareTracked) {
+        reserve(contacts, spareContacts);
+        reserve(tracked, spareTracked);
+      },
+      next, m_held);
+}
+
 /// Links the vertices of contacts that ended: those of the first geometry, with self of both sides.
 void ContactTracker::linkVertices(bool self) {
   constexpr std::uint32_t kNone = 0xffffffffu;
@@ -295,6 +311,7 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   m_keeps = m_isDropped = false;
   m_elements = elements;
   match(last, next);
+  if (!m_isHeld) reserveAs(next);
   if (!m_begun.empty() && !m_ended.empty()) {
     linkVertices(pair.self());
     findSlides(pair.self(), hasOtherElements(next));

@@ -110,6 +110,7 @@ class ContactTracker : public CountedObject {
     return ended.contact->age - (m_hasGrown ? 1 : 0);
   }
   void match(const Contents& last, Contents& next);
+  void reserveAs(const Contents& next);
   void linkVertices(bool self);
   void findSlides(bool self, bool otherElements);
   void takePredecessors();
