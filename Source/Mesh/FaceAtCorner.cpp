@@ -1,5 +1,6 @@
 #include "Mesh/FaceAtCorner.h"
 
+#include "Mesh/AngleSeries.h"
 #include "Math/Foot.h"
 #include "Math/StableLength.h"
 
@@ -17,9 +18,8 @@ static double angleOf(double sine, double cosine, double length) {
   double tangent = sine / (length + cosine);  // of the half
   for (int i = 0; i < 2; ++i) tangent /= 1.0 + std::sqrt(1.0 + tangent * tangent);
   const double square = tangent * tangent;
-  constexpr double kInverse[] = {1.0 / 15, 1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3};
   double series = 0.0;
-  for (const double inverse : kInverse) series = inverse - square * series;
+  for (const double inverse : kAngleSeries) series = inverse - square * series;
   return 8.0 * tangent * (1.0 - square * series);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "Mesh/AngleSeries.h"
 #include "Mesh/Corners.h"
 
 #include <Eigen/Core>
@@ -28,8 +29,10 @@ class FaceAtCorner {
   /// Whether its size and angle are moderate, so that the cross product of the rounded edges is
   /// within 2^-44 of its length.
   bool isPlain() const {
-    const auto isModerate = [](double square) { return square > 0x1p-400 && square < 0x1p400; };
-    return isModerate(m_ofU) && isModerate(m_ofV) && m_square > 0x1p-10 * m_ofU * m_ofV;
+    const auto isModerate = [](double square) {
+      return square > kLeastPlainSquare && square < kMostPlainSquare;
+    };
+    return isModerate(m_ofU) && isModerate(m_ofV) && m_square > kLeastPlainSine * m_ofU * m_ofV;
   }
 
  private:

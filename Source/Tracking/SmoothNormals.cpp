@@ -1,9 +1,12 @@
 #include "Tracking/SmoothNormals.h"
 
 #include "Mesh/FaceAtCorner.h"
+#include "Mesh/FaceBlock.h"
 #include "Math/StableLength.h"
 #include "Core/Assert.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace palpate {
@@ -12,21 +15,42 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// The positions of vertices at a time of the step.
+struct AtTime {
+  const TriangleMesh& mesh;
+  double time;
+  Vector3d operator[](std::uint32_t v) const {
+    return time == 1.0 ? mesh.now[v] : (1.0 - time) * mesh.before[v] + time * mesh.now[v];
+  }
+};
+
 /// Unit, or zero.
 Vector3d normalOfVertex(const TriangleMesh& mesh, std::uint32_t vertex, double time) {
-  struct AtTime {
-    const TriangleMesh& mesh;
-    double time;
-    Vector3d operator[](std::uint32_t v) const {
-      return time == 1.0 ? mesh.now[v] : (1.0 - time) * mesh.before[v] + time * mesh.now[v];
-    }
+  constexpr std::size_t kLanes = FaceBlock::kLanes;
+  const AtTime at{mesh, time};
+  const Vector3d own = at[vertex];
+  const auto cornerOf = [=](const Triangle& names) {
+    return names[0] == vertex ? 0 : names[1] == vertex ? 1 : 2;
   };
+  const auto star = mesh.topology.vertexTriangles[vertex];
   Vector3d sum = Vector3d::Zero();
-  for (const std::uint32_t t : mesh.topology.vertexTriangles[vertex]) {
-    const Triangle& names = mesh.topology.elements[t];
-    const std::size_t corner = names[0] == vertex ? 0 : names[1] == vertex ? 1 : 2;
-    const Corners corners = cornersOf(names, AtTime{mesh, time});
-    sum += FaceAtCorner(corners, corner).weightedNormal();
+  FaceBlock block;
+  for (std::size_t begin = 0; begin < star.size(); begin += kLanes) {
+    const auto faces = star.subspan(begin, std::min(kLanes, star.size() - begin));
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Triangle& names = mesh.topology.elements[faces[lane < faces.size() ? lane : 0]];
+      const int corner = cornerOf(names);
+      block.set(lane, at[names[(corner + 1) % 3]] - own, at[names[(corner + 2) % 3]] - own);
+    }
+    const FaceBlockNormals normals = weightedNormals(block);
+    for (std::size_t lane = 0; lane < faces.size(); ++lane) {
+      const Triangle& names = mesh.topology.elements[faces[lane]];
+      if (normals.isPlain >> lane & 1)
+        sum += Vector3d(normals.weighted[0][lane], normals.weighted[1][lane],
+                        normals.weighted[2][lane]);
+      else
+        sum += FaceAtCorner(cornersOf(names, at), cornerOf(names)).weightedNormal();
+    }
   }
   return stableUnit(sum);
 }
@@ -40,51 +64,91 @@ Vector3d onSideOf(const Vector3d& normal, const Vector3d& smooth) {
   return stableUnit(cosine > 0.0 ? smooth : Vector3d(-smooth));
 }
 
-template <class Contact>
-Vector3d ofElement(const TriangleMesh& mesh, const Contact& contact) {
-  return interpolatedNormal(mesh, contact.vertices, contact.weights.data(), contact.timeOfImpact);
+/// The sum of vertices' normals by weights. Unit, or zero.
+template <class NormalOf>
+Vector3d interpolated(std::span<const std::uint32_t> vertices, const double* weights,
+                      NormalOf&& normalOf) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    if (weights[i] != 0.0) sum += weights[i] * normalOf(vertices[i]);
+  return stableUnit(sum);
 }
 
-Vector3d ofEdges(const MeshPair& pair, const EdgeEdgeContact& contact) {
-  const double a[] = {1.0 - contact.weightA, contact.weightA},
-               b[] = {1.0 - contact.weightB, contact.weightB};
-  return interpolatedNormal(pair.b, contact.edgeB, b, contact.timeOfImpact) -
-         interpolatedNormal(pair.a, contact.edgeA, a, contact.timeOfImpact);
-}
+/// interpolatedNormal() of two meshes, for contacts with common vertices.
+class ContactNormals {
+ public:
+  explicit ContactNormals(const MeshPair& pair) : m_meshes{&pair.a, &pair.b} { m_keys.fill(kNone); }
+
+  template <class Contact>
+  Vector3d ofElement(bool ofB, const Contact& contact) {
+    return of(ofB, contact.vertices, contact.weights.data(), contact.timeOfImpact);
+  }
+  Vector3d ofEdges(const EdgeEdgeContact& contact) {
+    const double a[] = {1.0 - contact.weightA, contact.weightA},
+                 b[] = {1.0 - contact.weightB, contact.weightB};
+    return of(true, contact.edgeB, b, contact.timeOfImpact) -
+           of(false, contact.edgeA, a, contact.timeOfImpact);
+  }
+
+ private:
+  static constexpr std::size_t kPlaces = 256;
+  static constexpr std::uint32_t kNone = 0xffffffffu;
+
+  Vector3d of(bool ofB, std::span<const std::uint32_t> vertices, const double* weights,
+              double time) {
+    const TriangleMesh& mesh = *m_meshes[ofB];
+    if (time != 1.0 || !mesh.topology.hasFaces())
+      return interpolatedNormal(mesh, vertices, weights, time);
+    return interpolated(vertices, weights, [&](std::uint32_t vertex) -> const Vector3d& {
+      const std::uint32_t key = 2 * vertex + ofB;
+      Vector3d& normal = m_normals[key % kPlaces];
+      if (m_keys[key % kPlaces] != key) {
+        normal = normalOfVertex(mesh, vertex, 1.0);
+        m_keys[key % kPlaces] = key;
+      }
+      return normal;
+    });
+  }
+
+  const std::array<const TriangleMesh*, 2> m_meshes;
+  /// Normals at the step's end that were needed before, at the places of their keys.
+  std::array<std::uint32_t, kPlaces> m_keys;
+  std::array<Vector3d, kPlaces> m_normals;
+};
 
 }  // namespace
 
 Vector3d interpolatedNormal(const TriangleMesh& mesh, std::span<const std::uint32_t> vertices,
                             const double* weights, double time) {
-  Vector3d sum = Vector3d::Zero();
-  if (!mesh.topology.hasFaces()) return sum;
-  for (std::size_t i = 0; i < vertices.size(); ++i)
-    if (weights[i] != 0.0) sum += weights[i] * normalOfVertex(mesh, vertices[i], time);
-  return stableUnit(sum);
+  if (!mesh.topology.hasFaces()) return Vector3d::Zero();
+  return interpolated(vertices, weights,
+                      [&](std::uint32_t vertex) { return normalOfVertex(mesh, vertex, time); });
 }
 
 void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& threads,
                        CollisionData::Contents& contents) {
-  constexpr std::size_t kGrain = 64;  // contacts; any number will do
+  constexpr std::size_t kGrain = 256;  // contacts; any number will do
   const auto fill = [&](const auto& contacts, CountedVector<Vector3d>& normals, auto&& smooth) {
     normals.resize(contacts.size());
     threads.forChunks(contacts.size(), kGrain, [&](std::size_t, std::size_t i, std::size_t end) {
+      ContactNormals known(pair);
       for (; i < end; ++i) {
-        normals[i] = onSideOf(contacts[i].normal, smooth(contacts[i]));
+        normals[i] = onSideOf(contacts[i].normal, smooth(known, contacts[i]));
         PALPATE_ASSERT(std::abs(normals[i].norm() - 1.0) < 1e-9);
       }
     });
   };
-  const TriangleMesh& mesh = pair.a.topology.hasFaces() ? pair.a : pair.b;
+  const bool ofB = !pair.a.topology.hasFaces();
   fill(contents.vertexTriangle, contents.smooth.vertexTriangle,
-       [&](const auto& contact) { return ofElement(pair.b, contact); });
+       [](ContactNormals& normals, const auto& c) { return normals.ofElement(true, c); });
   fill(contents.triangleVertex, contents.smooth.triangleVertex,
-       [&](const auto& contact) { return ofElement(pair.a, contact); });
+       [](ContactNormals& normals, const auto& c) { return normals.ofElement(false, c); });
   fill(contents.edgeEdge, contents.smooth.edgeEdge,
-       [&](const auto& contact) { return ofEdges(pair, contact); });
-  fill(contents.shape, contents.smooth.shape, [&](const ShapeContact& contact) -> Vector3d {
-    return smoothsShape ? ofElement(mesh, contact) : contact.normal;
-  });
+       [](ContactNormals& normals, const auto& c) { return normals.ofEdges(c); });
+  fill(contents.shape, contents.smooth.shape,
+       [&](ContactNormals& normals, const ShapeContact& c) -> Vector3d {
+         return smoothsShape ? normals.ofElement(ofB, c) : c.normal;
+       });
 }
 
 }  // namespace palpate
