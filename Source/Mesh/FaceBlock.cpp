@@ -16,11 +16,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, FaceBlock::kLanes>;
 using V = hn::Vec<D>;
 
-/// In the order in which Eigen adds.
-HWY_INLINE V sumOfProducts(const Vector3<V>& a, const Vector3<V>& b) {
-  return a.x * b.x + (a.y * b.y + a.z * b.z);
-}
-
 /// The angle as in FaceAtCorner.cpp.
 HWY_INLINE V angleOf(V sine, V cosine, V length) {
   const D d;
@@ -48,12 +43,11 @@ HWY_ATTR void weightedNormalsKernel(const FaceBlock& block, FaceBlockNormals& no
                        hn::Load(d, ofU[2] + lane)},
         v{hn::Load(d, ofV[0] + lane), hn::Load(d, ofV[1] + lane), hn::Load(d, ofV[2] + lane)},
         across = cross(u, v);
-    const V squareU = sumOfProducts(u, u), squareV = sumOfProducts(v, v),
-            square = sumOfProducts(across, across), length = hn::Sqrt(square);
+    const V squareU = dot(u, u), squareV = dot(v, v), square = dot(across, across),
+            length = hn::Sqrt(square);
     const auto isPlain = hn::And(hn::And(isModerate(squareU), isModerate(squareV)),
                                  hn::Gt(square, hn::Set(d, kLeastPlainSine) * squareU * squareV));
-    const V weight =
-        hn::Div(angleOf(length, sumOfProducts(u, v), hn::Sqrt(squareU * squareV)), length);
+    const V weight = hn::Div(angleOf(length, dot(u, v), hn::Sqrt(squareU * squareV)), length);
     hn::Store(weight * across.x, d, normals.weighted[0] + lane);
     hn::Store(weight * across.y, d, normals.weighted[1] + lane);
     hn::Store(weight * across.z, d, normals.weighted[2] + lane);
