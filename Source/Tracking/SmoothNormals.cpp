@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 namespace palpate {
@@ -26,22 +27,26 @@ struct AtTime {
 
 /// Unit, or zero.
 Vector3d normalOfVertex(const TriangleMesh& mesh, std::uint32_t vertex, double time) {
-  constexpr std::size_t kLanes = FaceBlock::kLanes;
+  constexpr std::size_t kLanes = FaceBlock::kLanes, kNext[] = {1, 2, 0, 1};
   const AtTime at{mesh, time};
   const Vector3d own = at[vertex];
-  const auto cornerOf = [=](const Triangle& names) {
-    return names[0] == vertex ? 0 : names[1] == vertex ? 1 : 2;
+  // Without a branch: which corner it is cannot be predicted.
+  const auto cornerOf = [=](const Triangle& names) -> std::size_t {
+    const std::size_t isLater = names[0] != vertex;
+    return isLater + (isLater & static_cast<std::size_t>(names[1] != vertex));
   };
   const auto star = mesh.topology.vertexTriangles[vertex];
   Vector3d sum = Vector3d::Zero();
   FaceBlock block;
   for (std::size_t begin = 0; begin < star.size(); begin += kLanes) {
     const auto faces = star.subspan(begin, std::min(kLanes, star.size() - begin));
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const Triangle& names = mesh.topology.elements[faces[lane < faces.size() ? lane : 0]];
-      const int corner = cornerOf(names);
-      block.set(lane, at[names[(corner + 1) % 3]] - own, at[names[(corner + 2) % 3]] - own);
+    for (std::size_t lane = 0; lane < faces.size(); ++lane) {
+      const Triangle& names = mesh.topology.elements[faces[lane]];
+      const std::size_t corner = cornerOf(names);
+      block.set(lane, at[names[kNext[corner]]] - own, at[names[kNext[corner + 1]]] - own);
     }
+    for (std::size_t lane = faces.size(); lane < kLanes; ++lane)
+      block.set(lane, Vector3d::UnitX(), Vector3d::UnitY());
     const FaceBlockNormals normals = weightedNormals(block);
     for (std::size_t lane = 0; lane < faces.size(); ++lane) {
       const Triangle& names = mesh.topology.elements[faces[lane]];
@@ -77,7 +82,7 @@ Vector3d interpolated(std::span<const std::uint32_t> vertices, const double* wei
 /// interpolatedNormal() of two meshes, for contacts with common vertices.
 class ContactNormals {
  public:
-  explicit ContactNormals(const MeshPair& pair) : m_meshes{&pair.a, &pair.b} { m_keys.fill(kNone); }
+  explicit ContactNormals(const MeshPair& pair) : m_meshes{&pair.a, &pair.b} {}
 
   template <class Contact>
   Vector3d ofElement(bool ofB, const Contact& contact) {
@@ -91,29 +96,30 @@ class ContactNormals {
   }
 
  private:
-  static constexpr std::size_t kPlaces = 256;
-  static constexpr std::uint32_t kNone = 0xffffffffu;
+  struct Key {
+    std::uint32_t vertex = 0xffffffffu;  ///< 2 v, or 2 v + 1 of b
+    std::uint64_t time = 0;              ///< the bits of the number
+    bool operator==(const Key&) const = default;
+  };
+  struct Known {
+    Key key;
+    Vector3d normal;
+  };
 
   Vector3d of(bool ofB, std::span<const std::uint32_t> vertices, const double* weights,
               double time) {
     const TriangleMesh& mesh = *m_meshes[ofB];
-    if (time != 1.0 || !mesh.topology.hasFaces())
-      return interpolatedNormal(mesh, vertices, weights, time);
+    if (!mesh.topology.hasFaces()) return Vector3d::Zero();
     return interpolated(vertices, weights, [&](std::uint32_t vertex) -> const Vector3d& {
-      const std::uint32_t key = 2 * vertex + ofB;
-      Vector3d& normal = m_normals[key % kPlaces];
-      if (m_keys[key % kPlaces] != key) {
-        normal = normalOfVertex(mesh, vertex, 1.0);
-        m_keys[key % kPlaces] = key;
-      }
-      return normal;
+      const Key key{2 * vertex + ofB, std::bit_cast<std::uint64_t>(time)};
+      Known& known = m_known[key.vertex % m_known.size()];
+      if (known.key != key) known = {key, normalOfVertex(mesh, vertex, time)};
+      return known.normal;
     });
   }
 
   const std::array<const TriangleMesh*, 2> m_meshes;
-  /// Normals at the step's end that were needed before, at the places of their keys.
-  std::array<std::uint32_t, kPlaces> m_keys;
-  std::array<Vector3d, kPlaces> m_normals;
+  std::array<Known, 256> m_known;
 };
 
 }  // namespace
