@@ -134,27 +134,36 @@ Vector3d interpolatedNormal(const TriangleMesh& mesh, std::span<const std::uint3
 void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& threads,
                        CollisionData::Contents& contents) {
   constexpr std::size_t kGrain = 256;  // contacts; any number will do
-  const auto fill = [&](const auto& contacts, CountedVector<Vector3d>& normals, auto&& smooth) {
-    normals.resize(contacts.size());
-    threads.forChunks(contacts.size(), kGrain, [&](std::size_t, std::size_t i, std::size_t end) {
-      ContactNormals known(pair);
-      for (; i < end; ++i) {
-        normals[i] = onSideOf(contacts[i].normal, smooth(known, contacts[i]));
-        PALPATE_ASSERT(std::abs(normals[i].norm() - 1.0) < 1e-9);
+  auto& [ofVertices, ofTriangles, ofEdges, ofShapes] = contents.smooth;
+  ofVertices.resize(contents.vertexTriangle.size());
+  ofTriangles.resize(contents.triangleVertex.size());
+  ofEdges.resize(contents.edgeEdge.size());
+  ofShapes.resize(contents.shape.size());
+  const bool meshIsB = !pair.a.topology.hasFaces();
+  const std::size_t size =
+      ofVertices.size() + ofTriangles.size() + ofEdges.size() + ofShapes.size();
+  threads.forChunks(size, kGrain, [&](std::size_t, std::size_t begin, std::size_t end) {
+    ContactNormals known(pair);
+    std::size_t first = 0;  // of the list, among all contacts
+    const auto fill = [&](const auto& contacts, CountedVector<Vector3d>& normals, auto&& smooth) {
+      for (std::size_t i = std::max(begin, first); i < std::min(end, first + contacts.size());
+           ++i) {
+        const auto& contact = contacts[i - first];
+        Vector3d& normal = normals[i - first];
+        normal = onSideOf(contact.normal, smooth(contact));
+        PALPATE_ASSERT(std::abs(normal.norm() - 1.0) < 1e-9);
       }
+      first += contacts.size();
+    };
+    fill(contents.vertexTriangle, ofVertices,
+         [&](const auto& contact) { return known.ofElement(true, contact); });
+    fill(contents.triangleVertex, ofTriangles,
+         [&](const auto& contact) { return known.ofElement(false, contact); });
+    fill(contents.edgeEdge, ofEdges, [&](const auto& contact) { return known.ofEdges(contact); });
+    fill(contents.shape, ofShapes, [&](const ShapeContact& contact) -> Vector3d {
+      return smoothsShape ? known.ofElement(meshIsB, contact) : contact.normal;
     });
-  };
-  const bool ofB = !pair.a.topology.hasFaces();
-  fill(contents.vertexTriangle, contents.smooth.vertexTriangle,
-       [](ContactNormals& normals, const auto& c) { return normals.ofElement(true, c); });
-  fill(contents.triangleVertex, contents.smooth.triangleVertex,
-       [](ContactNormals& normals, const auto& c) { return normals.ofElement(false, c); });
-  fill(contents.edgeEdge, contents.smooth.edgeEdge,
-       [](ContactNormals& normals, const auto& c) { return normals.ofEdges(c); });
-  fill(contents.shape, contents.smooth.shape,
-       [&](ContactNormals& normals, const ShapeContact& c) -> Vector3d {
-         return smoothsShape ? normals.ofElement(ofB, c) : c.normal;
-       });
+  });
 }
 
 }  // namespace palpate
