@@ -134,14 +134,14 @@ Vector3d interpolatedNormal(const TriangleMesh& mesh, std::span<const std::uint3
 void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& threads,
                        CollisionData::Contents& contents) {
   constexpr std::size_t kGrain = 256;  // contacts; any number will do
-  auto& [ofVertices, ofTriangles, ofEdges, ofShapes] = contents.smooth;
-  ofVertices.resize(contents.vertexTriangle.size());
-  ofTriangles.resize(contents.triangleVertex.size());
-  ofEdges.resize(contents.edgeEdge.size());
-  ofShapes.resize(contents.shape.size());
+  CollisionData::Contents::Smooth& all = contents.smooth;
+  all.vertexTriangle.resize(contents.vertexTriangle.size());
+  all.triangleVertex.resize(contents.triangleVertex.size());
+  all.edgeEdge.resize(contents.edgeEdge.size());
+  all.shape.resize(contents.shape.size());
   const bool meshIsB = !pair.a.topology.hasFaces();
-  const std::size_t size =
-      ofVertices.size() + ofTriangles.size() + ofEdges.size() + ofShapes.size();
+  const std::size_t size = all.vertexTriangle.size() + all.triangleVertex.size() +
+                           all.edgeEdge.size() + all.shape.size();
   threads.forChunks(size, kGrain, [&](std::size_t, std::size_t begin, std::size_t end) {
     ContactNormals known(pair);
     std::size_t first = 0;  // of the list, among all contacts
@@ -155,12 +155,13 @@ void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& t
       }
       first += contacts.size();
     };
-    fill(contents.vertexTriangle, ofVertices,
+    fill(contents.vertexTriangle, all.vertexTriangle,
          [&](const auto& contact) { return known.ofElement(true, contact); });
-    fill(contents.triangleVertex, ofTriangles,
+    fill(contents.triangleVertex, all.triangleVertex,
          [&](const auto& contact) { return known.ofElement(false, contact); });
-    fill(contents.edgeEdge, ofEdges, [&](const auto& contact) { return known.ofEdges(contact); });
-    fill(contents.shape, ofShapes, [&](const ShapeContact& contact) -> Vector3d {
+    fill(contents.edgeEdge, all.edgeEdge,
+         [&](const auto& contact) { return known.ofEdges(contact); });
+    fill(contents.shape, all.shape, [&](const ShapeContact& contact) -> Vector3d {
       return smoothsShape ? known.ofElement(meshIsB, contact) : contact.normal;
     });
   });
