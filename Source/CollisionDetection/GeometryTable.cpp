@@ -452,7 +452,7 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
   if (TetrahedraCut::isPossible(solid.topology, cut.rest(), added)) {
     TetrahedraCut ofSolid(solid.topology, cut.rest(), sorted, added);
     if (ofSolid.fault()) refuse(geometry, *ofSolid.fault());
-    reserveAmortized(solid.tags, count + added.size());
+    if (!solid.tags.empty()) reserveAmortized(solid.tags, count + added.size());
     cut.removed = ofSolid.goneFaces();
     cut.added = ofSolid.newFaces();
     apply(cut, prepare);
@@ -500,7 +500,7 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   for (const std::uint32_t t : cut.removed)
     smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
   for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
-  reserveAmortized(mesh.tags, count + cut.added.size());
+  if (!mesh.tags.empty()) reserveAmortized(mesh.tags, count + cut.added.size());
   if (!cut.positions.empty())
     geometry.pieces.forget();  // it uses the positions, and is of fewer vertices
   geometry.step.reserveCut(mesh, cut.positions.size());

@@ -1,6 +1,8 @@
+// Part of Mesh/TriangleMesh.h: cuts of a topology.
 #include "Mesh/TriangleMesh.h"
 
 #include "Core/Assert.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <utility>

@@ -9,6 +9,7 @@
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
 #include "Common/Sanitized.h"
+#include "Common/Solids.h"
 #include "Common/WholeScene.h"
 
 #include <gtest/gtest.h>
@@ -298,6 +299,68 @@ TEST_P(AllocationFailure, NextFrameIsCorrect) {
       }
       EXPECT_GT(failures, first ? 40u / kStep : 0u);
     }
+}
+
+/// A cut that fails leaves every bit of the state, also of what it had already prepared.
+TEST_P(AllocationFailure, LeavesTheMeshUncut) {
+  Random random(4);
+  const Solid block = cells(2, random);
+  const Mesh ground = sheet(5, 0.1, 0), ball = sphere(6, 8, {0.5, 0.5, 0.1}, 0.3);
+  for (const bool solid : {false, true}) {
+    const auto prepared = [&] {
+      auto detection = std::make_unique<OctreeBasedCD>(settings());
+      const GeometryId a = solid ? detection->addTetrahedralMesh(block.positions, block.tetrahedra)
+                                 : detection->addTriangleMesh(ground.positions, ground.triangles),
+                       b = detection->addTriangleMesh(ball.positions, ball.triangles);
+      detection->addCollisionPair(a, a, {.thickness = 0.02, .restDistance = 0.3});
+      detection->addCollisionPair(a, b, {.thickness = 0.05, .trackContacts = true});
+      detection->setTags(a, Ids((solid ? block.tetrahedra.size() : ground.triangles.size()), 7));
+      detection->setDisabledElements(a, Ids{3});
+      detection->detectCollision();
+      detection->advance();
+      return detection;
+    };
+    const auto cut = [&](OctreeBasedCD& detection) {
+      const GeometryId a{0};
+      const auto m = static_cast<std::uint32_t>(detection.vertexCount(a));
+      const Positions tip{{0.4, 0.4, 0.15}};
+      if (!solid) {
+        const Triangle t = ground.triangles[8];
+        return detection.replaceTriangles(
+            a, Ids{2, 8}, std::vector<Triangle>{{t[0], t[1], m}, {t[1], t[2], m}}, tip);
+      }
+      Tetrahedron t = block.tetrahedra[5];
+      t[0] = m;
+      return detection.replaceTetrahedra(a, Ids{5, 9}, std::vector<Tetrahedron>{t}, tip);
+    };
+    const auto answers = [&](OctreeBasedCD& detection) {
+      detection.detectCollision();
+      return std::array{detection.collisionData(GeometryId{0}, GeometryId{0}).hash(),
+                        detection.collisionData(GeometryId{0}, GeometryId{1}).hash()};
+    };
+    const auto fresh = prepared();
+    const auto before = fresh->save();
+    cut(*fresh);
+    const auto after = fresh->save();
+    ASSERT_NE(after, before);
+    const auto expected = answers(*fresh);
+    std::size_t failures = 0;
+    for (std::size_t n = 1;; ++n) {
+      const auto detection = prepared();
+      const bool threw = FailingAllocation::throwsAt(n, [&] { cut(*detection); });
+      const bool failed = FailingAllocation::failed();
+      SCOPED_TRACE("allocation " + std::to_string(n));
+      if (threw) {
+        ASSERT_EQ(detection->save(), before);
+        cut(*detection);
+        ++failures;
+      }
+      ASSERT_EQ(detection->save(), after);
+      ASSERT_EQ(answers(*detection), expected);
+      if (!failed) break;
+    }
+    EXPECT_GT(failures, 20u);
+  }
 }
 
 /// A publication that fails leaves the last snapshot, and copies of the next one are whole.
