@@ -303,6 +303,7 @@ TEST_P(AllocationFailure, NextFrameIsCorrect) {
 
 /// A cut that fails leaves every bit of the state, also of what it had already prepared.
 TEST_P(AllocationFailure, LeavesTheMeshUncut) {
+  using Ids = std::vector<std::uint32_t>;
   Random random(4);
   const Solid block = cells(2, random);
   const Mesh ground = sheet(5, 0.1, 0), ball = sphere(6, 8, {0.5, 0.5, 0.1}, 0.3);
