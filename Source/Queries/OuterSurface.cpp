@@ -148,18 +148,33 @@ bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int numbe
   return false;
 }
 
-/// Finds the triangles that have points in common with others that share no vertex with them.
+/// Finds the triangles that have points in common with others, besides common vertices. Triangles
+/// with a common edge have others only if they are in one plane.
 void OuterSurface::findCreases() const {
   m_parts = {};  // an earlier call may have found no memory
   SignCounts counts;
-  const auto test = [&](std::uint32_t i, std::uint32_t j) {
+  const auto test = [&](std::uint32_t first, std::uint32_t second) {
+    // Not in the octree's order, on which rounding would depend.
+    const auto [i, j] = std::minmax(first, second);
     const Triangle &a = m_geometry.mesh.topology.elements[i],
                    &b = m_geometry.mesh.topology.elements[j];
-    if (std::find_first_of(a.begin(), a.end(), b.begin(), b.end()) != a.end()) return;
     const Corners ofA = cornersOf(i), ofB = cornersOf(j);
-    const TriangleIntersection found = intersectTriangles(ofA, ofB, counts);
-    if (!found.intersect()) return;
     std::vector<Vector3d> common;
+    ExcludedFeatures excluded;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t l = 0; l < 3; ++l) {
+        if (a[k] != b[l]) continue;
+        common.push_back(ofA[k]);
+        excluded.cornersOfA |= static_cast<std::uint8_t>(1u << k);
+        excluded.cornersOfB |= static_cast<std::uint8_t>(1u << l);
+        for (const std::size_t edgeOfA : {k, (k + 2) % 3})
+          for (const std::size_t edgeOfB : {l, (l + 2) % 3})
+            excluded.edges |= static_cast<std::uint16_t>(TriangleIntersection::edgesBit(
+                static_cast<int>(edgeOfA), static_cast<int>(edgeOfB)));
+      }
+    if (common.size() > 1) return;
+    const TriangleIntersection found = intersectTriangles(ofA, ofB, counts, excluded);
+    if (!found.intersect()) return;
     addCommonPoints(ofA, ofB, found, common);
     m_parts.mixed.push_back(i);
     m_parts.mixed.push_back(j);
@@ -167,12 +182,11 @@ void OuterSurface::findCreases() const {
         windingNormal(ofA[0], ofA[1], ofA[2]).cross(windingNormal(ofB[0], ofB[1], ofB[2]));
     // Triangles in one plane have an area in common. Its outline ends at these points.
     if (found.touch())
-      for (const Vector3d& point : common)
-        m_parts.creases.push_back({std::min(i, j), {point, point}});
-    const auto [first, last] = std::minmax_element(
+      for (const Vector3d& point : common) m_parts.creases.push_back({i, {point, point}});
+    const auto [start, end] = std::minmax_element(
         common.begin(), common.end(),
         [&](const Vector3d& l, const Vector3d& r) { return along.dot(l) < along.dot(r); });
-    m_parts.creases.push_back({std::min(i, j), {*first, *last}});
+    m_parts.creases.push_back({i, {*start, *end}});
   };
   const std::span<const std::uint32_t> order = m_geometry.tree.octree().order();
   if (m_bruteForce) {
@@ -204,7 +218,7 @@ void OuterSurface::findCreases() const {
   });
 }
 
-/// Triangles that no others intersect are of one kind with their neighbours.
+/// Triangles that no others intersect are of one kind with their neighbours, where an edge has two.
 CountedVector<std::uint32_t> OuterSurface::outerTriangles(
     const WindingNumber& windingNumber) const {
   const MeshTopology& topology = m_geometry.mesh.topology;
@@ -212,8 +226,8 @@ CountedVector<std::uint32_t> OuterSurface::outerTriangles(
   std::vector<Kind> kinds(topology.elements.size(), Kind::Unknown);
   for (const std::uint32_t element : m_parts.mixed) kinds[element] = Kind::Mixed;
   CountedVector<std::uint32_t> outer, open;
-  for (const std::uint32_t first : m_geometry.tree.octree().order()) {
-    if (kinds[first] != Kind::Unknown) continue;
+  topology.forEachElement([&](std::uint32_t first) {
+    if (kinds[first] != Kind::Unknown) return;
     const auto [a, b, c] = cornersOf(first);
     const Vector3d middle = (a + b + c) / 3.0, normal = windingNormal(a, b, c);
     const bool isOuter =
@@ -225,7 +239,7 @@ CountedVector<std::uint32_t> OuterSurface::outerTriangles(
       open.pop_back();
       if (isOuter) outer.push_back(element);
       for (const std::uint32_t edge : topology.triangleEdges[element]) {
-        if (edge == kNoEdge) continue;
+        if (edge == kNoEdge || topology.edgeTriangles[edge].size() != 2) continue;
         for (const std::uint32_t other : topology.edgeTriangles[edge]) {
           if (kinds[other] != Kind::Unknown) continue;
           kinds[other] = kinds[first];
@@ -233,7 +247,7 @@ CountedVector<std::uint32_t> OuterSurface::outerTriangles(
         }
       }
     }
-  }
+  });
   std::sort(outer.begin(), outer.end());
   return outer;
 }
