@@ -32,7 +32,7 @@ class GeometryMotion {
   /// Updates range(), correction() and arcDeviation().
   void update(const Geometry&);
   /// Stores the motion in the step, which was measured while the positions were copied.
-  void set(const TriangleMesh&, const MotionRange&);
+  void set(const Geometry&, const MotionRange&);
   /// Whether motion should be measured while positions are copied: the step before needed it.
   bool shouldMeasure() const { return m_wasUsed; }
   void advance() { m_wasUsed = std::exchange(m_isUsed, false); }
@@ -43,8 +43,15 @@ class GeometryMotion {
   double arcDeviation() const { return m_arcDeviation; }  ///< L
 
  private:
-  using Ends = DerivedFrom<std::array<PositionsState, 2>>;
-  Ends m_rangeVersion, m_arcVersion, m_correctionVersion;
+  using Ends = std::array<PositionsState, 2>;
+  struct Step {
+    Ends ends;
+    Revision topology;  ///< of a placed body, only vertices of elements count
+    friend bool operator==(const Step&, const Step&) = default;
+  };
+  static Step stepOf(const Geometry&);
+  DerivedFrom<Step> m_rangeVersion, m_arcVersion;
+  DerivedFrom<Ends> m_correctionVersion;
   MotionRange m_range, m_correction;
   double m_arcDeviation = 0;
   bool m_isUsed = false, m_wasUsed = false;

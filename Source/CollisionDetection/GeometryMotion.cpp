@@ -37,15 +37,20 @@ GeometryInStep Geometry::inStep() const {
           body.field.get()};
 }
 
-void GeometryMotion::set(const TriangleMesh& mesh, const MotionRange& motion) {
+GeometryMotion::Step GeometryMotion::stepOf(const Geometry& geometry) {
+  return {ends(geometry.body.mesh.before, geometry.body.mesh.now),
+          geometry.body.revisions.elements.topology};
+}
+
+void GeometryMotion::set(const Geometry& geometry, const MotionRange& motion) {
   m_range = motion;
-  m_rangeVersion.commit(ends(mesh.before, mesh.now));
+  m_rangeVersion.commit(stepOf(geometry));
 }
 
 void GeometryMotion::update(const Geometry& geometry) {
   m_isUsed = true;
   const TriangleMesh& mesh = geometry.body.mesh;
-  const auto step = ends(mesh.before, mesh.now);
+  const Step step = stepOf(geometry);
   if (!m_rangeVersion.isCurrent(step)) {
     m_rangeVersion.invalidate();
     if (mesh.before.isSameAs(mesh.now)) {

@@ -297,7 +297,7 @@ void GeometryTable::setPositions(GeometryId id,
   geometry.step.setPositions(geometry, geometry.body.mesh, before, now, threads,
                              geometry.motion.shouldMeasure() ? &moved : nullptr);
   ++m_state;
-  if (moved) geometry.motion.set(geometry.body.mesh, *moved);
+  if (moved) geometry.motion.set(geometry, *moved);
 }
 
 void GeometryTable::setSomePositions(GeometryId id, std::size_t first,

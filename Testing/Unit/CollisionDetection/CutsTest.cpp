@@ -439,6 +439,40 @@ TEST(Cuts, NewElementsAreCheckedWhereTheStepStarts) {
   EXPECT_GT(started[1], 50u);
 }
 
+/// A vertex that had no element moves a body further from the cut on, also in the same step.
+TEST(Cuts, PlacedBodiesMoveAsFarAsTheirElements) {
+  Mesh body = sheet(2, 0, 0);
+  const auto far = static_cast<std::uint32_t>(body.positions.size());
+  body.positions.push_back({50, 0, 0});
+  const Mesh floor = sheet(2, -1, 0);
+  const Pose turned{Eigen::AngleAxisd(0.1, Vector3d::UnitZ()).toRotationMatrix(), {0, 0, 0}};
+  const auto setUp = [&] {
+    OctreeBasedCD collisions;
+    const GeometryId a = addMesh(collisions, body), b = addMesh(collisions, floor);
+    collisions.addCollisionPair(a, b, {.method = Method::Proximity, .thickness = 0.1});
+    collisions.setTransform(a, Pose{});
+    collisions.detectCollision();
+    collisions.advance();
+    collisions.setTransform(a, turned);
+    return collisions;
+  };
+  OctreeBasedCD late = setUp(), early = setUp();
+  const GeometryId a{0}, b{1};
+  const auto cut = [&](OctreeBasedCD& collisions) {
+    collisions.replaceTriangles(a, Ids{0}, std::vector<Triangle>{{0, 1, far}}, {});
+  };
+  late.detectCollision();
+  const double before = late.collisionData(a, b).validity().displacement;
+  cut(late), cut(early);
+  late.detectCollision(), early.detectCollision();
+  const Validity &found = late.collisionData(a, b).validity(),
+                 &truth = early.collisionData(a, b).validity();
+  EXPECT_LT(before, 1.0);
+  EXPECT_GT(truth.displacement, 4.0);
+  EXPECT_EQ(found.displacement, truth.displacement);
+  EXPECT_EQ(found.arcDeviation, truth.arcDeviation);
+}
+
 TEST(Cuts, NewVerticesAreAtRestInTheStepOfTheCut) {
   OctreeBasedCD collisions;
   const GeometryId id = addMesh(collisions, sheet(1, 0, 0));
