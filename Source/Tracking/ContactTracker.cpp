@@ -4,6 +4,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <type_traits>
 #include <utility>
@@ -25,14 +26,14 @@ bool areSame(const ContactKey& a, const ContactKey& b) {
   return a.kind == b.kind && areSame(a.ids, b.ids);
 }
 
-/// Number of vertices that two features have in common.
-int sharedVertices(const Triangle& a, const Triangle& b) {
-  int shared = 0;
-  for (int i = 0; i < 3; ++i) {
-    const bool isNew = (i < 1 || a[i] != a[0]) && (i < 2 || a[i] != a[1]);
-    shared += isNew && (a[i] == b[0] || a[i] == b[1] || a[i] == b[2]);
-  }
-  return shared;
+/// Number of vertices that two features have in common. Without branches, which no processor
+/// predicts here.
+unsigned sharedVertices(const Triangle& a, const Triangle& b) {
+  const auto same = [](std::uint32_t v, std::uint32_t w) { return static_cast<unsigned>(v == w); };
+  const auto isIn = [&](std::uint32_t v) { return same(v, b[0]) | same(v, b[1]) | same(v, b[2]); };
+  const unsigned isSecondNew = same(a[1], a[0]) ^ 1u,
+                 isThirdNew = (same(a[2], a[0]) | same(a[2], a[1])) ^ 1u;
+  return isIn(a[0]) + (isSecondNew & isIn(a[1])) + (isThirdNew & isIn(a[2]));
 }
 
 ContactEnd endOfVertex(const MeshTopology& topology, std::uint32_t vertex) {
@@ -153,7 +154,7 @@ void ContactTracker::match(const Contents& last, Contents& next) {
           if (lasts)
             ++before;
           else
-            m_begun.push_back({&contact, verticesOf(key, corners), 0});
+            m_begun.push_back({&contact, verticesOf(key, corners), false});
         }
         while (before != end) ends();
       },
@@ -197,51 +198,60 @@ void ContactTracker::linkVertices(bool self) {
 /// Lists for each contact that began those that ended and have common vertices with it on both
 /// sides.
 void ContactTracker::findSlides(bool self, bool otherElements) {
-  m_slides.clear();
-  for (Begun& begun : m_begun) {
-    begun.firstSlide = m_slides.size();
-    const Vertices& now = begun.vertices;
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < m_begun.size(); ++i) {
+    const Vertices& now = m_begun[i].vertices;
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = now[0][k];
       if (k > 0 && vertex == now[0][k - 1]) continue;
       std::uint32_t link = m_heads[vertex & (m_heads.size() - 1)];
       for (; link < m_links.size(); link = m_links[link].next) {
         if (m_links[link].vertex != vertex) continue;
-        const Ended& ended = m_ended[m_links[link].entry];
+        const std::uint32_t entry = m_links[link].entry;
+        const Ended& ended = m_ended[entry];
         if (otherElements && ended.contact->key.kind == ContactKind::Shape) continue;
-        const Vertices& before = ended.vertices;
         const auto shared = [&](int first) {
-          const int a = sharedVertices(now[0], before[first]),
-                    b = sharedVertices(now[1], before[1 - first]);
-          return a > 0 && b > 0 ? a + b : 0;
+          const unsigned a = sharedVertices(now[0], ended.vertices[first]),
+                         b = sharedVertices(now[1], ended.vertices[1 - first]);
+          return (a + b) * (static_cast<unsigned>(a > 0) & static_cast<unsigned>(b > 0));
         };
-        const int most = std::max(shared(0), self ? shared(1) : 0);
-        if (most > 0) m_slides.push_back({m_links[link].entry, most});
+        const unsigned most = std::max(shared(0), self ? shared(1) : 0);
+        if (count == m_slides.size()) m_slides.resize(2 * count + m_begun.size());
+        m_slides[count] = {i, entry, most};
+        count += most > 0;
       }
     }
   }
+  m_slides.resize(count);
 }
 
 /// Of all pairs of a contact that ended and one that began, takes those with the most common
 /// vertices first, then those with the lowest keys. Each contact is in one such pair at most.
 void ContactTracker::takePredecessors() {
-  constexpr int kMostShared = 6;
-  for (int shared = kMostShared; shared >= 2; --shared)
-    for (std::size_t i = 0; i < m_begun.size(); ++i) {
-      TrackedContact& contact = *m_begun[i].contact;
-      if (contact.predecessor) continue;
-      const std::size_t end = i + 1 < m_begun.size() ? m_begun[i + 1].firstSlide : m_slides.size();
-      std::size_t lowest = m_ended.size();
-      for (std::size_t s = m_begun[i].firstSlide; s < end; ++s)
-        if (m_slides[s].shared == shared && !m_ended[m_slides[s].entry].isPredecessor)
-          lowest = std::min<std::size_t>(lowest, m_slides[s].entry);
-      if (lowest == m_ended.size()) continue;
-      Ended& ended = m_ended[lowest];
-      ended.isPredecessor = true;
-      contact.predecessor = ended.contact->key;
-      contact.age = ageOf(ended) + 1;
-      contact.userData = ended.contact->userData;
-    }
+  constexpr unsigned kMostShared = 6;
+  // Those with the most first, in their order.
+  std::array<std::size_t, kMostShared + 2> places{};
+  for (const Slide& slide : m_slides) ++places[kMostShared - slide.shared + 1];
+  for (unsigned i = 0; i <= kMostShared; ++i) places[i + 1] += places[i];
+  m_sortedSlides.resize(m_slides.size());
+  for (const Slide& slide : m_slides) m_sortedSlides[places[kMostShared - slide.shared]++] = slide;
+  for (auto slide = m_sortedSlides.begin(); slide != m_sortedSlides.end();) {
+    const auto first = slide;
+    std::size_t lowest = m_ended.size();
+    for (; slide != m_sortedSlides.end() && slide->begun == first->begun &&
+           slide->shared == first->shared;
+         ++slide)
+      if (!m_ended[slide->entry].isPredecessor)
+        lowest = std::min<std::size_t>(lowest, slide->entry);
+    Begun& begun = m_begun[first->begun];
+    if (lowest == m_ended.size() || begun.hasPredecessor) continue;
+    begun.hasPredecessor = true;
+    Ended& ended = m_ended[lowest];
+    ended.isPredecessor = true;
+    begun.contact->predecessor = ended.contact->key;
+    begun.contact->age = ageOf(ended) + 1;
+    begun.contact->userData = ended.contact->userData;
+  }
 }
 
 /// Contacts that began in this step keep what an earlier detection of it was given for them.
@@ -386,6 +396,7 @@ void ContactTracker::releaseMemory(Contents& contents) {
   m_heads = {};
   m_links = {};
   m_slides = {};
+  m_sortedSlides = {};
 }
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {

@@ -77,7 +77,7 @@ class ContactTracker : public CountedObject {
   struct Begun {
     TrackedContact* contact;
     Vertices vertices;
-    std::size_t firstSlide;
+    bool hasPredecessor;
   };
   /// Vertices of m_ended, in lists by the vertex modulo the number of lists.
   struct VertexLink {
@@ -85,8 +85,8 @@ class ContactTracker : public CountedObject {
   };
   /// A contact that ended and has `shared` vertices in common with one that began.
   struct Slide {
-    std::uint32_t entry;
-    int shared;
+    std::uint32_t begun, entry;
+    unsigned shared;
   };
 
   /// Of the element that a contact's key does not describe; else 0.
@@ -131,7 +131,7 @@ class ContactTracker : public CountedObject {
   Buffer<Begun> m_begun;          ///< in the answer at hand
   Buffer<std::uint32_t> m_heads;  ///< of lists in m_links
   Buffer<VertexLink> m_links;
-  Buffer<Slide> m_slides;
+  Buffer<Slide> m_slides, m_sortedSlides;
 };
 
 }  // namespace palpate
