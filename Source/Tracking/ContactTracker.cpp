@@ -26,15 +26,24 @@ bool areSame(const ContactKey& a, const ContactKey& b) {
   return a.kind == b.kind && areSame(a.ids, b.ids);
 }
 
-/// Number of vertices that two features have in common. Without branches, which no processor
-/// predicts here.
-unsigned sharedVertices(const Triangle& a, const Triangle& b) {
-  const auto same = [](std::uint32_t v, std::uint32_t w) { return static_cast<unsigned>(v == w); };
-  const auto isIn = [&](std::uint32_t v) { return same(v, b[0]) | same(v, b[1]) | same(v, b[2]); };
-  const unsigned isSecondNew = same(a[1], a[0]) ^ 1u,
-                 isThirdNew = (same(a[2], a[0]) | same(a[2], a[1])) ^ 1u;
-  return isIn(a[0]) + (isSecondNew & isIn(a[1])) + (isThirdNew & isIn(a[2]));
-}
+/// The vertices of a feature side by side, for comparisons without branches: no processor predicts
+/// which of them are equal.
+class FeatureVertices {
+ public:
+  explicit FeatureVertices(const Triangle& v)
+      : m_vertices{v[0], v[1], v[2], 0},
+        m_counts{1, v[1] != v[0], v[2] != v[0] && v[2] != v[1], 0} {}
+  /// Number of vertices in common with another feature.
+  unsigned shared(const Triangle& v) const {
+    const auto isIn = (m_vertices == v[0]) | (m_vertices == v[1]) | (m_vertices == v[2]);
+    const Lanes counted = reinterpret_cast<Lanes>(isIn) & m_counts;
+    return counted[0] + counted[1] + counted[2];
+  }
+
+ private:
+  using Lanes [[gnu::vector_size(16)]] = std::uint32_t;
+  Lanes m_vertices, m_counts;  ///< 1: the vertex comes first
+};
 
 ContactEnd endOfVertex(const MeshTopology& topology, std::uint32_t vertex) {
   if (vertex >= topology.vertexCount || !topology.isUsed[vertex]) return ContactEnd::Cut;
@@ -201,6 +210,7 @@ void ContactTracker::findSlides(bool self, bool otherElements) {
   std::size_t count = 0;
   for (std::uint32_t i = 0; i < m_begun.size(); ++i) {
     const Vertices& now = m_begun[i].vertices;
+    const FeatureVertices first(now[0]), second(now[1]);
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t vertex = now[0][k];
       if (k > 0 && vertex == now[0][k - 1]) continue;
@@ -210,9 +220,9 @@ void ContactTracker::findSlides(bool self, bool otherElements) {
         const std::uint32_t entry = m_links[link].entry;
         const Ended& ended = m_ended[entry];
         if (otherElements && ended.contact->key.kind == ContactKind::Shape) continue;
-        const auto shared = [&](int first) {
-          const unsigned a = sharedVertices(now[0], ended.vertices[first]),
-                         b = sharedVertices(now[1], ended.vertices[1 - first]);
+        const auto shared = [&](int side) {
+          const unsigned a = first.shared(ended.vertices[side]),
+                         b = second.shared(ended.vertices[1 - side]);
           return (a + b) * (static_cast<unsigned>(a > 0) & static_cast<unsigned>(b > 0));
         };
         const unsigned most = std::max(shared(0), self ? shared(1) : 0);
