@@ -200,6 +200,36 @@ TEST(OuterSurface, IsTheWholeSurfaceOfASimpleBody) {
   }
 }
 
+/// A ball that a random history deformed until triangles with one common vertex cross. Another
+/// order of the triangles gave another point, sixteen times as far away.
+TEST(OuterSurface, DoesNotDependOnTheOrderOfTriangles) {
+  const std::vector<Vector3d> positions{
+      {0.25331377010461115, 0.58225211674682298, 0.84750867716629052},
+      {0.74525810247210433, 0.2944712369118479, 0.4157026638382294},
+      {0.51126601400398619, 0.31798991971162976, 0.93143864326955761},
+      {0.77079095248204765, 0.11622357978643014, 0.53430680994533608},
+      {0.5525434082060463, 0.1077958530189351, 0.62266936122066974},
+      {1.0326399632374157, 0.46739062498090694, -0.19753666280380983},
+      {0.12371483156299372, 0.4411409744543609, 0.55114811875164094},
+      {0.73484893752104163, 0.36148624519910955, 0.66287301063079795},
+      {0.6475144729721376, 0.019183507299369271, -0.26284038778411445},
+      {0.3195206925941742, 0.20908000236519855, -0.27908368336447292}};
+  const std::vector<Triangle> triangles{
+      {0, 1, 2}, {1, 5, 6}, {1, 6, 2}, {5, 9, 6}, {0, 2, 3}, {2, 6, 7}, {2, 7, 3}, {6, 9, 7},
+      {0, 3, 4}, {3, 7, 8}, {3, 8, 4}, {7, 9, 8}, {0, 4, 1}, {4, 8, 5}, {4, 5, 1}, {8, 9, 5}};
+  const std::vector<Vector3d> points{
+      {0.53292798479852066, 0.32781866180965585, 0.72643530370194587}};
+  for (std::size_t first = 0; first < triangles.size(); ++first) {
+    Mesh body{positions, {}};
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+      body.triangles.push_back(triangles[(first + i) % triangles.size()]);
+    const std::vector<InsideVertex> inside = insideOf(points, body);
+    ASSERT_EQ(inside.size(), 1u);
+    EXPECT_EQ(body.triangles[inside[0].triangle], triangles[4]) << first;
+    EXPECT_NEAR(inside[0].depth, 0.002694834119833099, 1e-12) << first;
+  }
+}
+
 }  // namespace
 
 }  // namespace palpate::testing
