@@ -54,8 +54,9 @@ TEST(FaceBlock, HasTheBitsOfOneTriangle) {
     }
   }
   useSimdPath("");
-  EXPECT_GT(plain, 20000u);
-  EXPECT_GT(others, 20000u);
+  // Both kinds are common, however many SIMD paths the build has.
+  EXPECT_GT(4 * plain, plain + others);
+  EXPECT_GT(4 * others, plain + others);
 }
 
 }  // namespace
