@@ -212,7 +212,7 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
         record.isUnfinished = deadline.isOver();
       } catch (const OutOfTime&) {
       }
-    if (!record.isUnfinished) record.track(step);
+    if (!record.isUnfinished) track(record, step);
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
     statistics.milliseconds.order += spent;

@@ -29,12 +29,14 @@ class Frame {
   /// Writes the contacts of each pair, sorted, to PairRecord::next.
   /// trace: null for none.
   void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&, Trace* trace);
-  /// The same for a few pairs at a time in the given order, and follows their contacts into the
-  /// step (PairRecord::track()), until the deadline. The rest is PairRecord::isUnfinished.
+  /// The same for a few pairs at a time in the given order, with track(), until the deadline. The
+  /// rest is PairRecord::isUnfinished.
   void detectUntil(const Deadline&, std::uint64_t step, std::span<PairRecord* const>,
                    const Threads&, FrameStatistics&, Trace*);
   /// Writes the same results, found by testing every feature against every other.
   void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&, Trace*);
+  /// Takes the contacts of a pair over into the step with this number (PairRecord::track()).
+  void track(PairRecord& record, std::uint64_t step) { record.track(step, m_match); }
 
  private:
   struct Pair {
@@ -64,6 +66,7 @@ class Frame {
   Buffer<NodePair> m_nodePairs;
   TraversalStack m_stack;
   PairResults m_results;
+  ContactMatch m_match;
 };
 
 }  // namespace palpate

@@ -239,7 +239,7 @@ void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> re
     record->isUnfinished = deadline->isOver();
     if (record->isUnfinished) continue;
     frame.detectByBruteForce({&record, 1}, next, traced);
-    record->track(step);
+    frame.track(*record, step);
   }
 }
 
@@ -327,7 +327,7 @@ bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
     // With a deadline, pairs of other answers were tracked one by one.
     for (const auto& record : pairs.records())
       if (!deadline || !record->collides() || record->dataVersion.isCurrent(record->state()))
-        record->track(geometries.stepNumber());
+        frame.track(*record, geometries.stepNumber());
     if (deadline) keepUnfinished(records, next);
     for (PairRecord* record : records)
       if (!record->isUnfinished) record->addTags();

@@ -52,7 +52,7 @@ bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others
   return builds;
 }
 
-void PairRecord::track(std::uint64_t step) {
+void PairRecord::track(std::uint64_t step, ContactMatch& scratch) {
   using Contents = CollisionData::Contents;
   const bool changes = !dataVersion.isCurrent(state());
   if (changes && !collides()) Contents::of(next) = {};
@@ -69,7 +69,7 @@ void PairRecord::track(std::uint64_t step) {
     Contents& contents = Contents::of(next);
     contents.tracked.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
     tracker->track(meshes(), collides(), {a->body.revisions.elements, b->body.revisions.elements},
-                   Contents::of(data), contents);
+                   Contents::of(data), contents, scratch);
   }
 }
 

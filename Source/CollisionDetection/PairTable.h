@@ -93,7 +93,7 @@ struct PairRecord : CountedObject {
   }
   /// Follows the contacts into `next`, or where it holds, the result into the step with this number
   /// (PairSettings::trackContacts). Empties `next` of a pair that does not collide.
-  void track(std::uint64_t step);
+  void track(std::uint64_t step, ContactMatch& scratch);
   /// Writes Contents::tags of `next`, if it is new.
   void addTags();
   /// PairSettings::rememberSides: begins the step with this number if it has not begun.

@@ -4,8 +4,8 @@
 
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Tracking/ContactMatch.h"
 #include "Mesh/Revision.h"
-#include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
 
 #include <array>
@@ -15,19 +15,8 @@
 
 namespace palpate {
 
-/// Calls f(kind, contacts, tracked) for each list, in the order of keys. Of two contents, f takes
-/// the contacts of both, then tracked of both.
-template <class F, class... Contents>
-void forEachTracked(F&& f, Contents&... all) {
-  f(ContactKind::VertexTriangle, all.vertexTriangle..., all.tracked.vertexTriangle...);
-  f(ContactKind::TriangleVertex, all.triangleVertex..., all.tracked.triangleVertex...);
-  f(ContactKind::EdgeEdge, all.edgeEdge..., all.tracked.edgeEdge...);
-  f(ContactKind::Shape, all.shape..., all.tracked.shape...);
-  f(ContactKind::ShapeShape, all.shapeShape..., all.tracked.shapeShape...);
-}
-
 /// The contacts of one pair over time (PairSettings::trackContacts). Docs/HowTo/ContactsOverTime.md
-/// has the rules. Its scratch remembers its peak.
+/// has the rules.
 class ContactTracker : public CountedObject {
  public:
   using Contents = CollisionData::Contents;
@@ -40,7 +29,7 @@ class ContactTracker : public CountedObject {
   /// Writes Contents::tracked of an answer in this step. last: of the last detection, maybe in this
   /// step. collides: false if groups exclude the pair. elements: of the pair's geometries.
   void track(const MeshPair&, bool collides, const std::array<ElementsState, 2>& elements,
-             const Contents& last, Contents& next);
+             const Contents& last, Contents& next, ContactMatch& scratch);
   /// An answer that needs no detection lasts into this step. Call commit() then.
   void keep() { m_keeps = true; }
   bool keeps() const { return m_keeps; }
@@ -64,58 +53,14 @@ class ContactTracker : public CountedObject {
   void describe(File&, const auto& revisions, const Contents& kept, bool isCurrent);
 
  private:
-  /// The vertices of a contact's two features, some of them twice. What has no vertices, as a
-  /// shape, has kNoElement.
-  using Vertices = std::array<std::array<std::uint32_t, 3>, 2>;
-  /// A contact at the last advance() that is not in the answer at hand.
-  struct Ended {
-    const TrackedContact* contact;
-    Vertices vertices;
-    bool isPredecessor;  ///< of a contact of that answer
-  };
-  /// A contact that began.
-  struct Begun {
-    TrackedContact* contact;
-    Vertices vertices;
-    bool hasPredecessor;
-  };
-  /// Vertices of m_ended, in lists by the vertex modulo the number of lists.
-  struct VertexLink {
-    std::uint32_t vertex, entry, next;
-  };
-  /// A contact that ended and has `shared` vertices in common with one that began.
-  struct Slide {
-    std::uint32_t begun, entry;
-    unsigned shared;
-  };
-
-  /// Of the element that a contact's key does not describe; else 0.
-  template <class Contact>
-  static Triangle cornersOf(const Contact& contact) {
-    if constexpr (requires { contact.vertices; })
-      return contact.vertices;
-    else
-      return {};
-  }
-  template <class Contact>
-  static ContactKey keyOf(ContactKind, const Contact&);
-  static Vertices verticesOf(const ContactKey&, const Triangle& corners);
   /// Whether Contents::shape has elements of the other geometry now: equal keys are other contacts.
   bool hasOtherElements(const Contents& next) const {
     return next.tracked.elementsOfSecond != m_beforeOfSecond;
   }
   /// The contacts at the last advance().
   const Contents& before(const Contents& last) const { return m_isHeld ? m_held : last; }
-  std::uint32_t ageOf(const Ended& ended) const {  ///< at the last advance()
-    return ended.contact->age - (m_hasGrown ? 1 : 0);
-  }
-  void match(const Contents& last, Contents& next);
   void reserveAs(const Contents& next);
-  void linkVertices(bool self);
-  void findSlides(bool self, bool otherElements);
-  void takePredecessors();
-  void takeUserData(const Contents& last);
-  ContactEnd endOf(const MeshPair&, bool collides, const Ended&) const;
+  ContactEnd endOf(const MeshPair&, bool collides, const ContactMatch::Ended&) const;
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t m_step = kNoStep;  ///< the one after the last advance()
@@ -127,11 +72,6 @@ class ContactTracker : public CountedObject {
   std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< theirs; of the last answer
   bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
   bool m_isDropped = false;                 ///< m_held is all that is left of the last answer
-  Buffer<Ended> m_ended;
-  Buffer<Begun> m_begun;          ///< in the answer at hand
-  Buffer<std::uint32_t> m_heads;  ///< of lists in m_links
-  Buffer<VertexLink> m_links;
-  Buffer<Slide> m_slides, m_sortedSlides;
 };
 
 }  // namespace palpate

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <palpate/Tracking.h>
+
+#include "NarrowPhase/CollisionContents.h"
+#include "Core/Buffer.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace palpate {
+
+/// Calls f(kind, contacts, tracked) for each list, in the order of keys. Of two contents, f takes
+/// the contacts of both, then tracked of both.
+template <class F, class... Contents>
+void forEachTracked(F&& f, Contents&... all) {
+  f(ContactKind::VertexTriangle, all.vertexTriangle..., all.tracked.vertexTriangle...);
+  f(ContactKind::TriangleVertex, all.triangleVertex..., all.tracked.triangleVertex...);
+  f(ContactKind::EdgeEdge, all.edgeEdge..., all.tracked.edgeEdge...);
+  f(ContactKind::Shape, all.shape..., all.tracked.shape...);
+  f(ContactKind::ShapeShape, all.shapeShape..., all.tracked.shapeShape...);
+}
+
+/// Of the element that a contact's key does not describe; else 0.
+template <class Contact>
+Triangle cornersOf(const Contact& contact) {
+  if constexpr (requires { contact.vertices; })
+    return contact.vertices;
+  else
+    return {};
+}
+
+/// The contact with this key, null if there is none. tracked: of one list.
+template <class List>
+auto* findTracked(List& tracked, const ContactKey& key) {
+  const auto found =
+      std::lower_bound(tracked.begin(), tracked.end(), key,
+                       [](const TrackedContact& l, const ContactKey& r) { return l.key < r; });
+  return found != tracked.end() && found->key == key ? &*found : nullptr;
+}
+
+/// Compares the contacts of two answers of a pair: which lasted, ended or began, and from which a
+/// contact that began slid. Its scratch remembers its peak; pairs take turns with it.
+class ContactMatch {
+ public:
+  using Contents = CollisionData::Contents;
+  /// The vertices of a contact's two features, some of them twice. What has no vertices, as a
+  /// shape, has kNoElement.
+  using Vertices = std::array<Triangle, 2>;
+  /// A contact of the answer before that is not in the next one.
+  struct Ended {
+    const TrackedContact* contact;
+    Vertices vertices;
+    bool isPredecessor;  ///< of a contact of the next answer
+  };
+
+  /// Writes Contents::tracked of the next answer, without ended. steps: between the answers.
+  /// self: a mesh with itself. otherElements: Contents::shape has elements of the other geometry
+  /// now, so that equal keys are other contacts.
+  void track(const Contents& before, std::uint32_t steps, bool self, bool otherElements,
+             Contents& next);
+  /// Contacts that began keep what an earlier answer of the same step was given for them.
+  void takeUserData(const Contents& earlier);
+  /// Those of track(), ascending.
+  std::span<const Ended> ended() const { return m_ended; }
+
+ private:
+  struct Begun {
+    TrackedContact* contact;
+    Vertices vertices;
+    bool hasPredecessor;
+  };
+  /// A contact in the list of a vertex of its first feature.
+  struct Link {
+    std::uint64_t others;  ///< the vertices of its other feature, and maybe more
+    std::uint32_t entry, next;
+  };
+  static constexpr std::uint32_t kNoLink = 0;  ///< its `others` is empty, and it follows itself
+  /// A contact that began and one that ended, in the list of one of its three vertices.
+  struct Candidate {
+    std::uint32_t begun, entry;
+    unsigned vertex;
+  };
+  /// A contact that ended and has `shared` vertices in common with one that began.
+  struct Slide {
+    std::uint32_t begun, entry;
+    unsigned shared;
+  };
+
+  void match(const Contents& before, std::uint32_t steps, bool otherElements, Contents& next);
+  void linkVertices(bool self);
+  void findCandidates();
+  void findSlides(bool self, bool otherElements);
+  void takePredecessors(std::uint32_t steps);
+
+  Buffer<Ended> m_ended;
+  Buffer<Begun> m_begun;
+  Buffer<std::uint32_t> m_lists;  ///< their first links, by the vertex modulo their number
+  Buffer<Link> m_links;
+  Buffer<Candidate> m_candidates;
+  Buffer<Slide> m_slides, m_sortedSlides;
+};
+
+}  // namespace palpate
