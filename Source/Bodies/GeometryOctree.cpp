@@ -121,6 +121,7 @@ bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeS
   const auto firstAdded = static_cast<std::uint32_t>(m_groupOf.size());
   struct Gone {
     std::uint32_t place, group;
+    Triangle corners;
     std::array<float, 3> sum;
   };
   const auto sumOf = [&](const Triangle& t) {
@@ -134,7 +135,7 @@ bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeS
     const auto place = static_cast<std::uint32_t>(
         std::find(order.begin() + groups[group], order.begin() + groups[group + 1], id) -
         order.begin());
-    gone.push_back({place, group, sumOf(m_ordered[place])});
+    gone.push_back({place, group, m_ordered[place], sumOf(m_ordered[place])});
   }
   std::sort(gone.begin(), gone.end(),
             [](const Gone& l, const Gone& r) { return l.place < r.place; });
@@ -173,7 +174,9 @@ bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeS
   }
   reserveAmortized(m_groupOf, topology.elements.size());
   // Nothing below throws, but for want of memory: the next update then builds the octree anew.
-  m_groupsLayout = 0;
+  const std::uint64_t before = m_octree.layout();
+  const bool hasSlices = m_slicesLayout == before;
+  m_groupsLayout = m_slicesLayout = m_cut.before = m_cut.after = 0;
   const auto moves = m_octree.replace(places, joining);
   const std::size_t size = m_octree.size(), padded = size + BoxArrays::kPadding;
   const std::span<Triangle> ordered =
@@ -192,6 +195,30 @@ bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeS
   for (const std::uint32_t id : topology.removed) m_groupOf[id] = kNoGroup;
   for (const auto& [group, element] : joining) m_groupOf[element] = group;
   m_groupsLayout = m_octree.layout();
+
+  CountedVector<std::uint32_t>& changed = m_cut.groups;
+  changed.clear();
+  for (const Gone& one : gone) changed.push_back(one.group);
+  for (const auto& [group, element] : joining) changed.push_back(group);
+  const auto sortChanged = [&] {
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  };
+  sortChanged();
+  if (hasSlices) {
+    keepSlices(changed, topology.vertexCount);
+    m_slicesLayout = m_octree.layout();
+  }
+  const auto addAround = [&](const Triangle& corners) {
+    for (const std::uint32_t vertex : corners)
+      for (const std::uint32_t element : topology.vertexTriangles[vertex])
+        changed.push_back(m_groupOf[element]);
+  };
+  for (const Gone& one : gone) addAround(one.corners);
+  for (const auto& [group, element] : joining) addAround(topology.elements[element]);
+  sortChanged();
+  m_cut.before = before;
+  m_cut.after = m_octree.layout();
   return true;
 }
 
@@ -267,6 +294,23 @@ void GeometryOctree::makeSlices(const TriangleMesh& mesh) {
   }
   m_slicePieces = piecesOf(m_ordered, ranges, mesh.topology.vertexCount);
   m_slicesLayout = m_octree.layout();
+}
+
+/// Finds the pieces of slices with groups that changed. groups: ascending.
+void GeometryOctree::keepSlices(const CountedVector<std::uint32_t>& groups,
+                                std::size_t vertexCount) {
+  const auto begins = m_octree.groups();
+  auto group = groups.begin();
+  for (std::size_t i = 0; i < m_slices.size() && group != groups.end(); ++i) {
+    const Slice& slice = m_slices[i];
+    if (*group >= slice.endGroup) continue;
+    const std::array<std::pair<std::uint32_t, std::uint32_t>, 1> range{
+        {{begins[slice.firstGroup], begins[slice.endGroup]}}};
+    const IndexLists pieces = piecesOf(m_ordered, range, vertexCount);
+    m_slicePieces.reserveMore(0, pieces[0].size());
+    m_slicePieces.replace(i, pieces[0]);
+    while (group != groups.end() && *group < slice.endGroup) ++group;
+  }
 }
 
 void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& motion, double lag,

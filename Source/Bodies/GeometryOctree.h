@@ -94,6 +94,13 @@ class GeometryOctree {
   const FloatPoint* floatsAtStart() const {
     return (m_treeSwept ? m_floatsBefore : m_floats).data();
   }
+  /// A cut that kept the nodes: Octree::layout() before and after it, and the groups, ascending,
+  /// that hold elements with a vertex of those that it removed or added.
+  struct Cut {
+    std::uint64_t before = 0, after = 0;
+    CountedVector<std::uint32_t> groups;
+  };
+  const Cut& lastCut() const { return m_cut; }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
   std::span<const Triangle> ordered() const { return m_ordered; }
   std::size_t bytesBesidesOctree() const;
@@ -113,6 +120,7 @@ class GeometryOctree {
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
   bool replaceElements(const MeshTopology&, const OctreeSettings&);
+  void keepSlices(const CountedVector<std::uint32_t>& groups, std::size_t vertexCount);
   bool canRefitSome(const TriangleMesh&, Revision topology, double scale,
                     const OctreeSettings&) const;
   void makeSlices(const TriangleMesh&);
@@ -148,6 +156,7 @@ class GeometryOctree {
   // Of replaceElements(), made by the first one:
   CountedVector<std::uint32_t> m_groupOf;  ///< per element: its group of the octree, or none
   std::uint64_t m_groupsLayout = 0;        ///< Octree::layout() of m_groupOf
+  Cut m_cut;
   bool m_isLagging = false, m_isLoose = false;
   Revision m_lastPositions;    ///< of the last update of any kind
   std::size_t m_refitted = 0;  ///< slices that updateChanged() fitted since looseness was measured

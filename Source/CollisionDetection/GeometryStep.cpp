@@ -83,7 +83,8 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
   checked.memory->revision = end.bodyRevision();
 }
 
-void GeometryStep::reserveCut(TriangleMesh& mesh, std::size_t count) {
+void GeometryStep::reserveCut(TriangleMesh& mesh, std::size_t count, std::size_t gone) {
+  reserveAmortized(m_cuts.gone, m_cuts.gone.size() + gone);
   m_cuts.positions.reserve(m_cuts.positions.size() + ends(mesh).size());
   if (count == 0) return;
   for (Positions* end : ends(mesh)) {
@@ -111,13 +112,16 @@ void GeometryStep::reserveCut(TriangleMesh& mesh, std::size_t count) {
 }
 
 void GeometryStep::cut(TriangleMesh& mesh, std::span<const Eigen::Vector3d> newVertices,
-                       const ElementsState& before, std::size_t count,
-                       const ElementsState& after) noexcept {
+                       const ElementsState& before, std::size_t count, const ElementsState& after,
+                       std::span<const std::pair<std::uint32_t, Triangle>> gone) noexcept {
   if (m_cuts.after != before) {
     m_cuts.before = before;
     m_cuts.firstAdded = static_cast<std::uint32_t>(count);
     m_cuts.positions.clear();
+    m_cuts.gone.clear();
   }
+  m_cuts.gone.insert(m_cuts.gone.end(), gone.begin(), gone.end());
+  std::sort(m_cuts.gone.begin(), m_cuts.gone.end());
   m_cuts.after = after;
   if (!newVertices.empty()) append(mesh, newVertices);
 }

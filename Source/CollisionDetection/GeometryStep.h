@@ -51,14 +51,19 @@ class GeometryStep {
   /// shape: null if there is none.
   void setTransform(const GeometryLabel&, TriangleMesh&, PlacedShape* shape,
                     const std::optional<Pose>& before, const Pose& now);
-  /// Makes room for new vertices, and for a cut.
+  /// Makes room for new vertices, and for a cut of so many elements.
   /// Cost     that of a copy of all positions where others use them, or where the room ends.
-  void reserveCut(TriangleMesh&, std::size_t newVertices);
+  void reserveCut(TriangleMesh&, std::size_t newVertices, std::size_t goneElements);
   /// After a cut of elements from `before` to `after`, of which there were `count`: appends new
-  /// vertices, for which there is room. They are at rest in this step.
+  /// vertices, for which there is room. They are at rest in this step. gone: as CutsSince::gone.
   void cut(TriangleMesh&, std::span<const Eigen::Vector3d> newVertices, const ElementsState& before,
-           std::size_t count, const ElementsState& after) noexcept;
+           std::size_t count, const ElementsState& after,
+           std::span<const std::pair<std::uint32_t, Triangle>> gone) noexcept;
   const CutsSince& cutsSinceDetection() const { return m_cuts; }
+  /// Whether cutsSinceDetection() will keep what is gone after a cut of these elements.
+  bool continuesCuts(const ElementsState& elements) const {
+    return m_cuts.gone.empty() || m_cuts.after == elements;
+  }
   /// The end `now` becomes `before`.
   void advance(TriangleMesh&, PlacedShape* shape) noexcept;
 
@@ -71,6 +76,7 @@ class GeometryStep {
   void recordDetection(const TriangleMesh& mesh) noexcept {
     m_detected = mesh.now;
     m_cuts.after = {};
+    m_cuts.gone.clear();
   }
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }

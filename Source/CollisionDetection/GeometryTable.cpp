@@ -501,9 +501,12 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
     smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
   for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
   if (!mesh.tags.empty()) reserveAmortized(mesh.tags, count + cut.added.size());
-  if (!cut.positions.empty())
-    geometry.pieces.forget();  // it uses the positions, and is of fewer vertices
-  geometry.step.reserveCut(mesh, cut.positions.size());
+  // Where nothing else uses the positions, vertices are appended to them.
+  const bool continues = geometry.pieces.isAt(geometry.step.detected());
+  if (continues) geometry.pieces.forget();
+  geometry.step.reserveCut(mesh, cut.positions.size(), cut.removed.size());
+  CountedVector<std::pair<std::uint32_t, Triangle>> gone;
+  for (const std::uint32_t t : cut.removed) gone.push_back({t, mesh.topology.elements[t]});
   std::function<void(const EdgeChange&)> prepareEdges;
   if (prepare) prepareEdges = [&](const EdgeChange& change) { prepare(change, mesh.rest); };
   mesh.topology.cut(cut.removed, cut.added, mesh.rest.size(), prepareEdges);
@@ -517,7 +520,8 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
     *revision = revisions.counter.next();
-  geometry.step.cut(mesh, cut.positions, before, count, revisions.elements);
+  geometry.step.cut(mesh, cut.positions, before, count, revisions.elements, gone);
+  if (continues) geometry.pieces.continueAt(geometry.step.detected());
   geometry.freeMotion.clear();
 }
 

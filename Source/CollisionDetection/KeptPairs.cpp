@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace palpate {
@@ -51,6 +52,11 @@ void addParts(const Octree& tree, OctreeNode node, std::size_t most,
   for (std::uint32_t i = 0; i < kChildren; ++i) addParts(tree, children + i, most, parts);
 }
 
+/// The places of a part's elements in the octree's order. Parts follow each other in it.
+std::pair<std::uint32_t, std::uint32_t> rangeOf(const Octree& tree, OctreeNode part) {
+  return part & NodePair::kOwn ? tree.ownRange(part & ~NodePair::kOwn) : tree.range(part);
+}
+
 }  // namespace
 
 KeptPairs::Reach KeptPairs::reachFor(double distance, double speed, double edge) {
@@ -68,11 +74,38 @@ void KeptPairs::Parts::make(const Body& body) {
   addParts(tree, 0, std::max(kElementsPerPart, tree.size() / kMostParts), nodes);
   CountedVector<std::pair<std::uint32_t, std::uint32_t>> ranges;
   ranges.reserve(nodes.size());
-  for (const OctreeNode node : nodes)
-    ranges.push_back(node & NodePair::kOwn ? tree.ownRange(node & ~NodePair::kOwn)
-                                           : tree.range(node));
+  for (const OctreeNode node : nodes) ranges.push_back(rangeOf(tree, node));
   pieces = piecesOf(body.tree.ordered(), ranges, body.mesh.topology.vertexCount);
   moved.resize(nodes.size());
+  isCut.assign(nodes.size(), 0);
+  layout = tree.layout();
+}
+
+bool KeptPairs::Parts::canCut(const Body& body) const {
+  const GeometryOctree::Cut& cut = body.tree.lastCut();
+  return cut.before == layout && cut.after == body.tree.octree().layout();
+}
+
+/// Finds the pieces of parts with elements at the cut.
+void KeptPairs::Parts::cut(const Body& body) {
+  PALPATE_ASSERT(canCut(body));
+  const Octree& tree = body.tree.octree();
+  const CountedVector<std::uint32_t>& groups = body.tree.lastCut().groups;
+  layout = 0;
+  auto group = groups.begin();
+  for (std::size_t i = 0; i < nodes.size() && group != groups.end(); ++i) {
+    const auto range = rangeOf(tree, nodes[i]);
+    const auto isInside = [&] {
+      return group != groups.end() && tree.groups()[*group] < range.second;
+    };
+    if (!isInside()) continue;
+    const IndexLists now =
+        piecesOf(body.tree.ordered(), std::span(&range, 1), body.mesh.topology.vertexCount);
+    pieces.reserveMore(0, now[0].size());
+    pieces.replace(i, now[0]);
+    isCut[i] = 1;
+    while (isInside()) ++group;
+  }
   layout = tree.layout();
 }
 
@@ -86,8 +119,7 @@ MotionRange KeptPairs::Parts::addMotion(const PieceMotion& motion) {
 
 void KeptPairs::addMotion(const PieceMotion& a, const PieceMotion& b) {
   PALPATE_ASSERT(m_isActive);
-  // A geometry with other elements has another octree, for which start() makes new parts.
-  if (a.ranges().size() != m_rangeCountA || b.ranges().size() != m_rangeCountB) return deactivate();
+  if (!a.isKnown() || !b.isKnown()) return deactivate();
   const bool self = &a == &b;
   const MotionRange allA = m_partsA.addMotion(a), allB = self ? allA : m_partsB.addMotion(b);
   if (allA.isZero() && allB.isZero()) return;
@@ -104,6 +136,13 @@ void KeptPairs::addMotion(const PieceMotion& a, const PieceMotion& b) {
     m_classes.due +=
         kDueEarly * unit.weightOfClasses() * std::min(1.0, motion / unit.atClasses.classes);
   }
+}
+
+bool KeptPairs::fits(const Body& a, const Body& b) const {
+  const auto isKnown = [](const Parts& parts, const Body& body) {
+    return parts.areOf(body) || parts.canCut(body);
+  };
+  return isKnown(m_partsA, a) && (&a == &b || isKnown(m_partsB, b));
 }
 
 bool KeptPairs::isWhole() const {
@@ -158,9 +197,7 @@ std::size_t KeptPairs::startGathering(const Body& a, const Body& b, const Reach&
 /// What both kinds of detections begin with.
 void KeptPairs::startUnits(const Body& a, const Body& b, const Reach& reach) {
   PALPATE_ASSERT(reach.distance >= 0.0 && reach.lists >= reach.classes && reach.classes > 0.0);
-  const bool self = &a == &b, hasParts = m_isActive &&
-                                         m_partsA.layout == a.tree.octree().layout() &&
-                                         (self || m_partsB.layout == b.tree.octree().layout());
+  const bool hasParts = m_isActive && fits(a, b);
   m_isActive = false;
   m_reach = reach;
   m_scale = a.tree.floatsFrame().scale;
@@ -176,8 +213,15 @@ void KeptPairs::startUnits(const Body& a, const Body& b, const Reach& reach) {
   // Floats, offset and two differences have errors of 2^-24 each.
   m_floatError = static_cast<float>(3 * 0x1p-24 * size * m_scale) * (1.0f + 0x1p-20f);
   for (int k = 0; k < 3; ++k) m_offset[k] = static_cast<float>(offset[k]);
-  if (!hasParts) makeParts(a, b);
-  if (!hasParts || reach.distance + reach.lists + m_moved > m_reached) makeUnits(a, b);
+  if (hasParts)
+    cutUnits(a, b);
+  else
+    makeParts(a, b);
+  if (!hasParts || reach.distance + reach.lists + m_moved > m_reached) {
+    m_reached = reach.distance + (1.0 + kUnitMargins) * reach.lists;
+    m_moved = 0.0;
+    makeUnits(nearParts(a, b, m_reached, false));
+  }
   m_trees = treesOf(
       a, b, reach.distance + reach.lists + m_reach.error + a.tree.lag() + b.tree.lag(), false);
 }
@@ -186,19 +230,35 @@ void KeptPairs::makeParts(const Body& a, const Body& b) {
   m_units.clear();
   m_partsA.make(a);
   if (&a != &b) m_partsB.make(b);
-  m_rangeCountA = PieceMotion::pieceCount(a.mesh.now.size());
-  m_rangeCountB = PieceMotion::pieceCount(b.mesh.now.size());
   m_lists = m_classes = {};
 }
 
-/// Makes the units of the parts that are near each other now. Those that there were before keep
-/// their lists.
-void KeptPairs::makeUnits(const Body& a, const Body& b) {
+CountedVector<KeptPairs::PartPair> KeptPairs::nearParts(const Body& a, const Body& b,
+                                                        double reached, bool cut) const {
   const bool self = &a == &b;
-  const double reached = m_reach.distance + (1.0 + kUnitMargins) * m_reach.lists;
+  const Parts& partsB = self ? m_partsA : m_partsB;
   const TreePair trees =
       treesOf(a, b, reached + m_reach.error + a.tree.lag() + b.tree.lag(), false);
-  const auto &partsA = m_partsA.nodes, &partsB = self ? m_partsA.nodes : m_partsB.nodes;
+  CountedVector<std::uint32_t> all(partsB.nodes.size()), ofCut;
+  std::iota(all.begin(), all.end(), 0u);
+  for (const std::uint32_t j : all)
+    if (partsB.isCut[j]) ofCut.push_back(j);
+  CountedVector<PartPair> near;
+  for (std::uint32_t i = 0; i < m_partsA.nodes.size(); ++i) {
+    FloatBox box = trees.a->box(m_partsA.nodes[i] & ~NodePair::kOwn);
+    for (std::size_t k = 0; k < 3; ++k) {
+      box.lower[k] = OutwardRounding::down(box.lower[k] + trees.shiftLower[k]);
+      box.upper[k] = OutwardRounding::up(box.upper[k] + trees.shiftUpper[k]);
+    }
+    for (const std::uint32_t j : cut && !m_partsA.isCut[i] ? ofCut : all)
+      if ((!self || j >= i) && box.overlaps(trees.b->box(partsB.nodes[j] & ~NodePair::kOwn)))
+        near.push_back({i, j});
+  }
+  return near;
+}
+
+/// Makes units of these pairs of parts. Those that there were before keep their lists.
+void KeptPairs::makeUnits(const CountedVector<PartPair>& pairs) {
   std::swap(m_units, m_formerUnits);
   m_units.clear();
   CountedVector<Unit>& former = m_formerUnits;
@@ -214,28 +274,42 @@ void KeptPairs::makeUnits(const Body& a, const Body& b) {
     unit.near.clear();
     return unit;
   };
-  for (std::uint32_t i = 0; i < partsA.size(); ++i) {
-    FloatBox box = trees.a->box(partsA[i] & ~NodePair::kOwn);
-    for (std::size_t k = 0; k < 3; ++k) {
-      box.lower[k] = OutwardRounding::down(box.lower[k] + trees.shiftLower[k]);
-      box.upper[k] = OutwardRounding::up(box.upper[k] + trees.shiftUpper[k]);
-    }
-    for (std::uint32_t j = self ? i : 0; j < partsB.size(); ++j) {
-      if (!box.overlaps(trees.b->box(partsB[j] & ~NodePair::kOwn))) continue;
-      const auto isBefore = [&](const Unit& unit) {
-        return unit.partA != i ? unit.partA < i : unit.partB < j;
-      };
-      while (old < former.size() && isBefore(former[old])) ++old;
-      const bool isKept = old < former.size() && former[old].partA == i && former[old].partB == j;
-      m_units.push_back(isKept ? std::move(former[old++]) : newUnit());
-      m_units.back().partA = i;
-      m_units.back().partB = j;
-    }
+  for (const PartPair& pair : pairs) {
+    while (old < former.size() && former[old].parts() < pair) ++old;
+    const bool isKept = old < former.size() && former[old].parts() == pair;
+    m_units.push_back(isKept ? std::move(former[old++]) : newUnit());
+    m_units.back().partA = pair[0];
+    m_units.back().partB = pair[1];
   }
-  m_reached = reached;
-  m_moved = 0.0;
   for (Turn* turn : {&m_lists, &m_classes})
     if (turn->next >= m_units.size()) turn->next = 0;
+}
+
+/// After a cut that kept the nodes: lists of parts with elements at the cut are missing, and such
+/// parts have units with all that are near them now.
+void KeptPairs::cutUnits(const Body& a, const Body& b) {
+  const bool self = &a == &b;
+  if (m_partsA.areOf(a) && (self || m_partsB.areOf(b))) return;
+  Parts& partsB = self ? m_partsA : m_partsB;
+  for (Parts* parts : {&m_partsA, &partsB})
+    std::fill(parts->isCut.begin(), parts->isCut.end(), std::uint8_t{0});
+  if (!m_partsA.areOf(a)) m_partsA.cut(a);
+  if (!self && !m_partsB.areOf(b)) m_partsB.cut(b);
+  const auto isCut = [&](std::uint32_t i, std::uint32_t j) {
+    return m_partsA.isCut[i] || partsB.isCut[j];
+  };
+  // Further apart than m_reached, less m_moved, are all pairs of parts without a unit.
+  const CountedVector<PartPair> near = nearParts(a, b, m_reached, true);
+  CountedVector<PartPair> former, others;
+  for (Unit& unit : m_units) {
+    const bool cut = isCut(unit.partA, unit.partB);
+    (cut ? former : others).push_back(unit.parts());
+    if (cut) unit.movedSinceLists = std::numeric_limits<double>::infinity();
+  }
+  if (near == former) return;
+  CountedVector<PartPair> all(near.size() + others.size());
+  std::merge(near.begin(), near.end(), others.begin(), others.end(), all.begin());
+  makeUnits(all);
 }
 
 /// Units whose lists or classes no longer reach far enough, and those whose turn it is.
@@ -312,11 +386,20 @@ void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch
   }
 }
 
-std::size_t KeptPairs::countCandidates(const MeshTopology& a, const MeshTopology& b) const {
+std::size_t KeptPairs::countCandidates(const MeshTopology& a, const CutsSince& cutsOfA,
+                                       const MeshTopology& b, const CutsSince& cutsOfB) const {
+  const auto verticesOf = [](const MeshTopology& topology, const CutsSince& cuts,
+                             std::uint32_t element) -> const Triangle& {
+    const Triangle& now = topology.elements[element];
+    if (cuts.gone.empty() || now != Triangle{}) return now;
+    const auto found =
+        std::lower_bound(cuts.gone.begin(), cuts.gone.end(), std::pair(element, Triangle{}));
+    return found != cuts.gone.end() && found->first == element ? found->second : now;
+  };
   std::size_t count = 0;
   for (const Unit& unit : m_units)
     for (const ElementPair& pair : unit.boxes)
-      count += overlap(a.elements[pair.a], b.elements[pair.b]);
+      count += overlap(verticesOf(a, cutsOfA, pair.a), verticesOf(b, cutsOfB, pair.b));
   return count;
 }
 
@@ -370,6 +453,9 @@ void KeptPairs::make(Unit& unit, const MeshPair& meshes, JobScratch& scratch) {
   const auto found = scratch.sink.kept();
   resizeSparingly(unit.boxes, found.size());
   std::copy(found.begin(), found.end(), unit.boxes.begin());
+  unit.last = {};
+  for (const ElementPair& pair : unit.boxes)
+    unit.last = {std::max(unit.last[0], pair.a), std::max(unit.last[1], pair.b)};
   unit.atLists = m_reach;
   sort(unit, meshes, unit.boxes, scratch);
   unit.movedSinceLists = 0.0;

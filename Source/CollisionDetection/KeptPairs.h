@@ -33,6 +33,9 @@ namespace palpate {
 /// motion since they were sorted it follows which classes may hold contacts now; only these are
 /// tested. They are sorted again more often than the lists are made.
 ///
+/// A cut that keeps the nodes of the octree keeps the lists of all parts without elements at the
+/// cut.
+///
 /// Docs/Algorithms/LooseOctree.md has the argument.
 class KeptPairs {
  public:
@@ -52,8 +55,8 @@ class KeptPairs {
   bool isActive() const { return m_isActive; }
   /// The lists are not kept up to date any more. Their memory is kept.
   void deactivate() { m_isActive = false; }
-  /// Call after each PieceMotion::advanceTo() of either body while the lists are active. The two
-  /// are one object in self-collision.
+  /// Call after each PieceMotion::advanceTo() of either body while the lists are active, which end
+  /// with other elements unless those are of a cut. The two are one object in self-collision.
   void addMotion(const PieceMotion& a, const PieceMotion& b);
 
   /// Begins a detection by lists alone, and activates them. Lists that are missing are made.
@@ -63,6 +66,8 @@ class KeptPairs {
   /// missing after about `detections` like it, and few in the first one.
   std::size_t startGathering(const Body& a, const Body& b, const Reach&, std::size_t detections,
                              std::size_t mostJobs);
+  /// Whether the parts are of the present octrees, or of those before the last cut.
+  bool fits(const Body& a, const Body& b) const;
   /// Whether the lists are active and none is missing.
   bool isWhole() const;
   /// ns: about what it will cost to make the lists again in turn, in each detection, at a relative
@@ -75,19 +80,24 @@ class KeptPairs {
   /// After startGathering(): makes the lists of a job.
   void gather(std::size_t job, const MeshPair&, JobScratch&);
   /// Element pairs of a job, which has run: its candidates, and some whose boxes do not overlap.
+  /// first: only lists with elements from these ids on.
   template <class Use>
-  void forEachList(std::size_t job, Use&& use) const {
+  void forEachList(std::size_t job, const std::array<std::uint32_t, 2>& first, Use&& use) const {
     PALPATE_ASSERT(m_isActive && job + 1 < m_jobs.size());
     for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
-      use(std::span<const ElementPair>(m_units[i].boxes));
+      if (m_units[i].last[0] >= first[0] || m_units[i].last[1] >= first[1])
+        use(std::span<const ElementPair>(m_units[i].boxes));
   }
   /// The number of candidates of all jobs, while the floats are those of this detection. In
-  /// self-collision it may be off by pairs whose boxes are at the distance within rounding.
-  std::size_t countCandidates(const MeshTopology& a, const MeshTopology& b) const;
+  /// self-collision it may be off by pairs whose boxes are at the distance within rounding. cuts:
+  /// since the detection.
+  std::size_t countCandidates(const MeshTopology& a, const CutsSince& cutsOfA,
+                              const MeshTopology& b, const CutsSince& cutsOfB) const;
   void releaseMemory() { *this = KeptPairs(); }
 
  private:
   static constexpr int kClasses = 8;  ///< within Reach::classes
+  using PartPair = std::array<std::uint32_t, 2>;
 
   struct Unit {
     std::uint32_t partA = 0, partB = 0;
@@ -97,7 +107,9 @@ class KeptPairs {
     Reach atLists{}, atClasses{};
     Buffer<ElementPair> boxes, near;
     std::array<std::uint32_t, kClasses> ends{};  ///< of the classes in `near`; the rest is further
+    std::array<std::uint32_t, 2> last{};         ///< the highest ids in `boxes`
     bool isMade = false, isSorted = false;       ///< false: in this detection
+    PartPair parts() const { return {partA, partB}; }
     bool isListed() const { return movedSinceLists < std::numeric_limits<double>::infinity(); }
     double weight() const { return static_cast<double>(boxes.size()) + 16.0; }
     double weightOfClasses() const { return static_cast<double>(near.size()) + 4.0; }
@@ -110,7 +122,11 @@ class KeptPairs {
 
   void startUnits(const Body& a, const Body& b, const Reach&);
   void makeParts(const Body& a, const Body& b);
-  void makeUnits(const Body& a, const Body& b);
+  /// Ascending pairs of parts whose boxes are within `reached` now. cut: only those that a cut
+  /// changed, with all others.
+  CountedVector<PartPair> nearParts(const Body& a, const Body& b, double reached, bool cut) const;
+  void makeUnits(const CountedVector<PartPair>&);
+  void cutUnits(const Body& a, const Body& b);
   void chooseUnits();
   template <class IsDone, class Weight>
   void takeTurns(Turn&, IsDone&&, Weight&&);
@@ -124,19 +140,23 @@ class KeptPairs {
 
   /// The nodes of an octree that hold all of its elements, each once.
   struct Parts {
-    CountedVector<OctreeNode> nodes;   ///< as NodePair has them
-    IndexLists pieces;                 ///< of PieceMotion, for each node
-    CountedVector<MotionRange> moved;  ///< of each node, since the last detection
-    std::uint64_t layout = 0;          ///< Octree::layout() of the nodes
+    CountedVector<OctreeNode> nodes;    ///< as NodePair has them
+    IndexLists pieces;                  ///< of PieceMotion, for each node
+    CountedVector<MotionRange> moved;   ///< of each node, since the last detection
+    std::uint64_t layout = 0;           ///< Octree::layout() of the nodes
+    CountedVector<std::uint8_t> isCut;  ///< those that cut() changed
     void make(const Body&);
+    bool areOf(const Body& body) const { return layout == body.tree.octree().layout(); }
+    /// Whether a cut made the present octree of the parts' one.
+    bool canCut(const Body&) const;
+    void cut(const Body&);
     MotionRange addMotion(const PieceMotion&);
   };
 
   bool m_isActive = false;
-  CountedVector<Unit> m_units;                       ///< ascending parts
-  CountedVector<Unit> m_formerUnits;                 ///< their buffers are used again
-  Parts m_partsA, m_partsB;                          ///< of one mesh with itself, m_partsA only
-  std::size_t m_rangeCountA = 0, m_rangeCountB = 0;  ///< PieceMotion::ranges()
+  CountedVector<Unit> m_units;        ///< ascending parts
+  CountedVector<Unit> m_formerUnits;  ///< their buffers are used again
+  Parts m_partsA, m_partsB;           ///< of one mesh with itself, m_partsA only
   double m_reached = 0;  ///< L: further apart, less m_moved, are all pairs of parts without a unit
   double m_moved = 0;    ///< L: the relative motion of all since the units were made
   Turn m_lists, m_classes;

@@ -104,10 +104,11 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   const bool anyDisabled = m_record->anyDisabled();
   // Those that meet at the step's start have boxes within the motion at its end, and are listed.
   if (meshes.step.checksStart)
-    m_record->kept.forEachList(job, [&](std::span<const ElementPair> pairs) {
-      scratch.forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
-                          [&](const auto& part) { checkStart(meshes, part, scratch); });
-    });
+    m_record->kept.forEachList(
+        job, meshes.step.apartBelow, [&](std::span<const ElementPair> pairs) {
+          scratch.forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
+                              [&](const auto& part) { checkStart(meshes, part, scratch); });
+        });
   if (anyDisabled) {
     enabled(scratch.near, scratch.kept);
     scratch.near.swap(scratch.kept);

@@ -40,8 +40,10 @@ void OctreeBasedCD::Implementation::countCandidates() {
   const std::lock_guard lock(filling);
   for (const auto& record : pairs.records()) {
     if (!std::exchange(record->countIsPending, false)) continue;
+    const Geometry &a = *record->a, &b = *record->b;
     const std::size_t count =
-        record->kept.countCandidates(record->a->body.mesh.topology, record->b->body.mesh.topology);
+        record->kept.countCandidates(a.body.mesh.topology, a.step.cutsSinceDetection(),
+                                     b.body.mesh.topology, b.step.cutsSinceDetection());
     record->statistics.candidatePairs += count;
     statistics.candidatePairs += count;
   }

@@ -110,7 +110,9 @@ struct OctreeBasedCD::Implementation {
   template <class F>
   auto cutTopology(GeometryId geometry, F&& call) {
     return withinLimit([&] {
-      countCandidates();
+      if (const Geometry* changed = geometries.find(geometry);
+          changed && !changed->step.continuesCuts(changed->body.revisions.elements))
+        countCandidates();
       ChangedLists near;
       GeometryTable::CutPreparation prepare;
       if (pairs.needsNearAtRest(geometry))

@@ -39,6 +39,7 @@ struct PairRecord : CountedObject {
   KeptPairs kept;
   bool keeps = false;                  ///< this frame's candidates are those of `kept`
   bool gathers = false;                ///< they are searched, and some go to `kept`
+  bool followsCut = false;             ///< elements are others than those of the last detection
   bool countIsPending = false;         ///< the candidates of `kept` were not counted yet
   int slowFrames = 0;                  ///< consecutive detections in which candidates could be kept
   double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest that was slow

@@ -92,7 +92,15 @@ void planKeptPairs(const GeometryTable& geometries,
     const std::array elements{record->a->body.revisions.elements,
                               record->b->body.revisions.elements};
     // Other enabled elements own other features.
-    if (!mayKeep || record->keptElements != elements) record->kept.deactivate();
+    const auto isCut = [&](const Geometry& geometry, const ElementsState& last) {
+      const CutsSince& cuts = geometry.step.cutsSinceDetection();
+      return cuts.before == last && cuts.after == geometry.body.revisions.elements;
+    };
+    record->followsCut = record->keptElements != elements;
+    for (std::size_t i = 0; i < 2; ++i)
+      if (!mayKeep || (record->keptElements[i] != elements[i] &&
+                       !isCut(i == 0 ? *record->a : *record->b, record->keptElements[i])))
+        record->kept.deactivate();
     record->keptElements = elements;
     record->keeps = mayKeep && record->kept.isWhole();
     record->gathers = mayKeep && !record->keeps;
@@ -114,12 +122,22 @@ void planKeptPairs(const GeometryTable& geometries,
 
 bool reviewKeptPairs(PairRecord& record) {
   const PairPlan& plan = record.plan;
-  if (!(record.keeps || record.gathers) ||
-      (canKeep(record) && !plan.runsIntersection && !plan.startsIntersecting))
+  const auto stops = [&] {
+    record.keeps = false;
+    record.a->mayLag = record.b->mayLag = false;
+    return record.a->body.tree.isLagging() || record.b->body.tree.isLagging();
+  };
+  if ((record.keeps || record.gathers) &&
+      !(canKeep(record) && !plan.runsIntersection && !plan.startsIntersecting)) {
+    record.gathers = false;
+    return stops();
+  }
+  // A cut after which an octree was built anew.
+  if (!record.keeps || !record.followsCut || record.kept.fits(record.a->body, record.b->body))
     return false;
-  record.keeps = record.gathers = false;
-  record.a->mayLag = record.b->mayLag = false;
-  return record.a->body.tree.isLagging() || record.b->body.tree.isLagging();
+  record.kept.deactivate();
+  record.gathers = true;
+  return stops();
 }
 
 /// ns: about what an update and a search cost in a detection.

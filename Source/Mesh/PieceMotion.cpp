@@ -10,14 +10,15 @@ namespace palpate {
 void PieceMotion::advanceTo(const Positions& now) {
   const std::size_t size = now.size();
   m_ranges.resize(pieceCount(size));
-  const bool isKnown = m_to && m_to->size() == size;
-  m_from = isKnown ? m_to->bodyRevision() : now.bodyRevision();
-  if (isKnown && !m_to->hasSameBody(now)) {
+  m_isKnown = m_to && m_to->size() <= size;
+  m_from = m_isKnown ? m_to->bodyRevision() : now.bodyRevision();
+  if (m_isKnown && !m_to->hasSameBody(now)) {
     const auto before = m_to->body(), after = now.body();
     const VertexRange changed =
         now.changesSince(m_to->bodyRevision()).value_or(VertexRange{0, size});
     for (std::size_t piece = 0; piece < m_ranges.size(); ++piece) {
-      const std::size_t begin = piece * kPiece, count = std::min(kPiece, size - begin);
+      const std::size_t begin = std::min(piece * kPiece, before.size()),
+                        count = std::min(kPiece, before.size() - begin);
       m_ranges[piece] = changed.overlaps({begin, begin + count})
                             ? motionRange(before.subspan(begin, count), after.subspan(begin, count))
                             : MotionRange{.isEmpty = false};

@@ -23,15 +23,19 @@ class PieceMotion {
 
   /// Call before advanceTo(), which then does not throw.
   void reserve(std::size_t vertices) { m_ranges.reserve(pieceCount(vertices)); }
-  /// Measures the motion from the positions that were given last, which had as many vertices.
-  /// Without any, all is still.
+  /// Measures the motion from the positions that were given last. Vertices that were appended since
+  /// then are still. Without any positions, or with more of them before, all is.
   /// Cost     reads both positions once; none where they are the same.
   void advanceTo(const Positions& now);
   /// Forgets the positions, so that their memory can be used again.
   void forget() { m_to.reset(); }
+  bool isAt(const Positions& positions) const { return m_to && m_to->hasSameBody(positions); }
+  /// Takes these in the place of those that were given last, to which vertices were appended.
+  void continueAt(const Positions& appended) noexcept { m_to = appended; }
 
   Revision from() const { return m_from; }  ///< the bodies of the last advanceTo()
   Revision to() const { return m_to ? m_to->bodyRevision() : Revision(); }
+  bool isKnown() const { return m_isKnown; }                        ///< the motion was measured
   std::span<const MotionRange> ranges() const { return m_ranges; }  ///< of each piece
   MotionRange of(std::span<const std::uint32_t> pieces) const {
     MotionRange all;
@@ -42,6 +46,7 @@ class PieceMotion {
  private:
   std::optional<Positions> m_to;
   Revision m_from;
+  bool m_isKnown = false;
   CountedVector<MotionRange> m_ranges;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <utility>
 
 namespace palpate {
 
@@ -47,6 +48,8 @@ struct PositionsState {
 struct CutsSince {
   ElementsState before, after;   ///< the elements before the first of these cuts, and now
   std::uint32_t firstAdded = 0;  ///< elements from here on are new
+  /// Elements that are no more, ascending, with their vertices.
+  CountedVector<std::pair<std::uint32_t, std::array<std::uint32_t, 3>>> gone{};
   /// Positions to which vertices were appended: their revisions now and before these cuts.
   CountedVector<std::array<Revision, 2>> positions{};
   Revision positionsBefore(Revision now) const {

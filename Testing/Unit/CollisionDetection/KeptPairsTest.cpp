@@ -79,7 +79,10 @@ class KeptAndSearched {
       for (const auto& [a, b] : scene.pairs)
         object.addCollisionPair(m_ids[a], m_ids[b], scene.settings);
     });
-    for (const TestGeometry& body : scene.bodies) m_positions.push_back(body.positions);
+    for (const TestGeometry& body : scene.bodies) {
+      m_positions.push_back(body.positions);
+      m_triangles.push_back(body.triangles);
+    }
   }
   template <class F>
   void forBoth(F&& f) {
@@ -98,6 +101,46 @@ class KeptAndSearched {
       m_positions[body][v] += randomPoint(random, -length, length);
     forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
   }
+  /// Splits up to four triangles with consecutive ids at new vertices, and removes one of them.
+  void cut(Random& random, std::size_t body) { cut(body, random() % m_triangles[body].size(), 4); }
+  void cut(std::size_t body, std::size_t first, std::size_t count) {
+    const std::vector<Triangle>& triangles = m_triangles[body];
+    const Positions& p = m_positions[body];
+    std::vector<std::uint32_t> removed;
+    std::vector<Triangle> added;
+    std::vector<Vector3d> middles;
+    for (std::size_t id = first; id < std::min(first + count, triangles.size()); ++id) {
+      const auto [u, v, w] = triangles[id];
+      if (u == v) continue;
+      removed.push_back(static_cast<std::uint32_t>(id));
+      if (id == first + 2) continue;
+      const auto middle = static_cast<std::uint32_t>(p.size() + middles.size());
+      middles.push_back((p[u] + p[v] + p[w]) / 3.0);
+      for (const Triangle& t : {Triangle{u, v, middle}, {v, w, middle}, {w, u, middle}})
+        added.push_back(t);
+    }
+    replace(body, removed, added, middles);
+  }
+  void replace(std::size_t body, const std::vector<std::uint32_t>& removed,
+               const std::vector<Triangle>& added, const std::vector<Vector3d>& positions) {
+    forBoth([&](OctreeBasedCD& object) {
+      object.replaceTriangles(m_ids[body], removed, added, positions);
+    });
+    std::vector<Triangle>& triangles = m_triangles[body];
+    for (const std::uint32_t id : removed) triangles[id] = {0, 0, 0};
+    triangles.insert(triangles.end(), added.begin(), added.end());
+    m_positions[body].insert(m_positions[body].end(), positions.begin(), positions.end());
+  }
+  /// Vertices from this one on.
+  void lift(std::size_t body, std::size_t first, double height) {
+    for (std::size_t v = first; v < m_positions[body].size(); ++v)
+      m_positions[body][v].z() += height;
+    forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
+  }
+  std::size_t vertexCount(std::size_t body) const { return m_positions[body].size(); }
+  void detectOnly() {
+    forBoth([](OctreeBasedCD& object) { object.detectCollision(); });
+  }
   void detect() {
     forBoth([](OctreeBasedCD& object) { object.detectCollision(); });
     const OctreeBasedCD &kept = m_objects[0], &searched = m_objects[1];
@@ -113,22 +156,27 @@ class KeptAndSearched {
       EXPECT_EQ(of.displacement, expected.displacement);
       EXPECT_EQ(of.untrustedVerticesA, expected.untrustedVerticesA);
       EXPECT_EQ(of.untrustedVerticesB, expected.untrustedVerticesB);
-      if (!m_asksStatistics) continue;
-      // With itself, rounding may decide for some pairs.
-      EXPECT_NEAR(static_cast<double>(kept.pairStatistics(pair.a, pair.b).candidatePairs),
-                  static_cast<double>(searched.pairStatistics(pair.a, pair.b).candidatePairs),
-                  pair.a == pair.b ? 4.0 : 0.0);
     }
+    if (m_asksStatistics) compareStatistics();
     EXPECT_EQ(kept.statistics().contacts, searched.statistics().contacts);
     m_tested[0] += kept.statistics().featurePairs;
     m_tested[1] += searched.statistics().featurePairs;
     m_contacts += searched.statistics().contacts;
+  }
+  void compareStatistics() const {
+    const OctreeBasedCD &kept = m_objects[0], &searched = m_objects[1];
+    // With itself, rounding may decide for some pairs.
+    for (const CollisionPair& pair : searched.pairs())
+      EXPECT_NEAR(static_cast<double>(kept.pairStatistics(pair.a, pair.b).candidatePairs),
+                  static_cast<double>(searched.pairStatistics(pair.a, pair.b).candidatePairs),
+                  pair.a == pair.b ? 4.0 : 0.0);
   }
   void advance() {
     forBoth([](OctreeBasedCD& object) { object.advance(); });
   }
   void setTopology(std::size_t body, const Mesh& mesh) {
     m_positions[body] = mesh.positions;
+    m_triangles[body] = mesh.triangles;
     forBoth([&](OctreeBasedCD& object) {
       object.setTriangles(m_ids[body], mesh.positions, mesh.triangles);
     });
@@ -148,6 +196,7 @@ class KeptAndSearched {
   std::vector<OctreeBasedCD> m_objects;
   std::vector<GeometryId> m_ids;
   std::vector<Positions> m_positions;
+  std::vector<std::vector<Triangle>> m_triangles;  ///< {0, 0, 0}: removed
   std::array<std::size_t, 2> m_tested{};
   std::size_t m_contacts = 0;
   bool m_asksStatistics = true;
@@ -192,6 +241,12 @@ TEST_P(KeptPairs, ChangesBetweenFramesHaveTheAnswersOfASearch) {
         both.move(random, body, 0.002 * edge);
     }
     switch (frame % 40) {
+      case 6:
+      case 7:
+      case 20:
+        if (GetParam().bodies[0].type == GeometryType::Triangles)
+          for (int i = 0; i < frame % 3; ++i) both.cut(random, 0);
+        break;
       case 11:  // octrees are updated to other positions, to which the body does not return
         both.move(random, 0, 0.3 * edge);
         both.kept().queries().closestPoint(both.id(0), {0.5, 0.5, 0.5});
@@ -233,10 +288,10 @@ TEST_P(KeptPairs, ChangesBetweenFramesHaveTheAnswersOfASearch) {
 }
 
 /// Slow frames until candidates are kept.
-void runUntilKept(KeptAndSearched& both, Random& random, double edge) {
+void runUntilKept(KeptAndSearched& both, Random& random, double edge, std::size_t body = 1) {
   for (int frame = 0; frame < 30; ++frame) {
     both.advance();
-    both.move(random, 1, 0.001 * edge);
+    both.move(random, body, 0.001 * edge);
     both.detect();
   }
   EXPECT_TRUE(both.testsFewer());
@@ -257,6 +312,124 @@ TEST(KeptPairsOfTwoSheets, ListsAreMadeAlongWithSearches) {
   }
   EXPECT_GT(searches, 8);
   EXPECT_LT(searches, 25);
+}
+
+/// Sheets of several parts, the second one above the first one, the third one close below it.
+SlowScene largeSheets(double distance, double thickness) {
+  SlowScene scene = slowScenes().front();
+  scene.bodies = {sheetAt(48, 0.5, 0.0), sheetAt(48, 0.5 + distance, 0.0), sheetAt(48, 0.49, 0.0)};
+  scene.pairs = {{0, 1}, {0, 2}};
+  scene.edge = 1.0 / 48;
+  scene.settings.thickness = thickness;
+  return scene;
+}
+
+TEST(KeptPairsOfTwoSheets, CutsKeepTheListsOfOtherElements) {
+  for (const int threads : {1, 4}) {
+    Random random(10);
+    SlowScene scene = largeSheets(0.02, 0.008);
+    scene.pairs = {{0, 1}, {1, 1}};
+    scene.bodies[1] = sheetAt(48, 0.52, 1.0);
+    KeptAndSearched both(scene, threads);
+    PairSettings ofOne = scene.settings;
+    ofOne.restDistance = 0.03;
+    both.forBoth(
+        [&](OctreeBasedCD& object) { object.setPairSettings(both.id(1), both.id(1), ofOne); });
+    both.setAsksStatistics(false);
+    runUntilKept(both, random, scene.edge);
+    int frames = 0, fewer = 0;
+    for (int frame = 0; frame < casesOf(80); ++frame) {
+      SCOPED_TRACE("frame " + std::to_string(frame));
+      both.advance();
+      if (frame % 5 == 4) both.move(random, 1, 0.001 * scene.edge);
+      for (int i = 0; i < frame % 4 - 1; ++i) both.cut(random, random() % 2);
+      if (frame % 16 == 3) both.kept().queries().closestPoint(both.id(1), {0.5, 0.5, 0.5});
+      if (frame % 5 != 4) both.move(random, 1, 0.001 * scene.edge);
+      if (frame % 3 == 2) both.move(random, 0, 0.001 * scene.edge);
+      both.detect();
+      if (HasFailure()) return;
+      ++frames, fewer += both.testsFewer();
+    }
+    EXPECT_GT(4 * fewer, 3 * frames) << threads << " threads";
+  }
+}
+
+TEST(KeptPairsOfTwoSheets, CutsGiveFeaturesToElementsOfOtherParts) {
+  Random random(11);
+  const SlowScene scene = largeSheets(0.01, 0.011);
+  KeptAndSearched both(scene, 1);
+  runUntilKept(both, random, scene.edge);
+  for (int frame = 0; frame < casesOf(15); ++frame) {
+    both.advance();
+    for (int i = 0; i < 20; ++i) both.cut(random, random() % 2);
+    both.detect();
+    if (HasFailure()) return;
+    EXPECT_TRUE(both.testsFewer());
+  }
+}
+
+TEST(KeptPairsOfTwoSheets, MotionDuringCutsCounts) {
+  Random random(12);
+  const double distance = 0.08;
+  const SlowScene scene = largeSheets(distance, 0.004);
+  KeptAndSearched both(scene, 1);
+  runUntilKept(both, random, scene.edge, 0);
+  const double step = 0.03 * scene.edge;
+  for (int frame = 0; frame * step < distance; ++frame) {
+    both.advance();
+    both.cut(1, 4 * static_cast<std::size_t>(frame), 4);
+    both.lift(1, 0, -step);
+    both.detect();
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(both.contacts(), 0u);
+}
+
+TEST(KeptPairsOfTwoSheets, NewVerticesMoveByThemselves) {
+  Random random(13);
+  const double distance = 0.03;
+  const SlowScene scene = largeSheets(distance, 0.004);
+  KeptAndSearched both(scene, 1);
+  runUntilKept(both, random, scene.edge, 0);
+  const std::size_t first = both.vertexCount(0);
+  both.cut(0, 2000, 4);
+  const double step = 0.01 * scene.edge;
+  for (int frame = 0; frame * step < distance; ++frame) {
+    both.advance();
+    both.lift(0, first, step);
+    both.detect();
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(both.contacts(), 0u);
+}
+
+TEST(KeptPairsOfTwoSheets, ANewTriangleMayReachFar) {
+  Random random(14);
+  const SlowScene scene = largeSheets(0.08, 0.004);
+  for (const bool pierces : {false, true}) {
+    KeptAndSearched both(scene, 1);
+    runUntilKept(both, random, scene.edge, 0);
+    both.advance();
+    const auto tip = static_cast<std::uint32_t>(both.vertexCount(0));
+    both.replace(0, {0}, {{0, 1, tip}}, {{0.45, 0.45, pierces ? 0.6 : 0.57}});
+    both.detect();
+    EXPECT_TRUE(both.testsFewer());
+    both.advance();
+    both.move(random, 1, 0.001 * scene.edge);
+    both.detect();
+  }
+}
+
+TEST(KeptPairsOfTwoSheets, CandidatesAreCountedAfterCuts) {
+  Random random(15);
+  const SlowScene scene = largeSheets(0.01, 0.004);
+  KeptAndSearched both(scene, 1);
+  runUntilKept(both, random, scene.edge);
+  both.advance();
+  both.move(random, 1, 0.001 * scene.edge);
+  both.detectOnly();
+  for (int i = 0; i < 5; ++i) both.cut(random, random() % 2);
+  both.compareStatistics();
 }
 
 /// The octree of a body that lags has outdated boxes, by which its motion must not be measured.
