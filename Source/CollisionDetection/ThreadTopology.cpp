@@ -15,11 +15,7 @@
 
 namespace palpate {
 
-namespace {
-
-using Cause = ThreadEvent::Cause;
-
-struct Watch {
+struct ThreadWatch {
   VertexPath thread, loop;  ///< or two parts of threads
   bool isOfParts = false;
   std::vector<Segment> threadEdges, loopEdges;  ///< whose loss is that of the paths
@@ -28,6 +24,10 @@ struct Watch {
   /// Of parts: their positions after the last update(); at the start of its step.
   std::vector<Eigen::Vector3d> end{}, start{};
 };
+
+namespace {
+
+using Cause = ThreadEvent::Cause;
 
 constexpr std::array<std::uint32_t, 2> kNone{kNoElement, kNoElement};
 
@@ -132,7 +132,7 @@ bool areEdgesOf(const VertexPath& path, const std::vector<Segment>& edges) {
 }
 
 template <class File>
-void describeWatch(File& file, Watch& watch) {
+void describeWatch(File& file, ThreadWatch& watch) {
   description::fieldOf(file, watch.isOfParts);
   for (VertexPath* path : {&watch.thread, &watch.loop}) {
     file.integer(path->geometry);
@@ -180,7 +180,7 @@ void describeEvent(File& file, ThreadEvent& event) {
 
 struct ThreadTopology::Implementation {
   std::shared_ptr<StepSource> source;
-  std::vector<Watch> watches;
+  std::vector<ThreadWatch> watches;
   std::vector<ThreadEvent> events;
   std::size_t eventsBefore = 0;       ///< number of events before the step of the last update()
   std::optional<std::uint64_t> step;  ///< of the last update()
@@ -194,7 +194,8 @@ struct ThreadTopology::Implementation {
 
   template <class File>
   void describe(File& file) {
-    description::itemsOf(file, watches, 32, [&](Watch& watch) { describeWatch(file, watch); });
+    description::itemsOf(file, watches, 32,
+                         [&](ThreadWatch& watch) { describeWatch(file, watch); });
     description::itemsOf(file, events, 41, [&](ThreadEvent& event) { describeEvent(file, event); });
     file.integer(eventsBefore);
     description::optionalOf(file, step, [&](std::uint64_t& number) { file.integer(number); });
@@ -204,7 +205,7 @@ struct ThreadTopology::Implementation {
                                 [&](const ThreadEvent& e) { return e.index < watches.size(); }),
                 "an event names a thread that does not exist");
   }
-  const Watch& at(std::size_t index) const {
+  const ThreadWatch& at(std::size_t index) const {
     if (index >= watches.size())
       throw Error(ErrorCode::IndexOutOfRange, "ThreadTopology: index " + std::to_string(index) +
                                                   " is out of range; add() was "
@@ -212,7 +213,7 @@ struct ThreadTopology::Implementation {
                                                   std::to_string(watches.size()) + " times");
     return watches[index];
   }
-  void copy(const Watch& watch) {
+  void copy(const ThreadWatch& watch) {
     const GeometryTable& geometries = source->geometries();
     copyVertices(geometries.at(watch.thread.geometry), watch.thread, thread);
     copyVertices(geometries.at(watch.loop.geometry), watch.loop, loop);
@@ -252,7 +253,7 @@ std::size_t ThreadTopology::Implementation::add(const VertexPath& ofThread,
   const auto edges = [&](const VertexPath& path, bool isClosed) {
     return edgesOf(geometries.at(path.geometry).body.mesh.topology, path, isClosed);
   };
-  Watch watch{ofThread, ofLoop, isOfParts, edges(ofThread, false), edges(ofLoop, !isOfParts)};
+  ThreadWatch watch{ofThread, ofLoop, isOfParts, edges(ofThread, false), edges(ofLoop, !isOfParts)};
   copy(watch);
   if (isOfParts) {
     forEachVertex([&](const PathVertex& vertex) { watch.end.push_back(vertex.at[0]); });
@@ -267,7 +268,7 @@ std::size_t ThreadTopology::Implementation::add(const VertexPath& ofThread,
 int ThreadTopology::Implementation::follow(std::size_t index, int count,
                                            const std::vector<Eigen::Vector3d>& start,
                                            std::uint64_t now) {
-  const Watch& watch = watches[index];
+  const ThreadWatch& watch = watches[index];
   const GeometryTable& geometries = source->geometries();
   const std::optional<Cause> losses[] = {
       lossOf(watch.thread, watch.threadEdges, geometries.find(watch.thread.geometry)),
@@ -343,7 +344,7 @@ void ThreadTopology::update() {
   own.nextCounts.assign(size, 0);
   own.nextLost.assign(size, false);
   for (std::size_t i = 0; i < size; ++i) {
-    const Watch& watch = own.watches[i];
+    const ThreadWatch& watch = own.watches[i];
     own.nextLost[i] = isRepeated ? watch.wasLost : watch.isLost;
     if (!own.nextLost[i])
       own.nextCounts[i] = own.follow(i, isRepeated ? watch.countBefore : watch.count,
@@ -355,7 +356,7 @@ void ThreadTopology::update() {
   own.events.insert(own.events.end(), own.nextEvents.begin(), own.nextEvents.end());
   own.eventsBefore = kept;
   for (std::size_t i = 0; i < size; ++i) {
-    Watch& watch = own.watches[i];
+    ThreadWatch& watch = own.watches[i];
     if (!isRepeated) {
       watch.countBefore = watch.count, watch.wasLost = watch.isLost;
       watch.start.swap(watch.end);

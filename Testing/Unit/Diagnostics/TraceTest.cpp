@@ -120,7 +120,9 @@ TEST_F(TraceFile, HasTheLastFramesWithNestedEvents) {
         std::vector<long long> open;
         for (const Event& event : own) {
           while (!open.empty() && open.back() <= event.begin) open.pop_back();
-          if (!open.empty()) EXPECT_LE(event.end, open.back()) << event.name;
+          if (!open.empty()) {
+            EXPECT_LE(event.end, open.back()) << event.name;
+          }
           open.push_back(event.end);
         }
       }
