@@ -54,10 +54,10 @@ class GeometryOctree {
   /// lag() is at most `lag`. While the motion does not change, these are in turn all elements,
   /// about as many in each call. The octree isCurrent() only after the next update().
   void updateSome(const TriangleMesh&, const PieceMotion&, double lag, const Threads&);
-  /// Whether the last update was updateSome() to the positions now.
-  bool laggedTo(const TriangleMesh& mesh, double scale) const {
+  /// Whether the last update was updateSome() to the positions now, of these elements.
+  bool laggedTo(const TriangleMesh& mesh, Revision topology, double scale) const {
     return m_isLagging && isValid() && m_frame.scale == scale &&
-           m_lastPositions == mesh.now.bodyRevision();
+           m_treeVersion.state().topology == topology && m_lastPositions == mesh.now.bodyRevision();
   }
   /// L: no coordinate of a position is further outside of the boxes of its elements.
   double lag() const { return m_lag; }

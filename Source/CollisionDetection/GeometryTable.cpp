@@ -573,8 +573,10 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   m_changed.clear();
   for (const auto& geometry : m_geometries) {
     const Body& body = geometry->body;
-    if (!geometry->skipsOctree && !(geometry->mayLag && body.tree.laggedTo(body.mesh, scale)) &&
-        (!body.tree.isCurrent(body.mesh, body.revisions.elements.topology, scale) ||
+    const Revision topology = body.revisions.elements.topology;
+    if (!geometry->skipsOctree &&
+        !(geometry->mayLag && body.tree.laggedTo(body.mesh, topology, scale)) &&
+        (!body.tree.isCurrent(body.mesh, topology, scale) ||
          body.tree.needsDops(body.mesh, settings.bounds)))
       m_changed.push_back(geometry.get());
   }

@@ -368,6 +368,30 @@ TEST(KeptPairsOfTwoSheets, CutsGiveFeaturesToElementsOfOtherParts) {
   }
 }
 
+/// The octree of a body that lags is updated after a cut, even if its positions are as before.
+TEST(KeptPairsOfTwoSheets, CutsOfBodiesAtRestHaveTheAnswersOfASearch) {
+  Random random(16);
+  const SlowScene scene = largeSheets(0.01, 0.011);
+  KeptAndSearched both(scene, 1);
+  runUntilKept(both, random, scene.edge, 0);
+  for (std::uint32_t square = 0; square < 48 * 48; square += 360) {
+    both.advance();
+    // The three corners of one triangle with one further corner of the next.
+    const auto [p, q, r] = scene.bodies[0].triangles[2 * square];
+    Triangle next = scene.bodies[0].triangles[2 * square + 1];
+    std::sort(next.begin(), next.end(), [&, p = p, q = q, r = r](auto l, auto k) {
+      const auto isShared = [&](auto v) { return v == p || v == q || v == r; };
+      return isShared(l) < isShared(k);
+    });
+    both.replace(0, {2 * square, 2 * square + 1}, {{p, q, next[0]}, {q, r, next[0]}}, {});
+    both.detect();
+    both.advance();
+    both.move(random, 0, 0.001 * scene.edge);
+    both.detect();
+    if (HasFailure()) return;
+  }
+}
+
 TEST(KeptPairsOfTwoSheets, MotionDuringCutsCounts) {
   Random random(12);
   const double distance = 0.08;
