@@ -315,11 +315,11 @@ TEST(KeptPairsOfTwoSheets, ListsAreMadeAlongWithSearches) {
 }
 
 /// Sheets of several parts, the second one above the first one, the third one close below it.
-SlowScene largeSheets(double distance, double thickness) {
+SlowScene largeSheets(double distance, double thickness, std::uint32_t n = 48) {
   SlowScene scene = slowScenes().front();
-  scene.bodies = {sheetAt(48, 0.5, 0.0), sheetAt(48, 0.5 + distance, 0.0), sheetAt(48, 0.49, 0.0)};
+  scene.bodies = {sheetAt(n, 0.5, 0.0), sheetAt(n, 0.5 + distance, 0.0), sheetAt(n, 0.49, 0.0)};
   scene.pairs = {{0, 1}, {0, 2}};
-  scene.edge = 1.0 / 48;
+  scene.edge = 1.0 / n;
   scene.settings.thickness = thickness;
   return scene;
 }
@@ -371,10 +371,11 @@ TEST(KeptPairsOfTwoSheets, CutsGiveFeaturesToElementsOfOtherParts) {
 /// The octree of a body that lags is updated after a cut, even if its positions are as before.
 TEST(KeptPairsOfTwoSheets, CutsOfBodiesAtRestHaveTheAnswersOfASearch) {
   Random random(16);
-  const SlowScene scene = largeSheets(0.01, 0.011);
+  const SlowScene scene = largeSheets(0.01, 0.0101, 24);
   KeptAndSearched both(scene, 1);
   runUntilKept(both, random, scene.edge, 0);
-  for (std::uint32_t square = 0; square<48 * 48; square += kShareOfCases> 1 ? 1600 : 360) {
+  constexpr std::uint32_t kSquares = 24 * 24, kStep = kShareOfCases > 1 ? 400 : 90;
+  for (std::uint32_t square = 0; square < kSquares; square += kStep) {
     both.advance();
     // The three corners of one triangle with one further corner of the next.
     const auto [p, q, r] = scene.bodies[0].triangles[2 * square];
