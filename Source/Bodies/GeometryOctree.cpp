@@ -206,7 +206,10 @@ bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeS
   };
   sortChanged();
   if (hasSlices) {
-    keepSlices(changed, topology.vertexCount);
+    const auto rangeOf = [&](std::size_t slice) {
+      return std::pair(groups[m_slices[slice].firstGroup], groups[m_slices[slice].endGroup]);
+    };
+    findPiecesAgain(m_slicePieces, changed, topology.vertexCount, rangeOf, [](std::size_t) {});
     m_slicesLayout = m_octree.layout();
   }
   const auto addAround = [&](const Triangle& corners) {
@@ -294,23 +297,6 @@ void GeometryOctree::makeSlices(const TriangleMesh& mesh) {
   }
   m_slicePieces = piecesOf(m_ordered, ranges, mesh.topology.vertexCount);
   m_slicesLayout = m_octree.layout();
-}
-
-/// Finds the pieces of slices with groups that changed. groups: ascending.
-void GeometryOctree::keepSlices(const CountedVector<std::uint32_t>& groups,
-                                std::size_t vertexCount) {
-  const auto begins = m_octree.groups();
-  auto group = groups.begin();
-  for (std::size_t i = 0; i < m_slices.size() && group != groups.end(); ++i) {
-    const Slice& slice = m_slices[i];
-    if (*group >= slice.endGroup) continue;
-    const std::array<std::pair<std::uint32_t, std::uint32_t>, 1> range{
-        {{begins[slice.firstGroup], begins[slice.endGroup]}}};
-    const IndexLists pieces = piecesOf(m_ordered, range, vertexCount);
-    m_slicePieces.reserveMore(0, pieces[0].size());
-    m_slicePieces.replace(i, pieces[0]);
-    while (group != groups.end() && *group < slice.endGroup) ++group;
-  }
 }
 
 void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& motion, double lag,

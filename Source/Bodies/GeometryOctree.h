@@ -101,6 +101,26 @@ class GeometryOctree {
     CountedVector<std::uint32_t> groups;
   };
   const Cut& lastCut() const { return m_cut; }
+  /// Finds the pieces of PieceMotion of those ranges again that hold one of these groups, and calls
+  /// found(i) for each. pieces: of each range. rangeOf(i): its places in the order, which ascend.
+  /// groups: ascending.
+  template <class RangeOf, class F>
+  void findPiecesAgain(IndexLists& pieces, const CountedVector<std::uint32_t>& groups,
+                       std::size_t vertexCount, RangeOf&& rangeOf, F&& found) const {
+    auto group = groups.begin();
+    for (std::size_t i = 0; i < pieces.size() && group != groups.end(); ++i) {
+      const std::pair<std::uint32_t, std::uint32_t> range = rangeOf(i);
+      const auto isInside = [&] {
+        return group != groups.end() && m_octree.groups()[*group] < range.second;
+      };
+      if (!isInside()) continue;
+      while (isInside()) ++group;
+      const IndexLists now = piecesOf(m_ordered, std::span(&range, 1), vertexCount);
+      pieces.reserveMore(0, now[0].size());
+      pieces.replace(i, now[0]);
+      found(i);
+    }
+  }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
   std::span<const Triangle> ordered() const { return m_ordered; }
   std::size_t bytesBesidesOctree() const;
@@ -120,7 +140,6 @@ class GeometryOctree {
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
   bool replaceElements(const MeshTopology&, const OctreeSettings&);
-  void keepSlices(const CountedVector<std::uint32_t>& groups, std::size_t vertexCount);
   bool canRefitSome(const TriangleMesh&, Revision topology, double scale,
                     const OctreeSettings&) const;
   void makeSlices(const TriangleMesh&);

@@ -89,24 +89,12 @@ bool KeptPairs::Parts::canCut(const Body& body) const {
 /// Finds the pieces of parts with elements at the cut.
 void KeptPairs::Parts::cut(const Body& body) {
   PALPATE_ASSERT(canCut(body));
-  const Octree& tree = body.tree.octree();
-  const CountedVector<std::uint32_t>& groups = body.tree.lastCut().groups;
   layout = 0;
-  auto group = groups.begin();
-  for (std::size_t i = 0; i < nodes.size() && group != groups.end(); ++i) {
-    const auto range = rangeOf(tree, nodes[i]);
-    const auto isInside = [&] {
-      return group != groups.end() && tree.groups()[*group] < range.second;
-    };
-    if (!isInside()) continue;
-    const IndexLists now =
-        piecesOf(body.tree.ordered(), std::span(&range, 1), body.mesh.topology.vertexCount);
-    pieces.reserveMore(0, now[0].size());
-    pieces.replace(i, now[0]);
-    isCut[i] = 1;
-    while (isInside()) ++group;
-  }
-  layout = tree.layout();
+  body.tree.findPiecesAgain(
+      pieces, body.tree.lastCut().groups, body.mesh.topology.vertexCount,
+      [&](std::size_t part) { return rangeOf(body.tree.octree(), nodes[part]); },
+      [&](std::size_t part) { isCut[part] = 1; });
+  layout = body.tree.octree().layout();
 }
 
 /// Returns the motion of all vertices.

@@ -206,7 +206,6 @@ void Trust::start(const PairSettings& settings, const GeometryInStep& a, const G
   const bool isAuto = settings.method == Method::Auto;
   plan.runsIntersection = isAuto && haveTriangles(a, b);
   plan.step.checksStart = !m_atStart.meeting && (isAuto || m_checkCredit >= kFramesPerCheck);
-  if (plan.step.checksStart) m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
   PALPATE_ASSERT(m_checkCredit <= most);
   // The result cannot be trusted, so the step need not be examined.
   if (plan.method == Method::Proximity && settings.method == plan.method && !plan.step.checksStart)
@@ -230,6 +229,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                                     : settings.thickness + plan.step.extraThickness;
   listFeatures(facts, plan.step.reportsImpacts, validity);
   if (plan.step.checksStart) {
+    m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
     m_atStart = {};
     m_atStart.meeting = facts.atStart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));

@@ -377,20 +377,32 @@ TEST(KeptPairsOfTwoSheets, CutsOfBodiesAtRestHaveTheAnswersOfASearch) {
   constexpr std::uint32_t kSquares = 24 * 24, kStep = kShareOfCases > 1 ? 400 : 90;
   for (std::uint32_t square = 0; square < kSquares; square += kStep) {
     both.advance();
-    // The three corners of one triangle with one further corner of the next.
-    const auto [p, q, r] = scene.bodies[0].triangles[2 * square];
-    Triangle next = scene.bodies[0].triangles[2 * square + 1];
-    std::sort(next.begin(), next.end(), [&, p = p, q = q, r = r](auto l, auto k) {
-      const auto isShared = [&](auto v) { return v == p || v == q || v == r; };
-      return isShared(l) < isShared(k);
+    // Two triangles of a square are replaced by others of its four corners.
+    const Triangle &first = scene.bodies[0].triangles[2 * square],
+                   &second = scene.bodies[0].triangles[2 * square + 1];
+    const std::uint32_t other = *std::find_if(second.begin(), second.end(), [&](std::uint32_t v) {
+      return std::find(first.begin(), first.end(), v) == first.end();
     });
-    both.replace(0, {2 * square, 2 * square + 1}, {{p, q, next[0]}, {q, r, next[0]}}, {});
+    both.replace(0, {2 * square, 2 * square + 1},
+                 {{first[0], first[1], other}, {first[1], first[2], other}}, {});
     both.detect();
     both.advance();
     both.move(random, 0, 0.001 * scene.edge);
     both.detect();
     if (HasFailure()) return;
   }
+}
+
+/// Sheets that are `distance` apart meet in steps: move(frame) changes both objects.
+template <class F>
+void runUntilMet(KeptAndSearched& both, double distance, double step, F&& move) {
+  for (int frame = 0; frame * step < distance; ++frame) {
+    both.advance();
+    move(frame);
+    both.detect();
+    if (::testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(both.contacts(), 0u);
 }
 
 TEST(KeptPairsOfTwoSheets, MotionDuringCutsCounts) {
@@ -400,14 +412,10 @@ TEST(KeptPairsOfTwoSheets, MotionDuringCutsCounts) {
   KeptAndSearched both(scene, 1);
   runUntilKept(both, random, scene.edge, 0);
   const double step = 0.03 * scene.edge;
-  for (int frame = 0; frame * step < distance; ++frame) {
-    both.advance();
+  runUntilMet(both, distance, step, [&](int frame) {
     both.cut(1, 4 * static_cast<std::size_t>(frame), 4);
     both.lift(1, 0, -step);
-    both.detect();
-    if (HasFailure()) return;
-  }
-  EXPECT_GT(both.contacts(), 0u);
+  });
 }
 
 TEST(KeptPairsOfTwoSheets, NewVerticesMoveByThemselves) {
@@ -419,13 +427,7 @@ TEST(KeptPairsOfTwoSheets, NewVerticesMoveByThemselves) {
   const std::size_t first = both.vertexCount(0);
   both.cut(0, 2000, 4);
   const double step = 0.01 * scene.edge;
-  for (int frame = 0; frame * step < distance; ++frame) {
-    both.advance();
-    both.lift(0, first, step);
-    both.detect();
-    if (HasFailure()) return;
-  }
-  EXPECT_GT(both.contacts(), 0u);
+  runUntilMet(both, distance, step, [&](int) { both.lift(0, first, step); });
 }
 
 TEST(KeptPairsOfTwoSheets, ANewTriangleMayReachFar) {

@@ -395,5 +395,22 @@ TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
   EXPECT_FALSE(collisions.collisionData(a, b).validity().startedApart);
 }
 
+/// A check that no detection finished was not made.
+TEST(StartedApart, IsCheckedAfterDetectionsThatThrew) {
+  const Mesh low = sheet(4, 0.0, 0.0);
+  std::vector<Eigen::Vector3d> high = low.positions;
+  for (Eigen::Vector3d& p : high) p.z() += 0.02;
+  OctreeBasedCD collisions;
+  const GeometryId a = addMesh(collisions, low),
+                   b = collisions.addTriangleMesh(high, low.triangles);
+  collisions.addCollisionPair(a, b, {.method = Method::Proximity, .thickness = 0.05});
+  collisions.setContactPredicate(a, b, [](const ContactFeatures&) -> bool { throw 1; });
+  for (int i = 0; i < 6; ++i) EXPECT_THROW(collisions.detectCollision(), int);
+  collisions.setContactPredicate(a, b, [](const ContactFeatures&) { return true; });
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.collisionData(a, b).validity().startedApart);
+  EXPECT_TRUE(collisions.collisionData(a, b).validity().trusted);
+}
+
 }  // namespace
 }  // namespace palpate
