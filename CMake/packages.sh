@@ -9,7 +9,7 @@ build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libg
 # All that pip needs to build the Python package, and SciPy for rows().
 python="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libmeshoptimizer-dev python3-dev
   pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel"
-test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev clang-format-14 qemu-user
+test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev clang-format-14 clang-tidy-14 qemu-user
   clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib
   mono-mcs mono-runtime"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe python3-sphinx-copybutton nodejs chromium"

@@ -19,12 +19,12 @@ namespace palpate {
 namespace {
 
 /// For those who ask for candidates: other kinds of pairs have none.
-constexpr auto startCandidates = [](PairWork& work, const FrameStart& frame) -> std::size_t {
+constexpr auto kStartCandidates = [](PairWork& work, const FrameStart& frame) -> std::size_t {
   MeshWork* const meshes = std::get_if<MeshWork>(&work);
   return meshes ? meshes->startCandidates(frame) : 0;
 };
 
-constexpr auto startWork = [](PairWork& work, const FrameStart& frame) {
+constexpr auto kStartWork = [](PairWork& work, const FrameStart& frame) {
   return std::visit([&](auto& each) { return each.start(frame); }, work);
 };
 
@@ -65,7 +65,7 @@ std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& th
 
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
-  start(records, threads, nullptr, startCandidates);
+  start(records, threads, nullptr, kStartCandidates);
   std::mutex mutex;
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Pair& pair = m_pairs[m_places[i].pair];
@@ -171,7 +171,7 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
   Stopwatch watch;
   {
     const TraceSpan span(trace, "start");
-    start(records, threads, nullptr, startWork);
+    start(records, threads, nullptr, kStartWork);
   }
   runRounds(threads, nullptr, trace);
   addTimes(watch.lap(), statistics);
@@ -219,7 +219,7 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
   };
   for (PairRecord* record : records) record->isUnfinished = true;
   while (!records.empty()) {
-    const std::size_t count = start(records, threads, &deadline, startWork);
+    const std::size_t count = start(records, threads, &deadline, kStartWork);
     if (count == 0) return;
     runRounds(threads, &deadline, trace);
     addTimes(watch.lap(), statistics);

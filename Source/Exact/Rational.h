@@ -12,9 +12,9 @@ namespace palpate::exact {
 
 /// Positions as integers in units of the largest power of two of which all are multiples, so that
 /// the integers are as short as possible.
-template <std::size_t Count>
+template <std::size_t count>
 struct Integers {
-  std::array<Vector<Integer>, Count> at;
+  std::array<Vector<Integer>, count> at;
   int exponent;
 
   template <class... Positions>

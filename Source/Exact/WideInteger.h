@@ -128,19 +128,19 @@ struct ExponentRange {
 /// 61 bits (Coordinate = std::int64_t) are enough for meshes near each other whose coordinates do
 /// not have many more bits than a double. Differences of 125 bits (Int128) also hold a gap that is
 /// tiny compared to the coordinates.
-template <std::size_t Count, class Coordinate = std::int64_t>
+template <std::size_t count, class Coordinate = std::int64_t>
 struct FixedGrid {
-  std::array<std::array<Coordinate, 3>, Count> at;  ///< relative to the first position
+  std::array<std::array<Coordinate, 3>, count> at;  ///< relative to the first position
   bool fits = true;
 
   template <class... Positions>
   explicit FixedGrid(const Positions&... positions) {
-    const std::array<const Eigen::Vector3d*, Count> all{&positions...};
+    const std::array<const Eigen::Vector3d*, count> all{&positions...};
     const auto [lowest, highest] = ExponentRange(positions...);
     fits = highest - lowest <= 120;
     for (int i = 0; i < 3 && fits; ++i) {
       const Int128 origin = integer((*all[0])[i], lowest);
-      for (std::size_t n = 0; n < Count; ++n) {
+      for (std::size_t n = 0; n < count; ++n) {
         const Int128 relative = integer((*all[n])[i], lowest) - origin;
         fits = fits && relative < kLimit && relative > -kLimit;
         at[n][i] = static_cast<Coordinate>(relative);

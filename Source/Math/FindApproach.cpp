@@ -49,7 +49,7 @@ double distanceInside(const RelativeMotion<kind>& motion, double t) {
   const double x = c.cross(b).dot(normal) / square, y = a.cross(c).dot(normal) / square;
   const bool inside =
       x >= 0.0 && y >= 0.0 &&
-      (RelativeMotion<kind>::square ? x <= 1.0 && y <= 1.0 : x + y <= 1.0);  // false for NaN
+      (RelativeMotion<kind>::kSquare ? x <= 1.0 && y <= 1.0 : x + y <= 1.0);  // false for NaN
   return inside ? (c - x * a - y * b).norm() : INFINITY;
 }
 
@@ -59,7 +59,7 @@ template <Kind kind>
 Separation accurateSeparation(const RelativeMotion<kind>& motion, double t) {
   const Vector3d zero = Vector3d::Zero(), first = at(t, motion.corner[0]);
   Separation separation;
-  if constexpr (RelativeMotion<kind>::square)
+  if constexpr (RelativeMotion<kind>::kSquare)
     separation.direction =
         -finiteEdgeEdgeDistance(zero, at(t, motion.a), first, at(t, motion.corner[2])).difference;
   else

@@ -143,7 +143,7 @@ typename ImpactSearch<kind>::Verdict ImpactSearch<kind>::classify(const Interval
   const CrossComponent x(m_motion.c, m_motion.b, k, bracket), y(m_motion.a, m_motion.c, k, bracket);
   const int signX = side * x.sign(), signY = side * y.sign();
   if (signX < 0 || signY < 0) return Verdict::Outside;
-  if constexpr (RelativeMotion<kind>::square) {
+  if constexpr (RelativeMotion<kind>::kSquare) {
     const int restX = side * (normal - x).sign(), restY = side * (normal - y).sign();
     if (restX < 0 || restY < 0) return Verdict::Outside;
     return signX > 0 && signY > 0 && restX > 0 && restY > 0 ? Verdict::Inside : Verdict::Unknown;

@@ -233,11 +233,11 @@ Passages ExactQuery::passages(double tolerance) const {
   });
   const bool multipleChanges = (sign != last) != (simple % 2 == 1);
   anyRootInside(volume, [&]<class Root>(const Root& root) {
-    constexpr bool isSimple = std::is_same_v<Root, CubicTime>;
-    if (!isSimple && !multipleChanges) return false;
+    constexpr bool kIsSimple = std::is_same_v<Root, CubicTime>;
+    if (!kIsSimple && !multipleChanges) return false;
     sign = -sign;
     if (!touchAt(root)) return false;
-    if constexpr (isSimple)
+    if constexpr (kIsSimple)
       add(root.timeLowerBound(tolerance), sign > 0);
     else
       add(root.timeLowerBound(), sign > 0);

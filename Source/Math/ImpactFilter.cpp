@@ -56,14 +56,14 @@ class FilterLanes {
   /// the same criterion as in findTouch() and findApproach().
   HWY_INLINE M separatedByBoxes(double distance) const {
     const D d;
-    constexpr auto corners = ImpactQuery::corners(kind);
+    constexpr auto kCorners = ImpactQuery::corners(kind);
     const V limit = hn::Set(d, distance),
             error = hn::Set(d, distance > 0.0 ? kApproachBoxError : 0.0);
     M separated = hn::Lt(limit, limit);  // none
     for (int k = 0; k < 3; ++k) {
       M above = hn::Eq(limit, limit), below = above;
       for (int i = 0; i < cornerCount(); ++i) {
-        const V first = coordinate(corners[i], 0, k), last = coordinate(corners[i], 1, k);
+        const V first = coordinate(kCorners[i], 0, k), last = coordinate(kCorners[i], 1, k);
         const V needed = limit + error * (largest(first, last) + limit);
         above = hn::And(above, hn::Gt(hn::Min(first, last), needed));
         below = hn::And(below, hn::Lt(hn::Max(first, last), hn::Neg(needed)));
@@ -76,8 +76,8 @@ class FilterLanes {
   /// Whether det(A, B, C) certainly has one sign throughout the step.
   HWY_INLINE M neverCoplanar() const {
     const D d;
-    constexpr auto axes = ImpactQuery::axes(kind);
-    const Ends a = difference(axes[0]), b = difference(axes[1]), c = difference(axes[2]);
+    constexpr auto kAxes = ImpactQuery::axes(kind);
+    const Ends a = difference(kAxes[0]), b = difference(kAxes[1]), c = difference(kAxes[2]);
     const Point p = largest(a), q = largest(b), r = largest(c);
     const auto [f, permanent] = coplanarityOf(a.at, b.at, c.at, p, q, r, hn::Set(d, 3.0));
     const V least = hn::Min(hn::Min(f[0], f[1]), hn::Min(f[2], f[3])),
@@ -93,11 +93,11 @@ class FilterLanes {
   /// findApproach() may report. Any direction is valid.
   HWY_INLINE M separatedAlong(const Point& direction, double distance, double tolerance) const {
     const D d;
-    constexpr auto corners = ImpactQuery::corners(kind);
+    constexpr auto kCorners = ImpactQuery::corners(kind);
     V least = hn::Set(d, std::numeric_limits<double>::infinity()), most = hn::Neg(least);
     Point largestCorner{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, displacement = largestCorner;
     for (int i = 0; i < cornerCount(); ++i) {
-      const Ends corner = difference(corners[i]);
+      const Ends corner = difference(kCorners[i]);
       const V first = dot(direction, corner.at[0]), last = dot(direction, corner.at[1]);
       least = hn::Min(least, hn::Min(first, last));
       most = hn::Max(most, hn::Max(first, last));
@@ -121,15 +121,15 @@ class FilterLanes {
 
   /// A x B at half time.
   HWY_INLINE Point normalHalfway() const {
-    constexpr auto axes = ImpactQuery::axes(kind);
-    return cross(halfway(axes[0]), halfway(axes[1]));
+    constexpr auto kAxes = ImpactQuery::axes(kind);
+    return cross(halfway(kAxes[0]), halfway(kAxes[1]));
   }
 
   /// Approximately the vector between the features' closest points at half time, if these are on
   /// the features' borders.
   HWY_INLINE Point gapHalfway() const {
-    constexpr auto axes = ImpactQuery::axes(kind);
-    const Point a = halfway(axes[0]), b = halfway(axes[1]), c = halfway(axes[2]);
+    constexpr auto kAxes = ImpactQuery::axes(kind);
+    const Point a = halfway(kAxes[0]), b = halfway(kAxes[1]), c = halfway(kAxes[2]);
     if constexpr (kind == ImpactQuery::Kind::EdgeEdge) {
       const V aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), ac = dot(a, c), bc = dot(b, c);
       const V x = clampedQuotient(ac * bb - bc * ab, aa * bb - ab * ab);

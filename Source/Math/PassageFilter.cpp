@@ -113,7 +113,7 @@ template <ImpactQuery::Kind kind>
 HWY_INLINE void findPassagesOf(const ImpactBlock& block, int lane, double tolerance,
                                BlockPassages& found) {
   const D d;
-  constexpr auto axes = ImpactQuery::axes(kind);
+  constexpr auto kAxes = ImpactQuery::axes(kind);
   const auto difference = [&](const ImpactQuery::Difference& vertices, int end) HWY_ATTR -> Point {
     const auto coordinate = [&](int k) HWY_ATTR {
       return hn::Load(d, &block.positions[vertices[0]][end][k][lane]) -
@@ -121,9 +121,9 @@ HWY_INLINE void findPassagesOf(const ImpactBlock& block, int lane, double tolera
     };
     return {coordinate(0), coordinate(1), coordinate(2)};
   };
-  const Ends a{difference(axes[0], 0), difference(axes[0], 1)},
-      b{difference(axes[1], 0), difference(axes[1], 1)},
-      c{difference(axes[2], 0), difference(axes[2], 1)};
+  const Ends a{difference(kAxes[0], 0), difference(kAxes[0], 1)},
+      b{difference(kAxes[1], 0), difference(kAxes[1], 1)},
+      c{difference(kAxes[2], 0), difference(kAxes[2], 1)};
   const Point p = largest(a), q = largest(b), r = largest(c);
   const V sizeA = largest(p), sizeB = largest(q), sizeC = largest(r);
   // All corners are then at most kLargestImpactDifference from each other.

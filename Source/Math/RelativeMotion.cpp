@@ -23,15 +23,15 @@ Vector3d awayFromSegment(const Vector3d& point, const Vector3d& segment) {
 
 template <ImpactQuery::Kind kind>
 Separation RelativeMotion<kind>::bestSeparation(double t) const {
-  std::array<Vector3d, corners> position;
-  for (int i = 0; i < corners; ++i) position[i] = at(t, corner[i]);
+  std::array<Vector3d, kCorners> position;
+  for (int i = 0; i < kCorners; ++i) position[i] = at(t, corner[i]);
 
   // Squares are compared, which needs no square roots.
   Separation best;
   double bestLeast = 0.0, bestSquare = 1.0, nearestSquare = INFINITY;
   const auto consider = [&](const Vector3d& direction, double lengthSquared) {
     double least = direction.dot(position[0]);
-    for (int i = 1; i < corners; ++i) least = std::min(least, direction.dot(position[i]));
+    for (int i = 1; i < kCorners; ++i) least = std::min(least, direction.dot(position[i]));
     if (!(least > 0.0) || !(lengthSquared > kShortestDirection * kShortestDirection)) return;
     if (least * least * bestSquare > bestLeast * bestLeast * lengthSquared) {
       best.direction = direction;
@@ -49,7 +49,7 @@ Separation RelativeMotion<kind>::bestSeparation(double t) const {
   consider(normal.dot(w) < 0.0 ? Vector3d(-normal) : normal, normal.squaredNorm());
   considerAway(awayFromSegment(w, u));
   considerAway(awayFromSegment(w, v));
-  if constexpr (square) {
+  if constexpr (kSquare) {
     considerAway(awayFromSegment(w - v, u));
     considerAway(awayFromSegment(w - u, v));
   } else {

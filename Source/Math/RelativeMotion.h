@@ -36,24 +36,24 @@ struct Separation {
 /// doubles. Each component is the exact value rounded once, and has the exact sign.
 template <ImpactQuery::Kind kind>
 struct RelativeMotion {
-  static constexpr bool square = kind == ImpactQuery::Kind::EdgeEdge;
-  static constexpr int corners = square ? 4 : 3;
+  static constexpr bool kSquare = kind == ImpactQuery::Kind::EdgeEdge;
+  static constexpr int kCorners = kSquare ? 4 : 3;
   using Ends = std::array<Eigen::Vector3d, 2>;
 
   Ends a, b, c;
-  std::array<Ends, corners> corner;
+  std::array<Ends, kCorners> corner;
 
   explicit RelativeMotion(const ImpactQuery& query) {
-    constexpr auto axes = ImpactQuery::axes(kind);
-    constexpr auto cornerDifferences = ImpactQuery::corners(kind);
+    constexpr auto kAxes = ImpactQuery::axes(kind);
+    constexpr auto kCornerDifferences = ImpactQuery::corners(kind);
     for (int end = 0; end < 2; ++end) {
       const auto difference = [&](const ImpactQuery::Difference& d) -> Eigen::Vector3d {
         return query.vertices[d[0]].at(end) - query.vertices[d[1]].at(end);
       };
-      a[end] = difference(axes[0]);
-      b[end] = difference(axes[1]);
-      c[end] = difference(axes[2]);
-      for (int i = 0; i < corners; ++i) corner[i][end] = difference(cornerDifferences[i]);
+      a[end] = difference(kAxes[0]);
+      b[end] = difference(kAxes[1]);
+      c[end] = difference(kAxes[2]);
+      for (int i = 0; i < kCorners; ++i) corner[i][end] = difference(kCornerDifferences[i]);
     }
   }
 

@@ -194,6 +194,50 @@ checkFormat() {
   find Source Examples Testing -name '*.h' -o -name '*.cpp' | xargs "$tool" --dry-run -Werror --style=file || faults=1
 }
 
+# Names as .clang-tidy says. clang-tidy takes 6 s for what Eigen declares, so that many files are checked at once: all
+# headers of the modules, or the sources of one. Sources with kernels name the same things, and are checked one at a
+# time, as scalar code. Adapters have names of other libraries, and the C interface those of C.
+# Arguments: Eigen's folder, "headers" or a module.
+checkNames() {
+  local eigen=$1 part=$2 tool file options unit
+  tool=$(command -v clang-tidy-14) || {
+    echo "skipped: clang-tidy-14 is not installed"
+    exit 77
+  }
+  options=(-std=c++20 -DPALPATE_SCALAR -DPALPATE_THREADS_STD -I. -ISource -ISource/Public -ISource/Simplify/Public
+    -isystem "$eigen")
+  unit=$(mktemp --suffix=.cpp)
+  namesIn() {
+    local output
+    output=$("$tool" --quiet --config-file=.clang-tidy --header-filter='/Source/' "$1" -- "${options[@]}" 2>/dev/null) ||
+      fault "$output"
+  }
+  if [[ $part == headers ]]; then
+    find Source -name '*.h' ! -path '*/Adapters/*' ! -name palpate_c.h -exec grep -l '^#pragma once' {} + |
+      { xargs grep -L '"Core/Simd.h"' || true; } | sort | sed "s|.*|#include \"$PWD/&\"|" >"$unit"
+    namesIn "$unit"
+  else
+    find "Source/$part" -name '*.cpp' -exec grep -L '"Core/Simd.h"' {} + | sort | sed "s|.*|#include \"$PWD/&\"|" >"$unit"
+    namesIn "$unit"
+    while read -r file; do namesIn "$file"; done < <(
+      find "Source/$part" -name '*.cpp' -exec grep -l '"Core/Simd.h"' {} + | sort)
+  fi
+  rm "$unit"
+}
+
+# Subjects of commits have at most 72 characters, from the commit after START on: earlier ones were not checked. A tree
+# without history, or with a part of it, is not checked. Argument: START.
+checkSubjects() {
+  local start=$1 LC_ALL=C.UTF-8 commit subject
+  git rev-parse --quiet --verify "$start^{commit}" >/dev/null 2>&1 || {
+    echo "skipped: there is no history with the commit $start"
+    exit 77
+  }
+  while read -r commit subject; do
+    ((${#subject} <= 72)) || fault "$commit: ${#subject} characters: $subject"
+  done < <(git log --no-merges --format='%h %s' "$start..HEAD")
+}
+
 # Each source file has a header of its name, beside it or public, or its first line says of which header it is a part.
 checkParts() {
   local file name header

@@ -13,7 +13,7 @@ for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapte
   mkdir -p "$tree/Source/$module"
 done
 mkdir -p "$tree/Examples" "$tree/Testing"
-cp "$root/.clang-format" "$tree"
+cp "$root/.clang-format" "$root/.clang-tidy" "$tree"
 printf '#pragma once\n\n#include <Eigen/Core>\n' >"$tree/Source/Public/palpate/Types.h"
 printf '#pragma once\n' >"$tree/Source/Public/palpate/Capture.h"
 
@@ -69,6 +69,15 @@ printf '#pragma once\ninline int one() { return 1; }\n' >"$tree/Source/Math/One.
 plant Headers Source/Shapes/A.h '#pragma once\ninline int one() { return 2; }\n' "$compiler" "$eigen"
 plant Format Source/Core/A.h '#pragma once\nint  a;\n'
 plant Format Source/A.md '<<<<<<< HEAD\n'
+mkdir -p "$tree/stub/Eigen"  # clang-tidy takes 6 s for the real one
+touch "$tree/stub/Eigen/Core"
+printf 'namespace palpate {\nint two() { return 2; }\n}\n' >"$tree/Source/Math/Two.cpp"
+plant Names Source/Math/A.h '#pragma once\nstruct Two { int m_second; };\n' "$tree/stub" headers
+plant Names Source/Math/A.h '#pragma once\ntemplate <int Count>\nvoid repeat();\n' "$tree/stub" headers
+plant Names Source/Math/A.cpp 'int Twice(int a) { return 2 * a; }\n' "$tree/stub" Math
+plant Names Source/Math/A.cpp '// #include "Core/Simd.h"\nint twice(int first_number) { return 2 * first_number; }\n' "$tree/stub" Math
+plant Names Source/Math/A.cpp 'int twice(int a) { return b; }\n' "$tree/stub" Math
+rm -r "$tree/stub" "$tree/Source/Math/Two.cpp"
 plant Quiet Source/Math/A.cpp 'void f() { std::cerr << 1; }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::printf("1"); }\n'
 plant Quiet Source/Math/A.cpp 'void f() { std::exit(1); }\n'
@@ -114,6 +123,20 @@ expect fails Pictures
 truncate --size 400000 "$tree/Examples/A.png"
 expect holds Pictures
 rm "$tree/Examples/A.png"
+
+planted="a subject of 73 characters"
+commit() { git -C "$tree" -c user.name=a -c user.email=a commit -q --allow-empty --no-verify -m "$1"; }
+if git -C "$tree" init -q 2>/dev/null; then
+  long="Math: $(printf 'a%.0s' {1..67})"
+  commit "$long"
+  start=$(git -C "$tree" rev-parse HEAD)
+  commit "${long%a}"
+  expect holds Subjects "$start"
+  commit "$long"
+  expect fails Subjects "$start"
+  [[ $(bash "$check" Subjects "$tree" 0000000) == skipped* ]] || { echo "Subjects does not skip"; missed=1; }
+  rm -rf "$tree/.git"
+fi
 
 planted="a stray symbol"
 printf 'namespace palpate { int a; }\n' | "$compiler" -shared -fPIC -x c++ -o "$tree/lib.so" -
