@@ -119,6 +119,29 @@ def particles(figures):
     return markdown(["particles", "triangles", *(f"`{m}` ms" for m in methods)], rows)
 
 
+# README's three figures: what is measured, its table, scene, metric and unit.
+THREE = (
+    ("five organs that glide through each other, {triangles} triangles: all pairs of triangles whose boxes overlap",
+     "race", "organs", "median ms", "ms"),
+    ("a twisted rod with itself, {triangles} triangles: likewise", "race", "rod-twist", "median ms", "ms"),
+    ("nearest of 100,000 triangles to a point close to them", "spatial", "100K triangles: closest near", "us", "µs"),
+)
+
+
+def three(figures):
+    """One row for each of README's figures: Palpate beside the fastest other library, on one thread."""
+    rows = []
+    for what, table, scene, metric, unit in THREE:
+        times = {r["engine"]: float(r["value"]) for r in figures.of(table)
+                 if r["scene"] == scene and r["metric"] == metric and int(r["threads"]) == 1}
+        own = times["Palpate"]
+        peer = min((engine for engine in times if not engine.startswith("Palpate")), key=times.get)
+        triangles = figures.value(table, scene, 1, "scene", "triangles")
+        what = what.format(triangles=f"{triangles:,.0f}" if triangles else "")
+        rows.append([what, f"{figure(own)} {unit}", f"{figure(times[peer])} {unit}, {peer}"])
+    return markdown(["one thread", "Palpate", "fastest other library"], rows)
+
+
 def provenance(figures):
     row = figures.rows[0]
     return [f"{row['machine']}, {row['compiler']}, SIMD path {row['simd']}, commit {row['commit']}."]
@@ -127,6 +150,7 @@ def provenance(figures):
 TABLES = {
     "provenance": provenance,
     "race": race,
+    "three": three,
     "whole-frame": metrics("whole frame", "1 / 2 threads"),
     "continuous": metrics("continuous", "1 / 2 threads", engines=lambda e: not e.startswith("Embree"),
                           columns=["ms", "narrow phase ms"]),

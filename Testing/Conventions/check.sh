@@ -299,14 +299,17 @@ checkQuiet() {
       xargs grep -nE '\b(cout|cerr|clog|printf|fprintf|puts|fputs|exit|abort|terminate)\b *(\(|<<|;)')
 }
 
-# README's statements are those that the consumer compiles and runs, and at most eight; links lead somewhere.
+# The links of the pages lead to files, and Docs/Map.md has a link to each page that is no note.
 checkLinks() {
   local page link
   while read -r page; do
     while read -r link; do
       [[ -e $(dirname "$page")/$link ]] || fault "$page: $link leads nowhere"
     done < <(sed '/^ *```/,/^ *```/d; /^ *<!--/,/-->/d' "$page" | grep -oE '\]\([^)#:]+\)' | tr -d '()]')
-  done < <(find README.md CHANGELOG.md Docs Data Examples Testing -name '*.md' 2>/dev/null)
+  done < <(find README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md .github Docs Data Examples Testing -name '*.md' 2>/dev/null)
+  while read -r page; do
+    grep -qF "(${page#Docs/})" Docs/Map.md || fault "Docs/Map.md does not name $page"
+  done < <(find Docs -name '*.md' ! -path 'Docs/Notes/*' ! -path 'Docs/Site/*' ! -name Map.md 2>/dev/null)
 }
 
 # Pages load soon: a picture has at most 400 kB, an animation 1500 kB.

@@ -116,6 +116,14 @@ planted="code that looks like a link"
 printf '```cpp\n[](double x) {}\n```\n' >"$tree/Examples/A.md"
 expect holds Links
 rm -r "$tree/Examples/A.md"
+planted="a page that the map does not name"
+mkdir "$tree/Docs"
+printf '[a](A.md)\n' >"$tree/Docs/Map.md"
+touch "$tree/Docs/A.md"
+expect holds Links
+touch "$tree/Docs/B.md"
+expect fails Links
+rm -r "$tree/Docs"
 
 planted="a picture of 400,001 bytes"
 truncate --size 400001 "$tree/Examples/A.png"

@@ -1,4 +1,4 @@
-"""The Python blocks of README.md and Docs run, and print what the pages say."""
+"""The Python blocks of the pages run, and print what the pages say."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ import standins
 SOURCE = pathlib.Path(os.environ["PALPATE_SOURCE"])
 PAGES = [
     page
-    for page in [SOURCE / "README.md", *sorted((SOURCE / "Docs").rglob("*.md"))]
+    for page in sorted((SOURCE / "Docs").rglob("*.md"))
     if "```python" in page.read_text()
 ]
 BLOCK = re.compile(r"^(?:<!-- (.*?) -->\n)?```(python|text)\n(.*?)^```$", re.S | re.M)
@@ -34,7 +34,7 @@ def test_blocks_run(page, monkeypatch):
 
 
 def test_pages_are_found():
-    pages = {"README", "Python", "PythonSofa", "PythonMuJoCo", "PythonTrimesh"}
+    pages = {"Python", "PythonSofa", "PythonMuJoCo", "PythonTrimesh"}
     assert {page.stem for page in PAGES} >= pages
 
 

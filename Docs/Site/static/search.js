@@ -3,7 +3,7 @@
 "use strict";
 
 const kWeights = [[/^reference\//, 0.5], [/^(Docs\/Algorithms|Docs\/Architecture)\b/, 0.6],
-                  [/^(Examples|Docs\/Notes|Data|CHANGELOG|CONTRIBUTING|README)\b/, 0.3]];
+                  [/^(Examples|Docs\/Notes|Docs\/Map|Data|CHANGELOG|CONTRIBUTING|README)\b/, 0.3]];
 const kLength = 240;  // characters of an excerpt
 const kAmerican = {license: "licence", color: "colour", center: "centre", meter: "metre", neighbor: "neighbour"};
 

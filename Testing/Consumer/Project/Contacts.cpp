@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <vector>
 
-// The statements between the marks are those of README. Testing/Conventions compares them.
+// A step of a program, and pairs with lines and points.
 int main() {
   const std::vector<Eigen::Vector3d> organPositions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const std::vector<palpate::Triangle> organTriangles{{0, 1, 2}};
