@@ -1,10 +1,17 @@
 #!/bin/bash
-# From nothing to tested: packages, the documentation site, every configuration that CI builds, their tests. Every
-# configuration runs, also after another one failed. The script fails if any stage failed or did not run. The release
-# tests run last, so that ctest's summary of them is the last thing printed; after a failure, what failed follows it.
+# CMake/test.sh: from nothing to tested on Debian 12: packages, the release build, its tests. ctest's summary comes last.
+# CMake/test.sh --all: what CI runs: also the documentation site, the scalar core, sanitizers, ThreadSanitizer, 64-bit ARM.
+# Every stage runs, also after another one failed. The script fails if any stage failed or did not run. The release tests
+# run last, so that ctest's summary of them is the last thing printed; after a failure, what failed follows it.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+all=0
+case $*:$# in
+  :0) ;;
+  --all:1) all=1 ;;
+  *) sed -n '2,3s/^# //p' "${BASH_SOURCE[0]}" >&2; exit 2 ;;
+esac
 jobs=$(nproc)
 report=()
 failed=0
@@ -61,17 +68,25 @@ configuration() {
 fixedAddresses=()
 setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-no-randomize)
 
-stage packages CMake/packages.sh build python test
-stage documentation CMake/docs.sh
+if ((all)); then
+  echo "Everything that CI runs comes: about an hour on two cores. Each stage says when it begins and how long it took."
+  stage packages CMake/packages.sh build python test matrix || exit 1
+  stage documentation CMake/docs.sh
+else
+  echo "Packages, the release build and its tests come: at most 15 minutes on two idle cores."
+  stage packages CMake/packages.sh build python test || exit 1
+fi
 build release
-# The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
-configuration scalar -DBUILD_SHARED_LIBS=OFF
-# Compiled by clang, with the fuzz targets.
-configuration asan-ubsan
-# Without SIMD: the scalar code of the modules with threads.
-configuration tsan
-# Hashes of answers on 64-bit ARM, in the emulator.
-stage "arm64: golden hashes" Testing/Golden/matrix.sh arm64
+if ((all)); then
+  # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
+  configuration scalar -DBUILD_SHARED_LIBS=OFF
+  # Compiled by clang, with the fuzz targets.
+  configuration asan-ubsan
+  # Without SIMD: the scalar code of the modules with threads.
+  configuration tsan
+  # Hashes of answers on 64-bit ARM, in the emulator.
+  stage "arm64: golden hashes" Testing/Golden/matrix.sh arm64
+fi
 
 table() { printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"; printf '%s\n' "${report[@]}"; }
 table

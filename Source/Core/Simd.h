@@ -1,5 +1,6 @@
-// The one place that names the SIMD library (Highway). No include guard: a file with SIMD code is
-// compiled once for each instruction set by including itself. Such a file starts with
+// The one place that names the SIMD library (Highway). Its include guard is one for each
+// instruction set: a file with SIMD code is compiled once for each set by including itself. Such a
+// file starts with
 //
 //   #undef HWY_TARGET_INCLUDE
 //   #define HWY_TARGET_INCLUDE "Module/File.cpp"
@@ -12,7 +13,10 @@
 #define HWY_COMPILE_ONLY_SCALAR
 #elif !defined(HWY_DISABLED_TARGETS)
 // Paths: scalar, SSE4, AVX2, AVX-512. SSSE3 and the later AVX-512 sets would not differ here.
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#ifndef PALPATE_SIMD_PATHS_LEFT_OUT
+#define PALPATE_SIMD_PATHS_LEFT_OUT 0
+#endif
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL | PALPATE_SIMD_PATHS_LEFT_OUT)
 #endif
 #if defined(__aarch64__) && !defined(TOOLCHAIN_MISS_SYS_AUXV_H)
 // The path is NEON, which every processor has. Without a choice at run time Highway does not ask
@@ -25,6 +29,13 @@
 
 #include <cstdint>
 #include <cstring>
+
+#if defined(PALPATE_CORE_SIMD) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_CORE_SIMD
+#undef PALPATE_CORE_SIMD
+#else
+#define PALPATE_CORE_SIMD
+#endif
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
@@ -72,3 +83,4 @@ struct Vector3 {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_MATH_BOX_ROUNDING) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_MATH_BOX_ROUNDING
+#undef PALPATE_MATH_BOX_ROUNDING
+#else
+#define PALPATE_MATH_BOX_ROUNDING
+#endif
+
 #include "Math/Box.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -24,3 +31,4 @@ HWY_INLINE V roundedUp(V v) {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

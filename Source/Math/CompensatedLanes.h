@@ -1,5 +1,12 @@
-// No include guard: for files with SIMD code, after Core/Simd.h. The arithmetic of
-// Exact/Compensated.h, operation by operation, and thus with the same bits.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set. The
+// arithmetic of Exact/Compensated.h, operation by operation, and thus with the same bits.
+#if defined(PALPATE_MATH_COMPENSATED_LANES) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_MATH_COMPENSATED_LANES
+#undef PALPATE_MATH_COMPENSATED_LANES
+#else
+#define PALPATE_MATH_COMPENSATED_LANES
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
 
@@ -93,3 +100,4 @@ HWY_INLINE V accurateDot(const DifferenceInLanes<V>& u, const DifferenceInLanes<
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

@@ -13,6 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace impactFilter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -186,6 +187,10 @@ HWY_ATTR unsigned mayImpactKernel(ImpactQuery::Kind kind, const ImpactBlock& blo
              ? mayImpactOf<ImpactQuery::Kind::VertexTriangle>(block, distance, tolerance)
              : mayImpactOf<ImpactQuery::Kind::EdgeEdge>(block, distance, tolerance);
 }
+
+}  // namespace impactFilter
+
+using impactFilter::mayImpactKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

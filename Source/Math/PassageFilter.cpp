@@ -13,6 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace passageFilter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -183,6 +184,10 @@ HWY_ATTR void findPassagesKernel(ImpactQuery::Kind kind, const ImpactBlock& bloc
       findPassagesOf<ImpactQuery::Kind::EdgeEdge>(block, lane, tolerance, found);
   leaveLanes();
 }
+
+}  // namespace passageFilter
+
+using passageFilter::findPassagesKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -10,6 +10,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace rayTriangles {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -146,6 +147,11 @@ HWY_ATTR void firstPointsKernel(const RayTriangles& pairs, const double (&t)[Ray
   }
   leaveLanes();
 }
+
+}  // namespace rayTriangles
+
+using rayTriangles::firstPointsKernel;
+using rayTriangles::intersectRaysKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

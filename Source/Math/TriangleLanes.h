@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_MATH_TRIANGLE_LANES) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_MATH_TRIANGLE_LANES
+#undef PALPATE_MATH_TRIANGLE_LANES
+#else
+#define PALPATE_MATH_TRIANGLE_LANES
+#endif
+
 #include <cstddef>
 
 HWY_BEFORE_NAMESPACE();
@@ -71,3 +78,4 @@ struct TrianglesInLanes {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

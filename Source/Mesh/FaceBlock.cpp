@@ -10,6 +10,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace faceBlock {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -55,6 +56,10 @@ HWY_ATTR void weightedNormalsKernel(const FaceBlock& block, FaceBlockNormals& no
   }
   leaveLanes();
 }
+
+}  // namespace faceBlock
+
+using faceBlock::weightedNormalsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

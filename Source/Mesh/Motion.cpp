@@ -14,6 +14,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace motion {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -47,6 +48,10 @@ HWY_ATTR void addBlocks(const double* before, const double* now, std::size_t blo
     }
   }
 }
+
+}  // namespace motion
+
+using motion::addBlocks;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

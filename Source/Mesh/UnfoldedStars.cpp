@@ -11,6 +11,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace unfoldedStars {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -86,6 +87,10 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
     std::copy_n(bits, count, views + begin);
   }
 }
+
+}  // namespace unfoldedStars
+
+using unfoldedStars::viewsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

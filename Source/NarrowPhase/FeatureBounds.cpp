@@ -18,6 +18,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace featureBounds {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -182,6 +183,10 @@ HWY_ATTR void featureBoundsKernel(const FloatMeshes& meshes, std::span<const Ele
     std::copy_n(found, size, bounds + begin);
   }
 }
+
+}  // namespace featureBounds
+
+using featureBounds::featureBoundsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

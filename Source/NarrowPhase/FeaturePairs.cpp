@@ -15,6 +15,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace featurePairs {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -399,6 +400,11 @@ HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b
   }
   pairs.resize(kept);
 }
+
+}  // namespace featurePairs
+
+using featurePairs::findFeaturePairsKernel;
+using featurePairs::keepOverlappingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -12,6 +12,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace intersectionFilter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -253,6 +254,10 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
   PALPATE_ASSERT(end <= out.data() + out.size());
   out.resize(static_cast<std::size_t>(end - out.data()));
 }
+
+}  // namespace intersectionFilter
+
+using intersectionFilter::keepPossiblyIntersectingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -31,6 +31,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace proximityFilter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -241,6 +242,10 @@ HWY_ATTR void filterKernel(const TrianglePairBatch& batch, double thickness, boo
   else
     filterScaled<true, false>(scaled, possible);
 }
+
+}  // namespace proximityFilter
+
+using proximityFilter::filterKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

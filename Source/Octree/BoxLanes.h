@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_OCTREE_BOX_LANES) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_OCTREE_BOX_LANES
+#undef PALPATE_OCTREE_BOX_LANES
+#else
+#define PALPATE_OCTREE_BOX_LANES
+#endif
+
 #include "Math/BoxRounding.h"
 #include "Octree/BoxMap.h"
 #include "Octree/Dops.h"
@@ -154,3 +161,4 @@ struct BoxLanes {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_OCTREE_LEAF_PAIRS) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_OCTREE_LEAF_PAIRS
+#undef PALPATE_OCTREE_LEAF_PAIRS
+#else
+#define PALPATE_OCTREE_LEAF_PAIRS
+#endif
+
 #include "Octree/PlacedTrees.h"
 
 #include <bit>
@@ -162,3 +169,4 @@ class LeafPairs {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

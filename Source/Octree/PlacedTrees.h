@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_OCTREE_PLACED_TREES) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_OCTREE_PLACED_TREES
+#undef PALPATE_OCTREE_PLACED_TREES
+#else
+#define PALPATE_OCTREE_PLACED_TREES
+#endif
+
 #include "Octree/BoxLanes.h"
 #include "Octree/Traversal.h"
 
@@ -158,3 +165,4 @@ class PlacedTrees {
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

@@ -1,4 +1,11 @@
-// No include guard: for files with SIMD code, after Core/Simd.h.
+// For files with SIMD code, after Core/Simd.h: included once for each instruction set.
+#if defined(PALPATE_OCTREE_WALK_LANES) == defined(HWY_TARGET_TOGGLE)
+#ifdef PALPATE_OCTREE_WALK_LANES
+#undef PALPATE_OCTREE_WALK_LANES
+#else
+#define PALPATE_OCTREE_WALK_LANES
+#endif
+
 #include "Octree/BoxLanes.h"
 #include "Core/Assert.h"
 
@@ -83,3 +90,4 @@ HWY_ATTR HWY_INLINE void walkAround(const Octree& octree, const FloatBox& point,
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
+#endif

@@ -13,6 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace nearestElements {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -197,6 +198,10 @@ HWY_ATTR void searchNearestKernel(const NearestSearch& search, float bound, std:
                                   void* context, TakeCandidates take) {
   Search(search, bound, count, context, take).run();
 }
+
+}  // namespace nearestElements
+
+using nearestElements::searchNearestKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

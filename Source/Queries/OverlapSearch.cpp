@@ -13,6 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace overlapSearch {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -341,6 +342,10 @@ HWY_ATTR void searchOverlappingKernel(const OverlapSearch& search,
                                       Buffer<std::uint32_t>& undecided) {
   OverlapDescent(search, elements, undecided).run();
 }
+
+}  // namespace overlapSearch
+
+using overlapSearch::searchOverlappingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

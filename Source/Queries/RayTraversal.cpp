@@ -17,6 +17,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace rayTraversal {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -267,6 +268,11 @@ HWY_ATTR void traverseRaysKernel(const Octree& octree, std::span<const RayTask> 
            [&](std::uint8_t i) HWY_ATTR { wait(i, searches[i].visitTriangles(at[i])); });
   }
 }
+
+}  // namespace rayTraversal
+
+using rayTraversal::traverseRayKernel;
+using rayTraversal::traverseRaysKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
