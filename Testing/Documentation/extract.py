@@ -144,6 +144,7 @@ def main():
             (folder / source).write_text("#include <palpate/Palpate.h>\nint main() { palpate::OctreeBasedCD collisions; }\n")
     names = {"programs": [program.name for program in programs if program.suffix == "cpp"],
              "programsInC": [program.name for program in programs if program.suffix == "c"],
+             "whole": [program.name for program in programs if program.whole is not None],
              "notRun": [program.name for program in programs if not program.runs],
              "projects": [name for name, _ in projects]}
     (out / "names.cmake").write_text("".join(f"set({key} {' '.join(value)})\n" for key, value in names.items()))
