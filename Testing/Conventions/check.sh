@@ -2,6 +2,7 @@
 # check.sh CHECK ROOT [ARGUMENT...]: checks one convention of the source tree, for example which module may include which.
 # Prints each line at fault. Exit code 0: no fault, 1: faults, 77: skipped. testChecks.sh shows that each check can fail.
 set -uo pipefail
+scripts=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 cd "$2"
 check=$1
 shift 2
@@ -93,26 +94,50 @@ checkPlaces() {
 # distance fields, captures and simplification.
 # Headers for iMSTK need iMSTK; Testing/Imstk compiles them. Arguments: the compiler, Eigen's folder.
 checkPublicHeaders() {
-  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -ISource/Public -ISource/Simplify/Public -ISource/Adapters/MeshFiles/Public
-    -ISource/Adapters/Vtk/Public -ISource/Adapters/Fcl/Public -isystem "$2") header include
-  # The files that a compilation, with these options, reads.
-  reached() { "${compile[@]}" -fsyntax-only -MD -MF - "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
-  local allowed files
-  allowed=$(printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
-    reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 -)
+  local compile=("$1" -std=c++20 -Wall -Wextra -Wconversion -Wshadow -Werror -x c++ -I. -ISource/Public -ISource/Simplify/Public
+    -ISource/Adapters/MeshFiles/Public -ISource/Adapters/Vtk/Public -ISource/Adapters/Fcl/Public -isystem "$2") header include
+  local lists allowed
+  lists=$(mktemp -d)
+  allowed=$lists/allowed
+  # The files that the preprocessor, with these options, reads.
+  reached() { "${compile[@]}" -M "$@" | tr ' \\' '\n\n' | grep / | sort -u; }
+  printf '#include <bits/stdc++.h>\n#include <Eigen/Core>\n#include <Eigen/Geometry>\n' |
+    reached -D_GLIBCXX_USE_TBB_PAR_BACKEND=0 - >"$allowed"
+  # Chains of headers: each reaches all that those before it in its chain reach. They are compiled together, and yet each
+  # sees only files that it reaches itself.
+  local chains=() last=() files i
+  while read -r _ header; do
+    files=$lists/${header//\//_}
+    for ((i = 0; i < ${#chains[@]}; ++i)); do
+      [[ -z $(comm -23 "${last[i]}" "$files") ]] && break
+    done
+    chains[i]+=" $header" last[i]=$files
+  done < <(
+    for header in $(find Source -path '*Public/palpate/*.h' -not -path '*/iMSTK/*' | sort); do
+      files=$lists/${header//\//_}
+      reached -include "$header" /dev/null >"$files"
+      echo "$(wc -l <"$files") $header"
+    done | sort -n)
+  for ((i = 0; i < ${#chains[@]}; ++i)); do
+    printf '#include "%s"\n' ${chains[i]} | "${compile[@]}" -fsyntax-only - && continue
+    for header in ${chains[i]}; do
+      "${compile[@]}" -fsyntax-only -include "$header" /dev/null 2>/dev/null || fault "$header does not compile alone"
+    done
+    ((faults)) || fault "headers do not compile together:${chains[i]}"
+  done
   for header in $(find Source -path '*Public/palpate/*.h' -not -path '*/iMSTK/*' | sort); do
-    files=$(set -o pipefail && reached -include "$header" /dev/null) || fault "$header does not compile alone"
+    files=$lists/${header//\//_}
     if [[ $header == */palpate_c.h ]]; then
       "$1" -x c -std=c99 -Wall -Wextra -Wc++-compat -pedantic -Werror -ISource/Public -fsyntax-only -include "$header" /dev/null ||
         fault "$header is not C99"
       continue
     fi
     if [[ $header == */OctreeBasedCD.h ]]; then
-      while read -r include; do fault "$header reaches $include"; done < <(grep -E '/(DistanceField|Capture|Simplify)\.h$' <<<"$files")
+      while read -r include; do fault "$header reaches $include"; done < <(grep -E '/(DistanceField|Capture|Simplify)\.h$' "$files")
     fi
     if [[ $header == */Palpate.h ]]; then
       for include in Source/Public/palpate/[A-Z]*.h; do
-        grep -qx "$include" <<<"$files" || fault "$header does not include $include"
+        grep -qx "$include" "$files" || fault "$header does not include $include"
       done
     fi
     while read -r include; do
@@ -120,8 +145,9 @@ checkPublicHeaders() {
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
     while read -r include; do fault "$header reaches $include"; done < <(
-      comm -13 <(echo "$allowed") <(echo "$files") | grep -vE '^(Source/((Adapters/(MeshFiles|Vtk|Fcl)|Simplify)/)?Public/palpate/|/dev/null)')
+      comm -13 "$allowed" "$files" | grep -vE '^(Source/((Adapters/(MeshFiles|Vtk|Fcl)|Simplify)/)?Public/palpate/|/dev/null)')
   done
+  rm -r "$lists"
 }
 
 # No two headers define the same name: of inline functions with one name, the linker takes any. Left out are headers that
@@ -247,6 +273,12 @@ checkParts() {
     header=$(sed -nE '1s|^// Part of <?([A-Za-z/_]+\.h)>?: .*|\1|p' "$file")
     [[ -n $header && -n $(find Source -path "*/$header") ]] || fault "$file: the first line names no header"
   done < <(sourceFiles | grep '\.cpp$')
+}
+
+# Random draws have an order: tests give the same numbers with each compiler.
+checkDraws() {
+  find Testing Examples \( -name '*.h' -o -name '*.cpp' \) -print0 | sort -z |
+    xargs -0 python3 "$scripts/draws.py" || faults=1
 }
 
 # Names that say nothing. The size of Source is printed, and not judged.
