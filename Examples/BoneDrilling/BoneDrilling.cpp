@@ -91,9 +91,8 @@ class BoneDrilling : public LiveScene {
     for (std::size_t i = 0; i < positions.size(); ++i) {  // sinking already; an eighth at the burr
       Vector3d& p = positions[i];
       do
-        p = i % 8 == 0
-                ? m_burrAt + Vector3d(between(-14, 14), between(-14, 14), between(-9, 14))
-                : Vector3d(between(-130, 130), between(-150, 120), between(kFloor, kBone + 180));
+        p = i % 8 == 0 ? m_burrAt + within({-14, -14, -9}, {14, 14, 14})
+                       : within({-130, -150, kFloor}, {130, 120, kBone + 180});
       while (p.norm() < (i % 8 == 0 ? boneRadius(p.normalized()) + 1 : 1.2 * kBone));
     }
     // Neighbours have near indices, as solvers of particles arrange them: they share cache lines.
@@ -182,6 +181,11 @@ class BoneDrilling : public LiveScene {
   double between(double low, double high) {
     return low + (high - low) * m_random() / m_random.max();
   }
+  Vector3d within(const Vector3d& low, const Vector3d& high) {
+    Vector3d p;
+    for (const int axis : {2, 1, 0}) p[axis] = between(low[axis], high[axis]);
+    return p;
+  }
 
   /// The hand presses 1 mm deep, along an eight.
   static Vector3d burrTarget(double frame) {
@@ -242,7 +246,7 @@ class BoneDrilling : public LiveScene {
     for (std::size_t i = m_world.bodies()[m_particles].first; i < solver.now.size(); ++i) {
       if (solver.now[i].z() > kFloor) continue;
       const Vector3d vessel(-14, -25, boneRadius(Vector3d(-14, -25, 110).normalized()) + 4);
-      const Vector3d away(between(-2, 2), between(-2, 2), between(-2, 2));
+      const Vector3d away = within({-2, -2, -2}, {2, 2, 2});
       solver.now[i] = solver.before[i] = (i % 2 == 0 ? m_burrAt : vessel) + away;
       solver.velocities[i] = 40 * away;
       ++m_fallen;

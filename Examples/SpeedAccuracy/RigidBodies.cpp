@@ -103,7 +103,8 @@ Moving particles(int count) {
   std::vector<Vector3d> directions;
   std::vector<double> heights;
   while (directions.size() < static_cast<std::size_t>(count)) {
-    const Vector3d d(between(-1, 1), between(-1, 1), between(-1, 1));
+    Vector3d d;
+    for (const int axis : {2, 1, 0}) d[axis] = between(-1, 1);
     if (d.norm() > 1 || d.norm() < 0.1) continue;
     directions.push_back(d.normalized());
     heights.push_back(between(-0.5 * kDepth, 3 * kThickness));

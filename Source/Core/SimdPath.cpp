@@ -1,5 +1,6 @@
 #include "Core/SimdPath.h"
 
+#include <algorithm>
 #include <cstdint>
 
 #undef HWY_TARGET_INCLUDE
@@ -48,6 +49,18 @@ void useSimdPath(const std::string& path) {
       break;
     }
   hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+}
+
+bool hideSimdPaths(const std::vector<std::string>& paths) {
+  std::int64_t hidden = 0;
+  std::size_t found = 0;
+  for (std::int64_t targets = HWY_TARGETS; targets != 0; targets &= targets - 1)
+    if (std::find(paths.begin(), paths.end(), nameOf(targets & -targets)) != paths.end()) {
+      hidden |= targets & -targets;
+      ++found;
+    }
+  hwy::DisableTargets(hidden);
+  return found == paths.size();
 }
 
 }  // namespace palpate

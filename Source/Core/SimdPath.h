@@ -15,4 +15,8 @@ std::vector<std::string> simdPaths();
 /// An empty path selects the best one.
 void useSimdPath(const std::string& path);
 
+/// For tests, before all else: this process behaves as on a processor without these paths. One path
+/// always remains. Returns false if a name is that of no path of this build.
+bool hideSimdPaths(const std::vector<std::string>& paths);
+
 }  // namespace palpate

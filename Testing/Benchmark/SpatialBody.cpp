@@ -161,8 +161,8 @@ std::vector<SpatialCase> makeCases(const SpatialBody& body, const Points& positi
       case Place::Surface:
         c.point = surface;
         c.rotation =
-            Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), direction(random)).matrix() *
-            Eigen::AngleAxisd(testing::uniform(random, 0, 6), Vector3d::UnitX()).matrix();
+            Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitX(), direction(random)).matrix();
+        c.rotation *= Eigen::AngleAxisd(testing::uniform(random, 0, 6), Vector3d::UnitX()).matrix();
         break;
     }
   }

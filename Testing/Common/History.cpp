@@ -20,8 +20,8 @@ constexpr int kTypes = 8;  ///< see randomGeometry() and add()
 constexpr int kMostExponent = 300, kMostSpread = 0;
 
 Settings settingsOfLife(Random& random, OctreeBounds bounds) {
-  Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1,
-                                 random() % 3 ? OctreeUpdate::Auto : OctreeUpdate::Rebuild);
+  const OctreeUpdate update = random() % 3 ? OctreeUpdate::Auto : OctreeUpdate::Rebuild;
+  Settings settings = settingsOf(Engine::Octree, random() % 4 == 0 ? 2 : 1, update);
   settings.octree.maxElementsPerLeaf = random() % 2 ? 32 : 2;
   settings.octree.bounds = bounds;
   return settings;

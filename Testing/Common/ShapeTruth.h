@@ -42,10 +42,9 @@ struct PlacedShape {
 };
 
 inline Matrix3d randomTurn(Random& random) {
-  return Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
-                                            uniform(random, -1, 1), uniform(random, 0.1, 1))
-                                .normalized())
-      .toRotationMatrix();
+  const double w = uniform(random, 0.1, 1), z = uniform(random, -1, 1), y = uniform(random, -1, 1),
+               x = uniform(random, -1, 1);
+  return Eigen::Quaterniond(Eigen::Vector4d(x, y, z, w).normalized()).toRotationMatrix();
 }
 
 /// For a body that is the hull of corners with a ball of `radius` around it: its corners. For

@@ -131,8 +131,8 @@ class BodyScene {
 };
 
 Matrix3d turnBy(Random& random, double by) {
-  return AngleAxisd(uniform(random, -by, by), randomPoint(random, -1, 1).normalized())
-      .toRotationMatrix();
+  const double angle = uniform(random, -by, by);
+  return AngleAxisd(angle, randomPoint(random, -1, 1).normalized()).toRotationMatrix();
 }
 
 /// A ball that comes near the ring and goes away again. The ring turns, and both are carried along.
@@ -489,8 +489,8 @@ class Cloud {
     const auto& [a, b, c] = m_mesh.triangles[(7 * i) % m_mesh.triangles.size()];
     const Vector3d &p = m_mesh.positions[a], u = m_mesh.positions[b] - p,
                    v = m_mesh.positions[c] - p;
-    return u.cross(v).normalized() * uniform(m_random, -0.04, 0.12) +
-           randomPoint(m_random, -1, 1) * 0.02;
+    const Vector3d along = u.cross(v).normalized() * uniform(m_random, -0.04, 0.12);
+    return along + randomPoint(m_random, -1, 1) * 0.02;
   }
   void place() {
     m_now.other.clear();

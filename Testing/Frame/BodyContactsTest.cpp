@@ -225,8 +225,8 @@ TEST(BodyContacts, EdgesThatTouchHaveAContactThatSeparates) {
   for (int run = 0; run < 600; ++run) {
     if (isLeftOut(run)) continue;
     const Eigen::Quaterniond turn =
-        Eigen::Quaterniond(Eigen::Vector4d(uniform(random, -1, 1), uniform(random, -1, 1),
-                                           uniform(random, -1, 1), uniform(random, 0.1, 1)))
+        Eigen::Quaterniond(Eigen::Vector4d{uniform(random, -1, 1), uniform(random, -1, 1),
+                                           uniform(random, -1, 1), uniform(random, 0.1, 1)})
             .normalized();
     const Vector3d place = randomPoint(random, -20, 20);
     std::vector<Vector3d> a, before, now;

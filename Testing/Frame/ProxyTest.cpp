@@ -60,9 +60,9 @@ std::vector<Scene> scenes() {
     Scene scene = all[i];
     scene.name += ", placed";
     scene.isPlaced = true;
+    const double angle = uniform(random, 0, 6);
     scene.rotation =
-        Eigen::AngleAxisd(uniform(random, 0, 6), randomPoint(random, -1, 1).normalized())
-            .toRotationMatrix();
+        Eigen::AngleAxisd(angle, randomPoint(random, -1, 1).normalized()).toRotationMatrix();
     // As inexact as setTransform() accepts.
     if (i % 4 == 0) scene.rotation(0, 1) += 3e-10;
     scene.translation = randomPoint(random, -50, 50);

@@ -148,10 +148,10 @@ TEST(Spike, LeavesAPlateOnTheSideFromWhichItCame) {
                                ? Vector3d((1 - s) * p[12] + s * p[i % 2 ? 13 : 18])
                                : Vector3d(s * p[12] + (1 - s) * (s * p[13] + (1 - s) * p[18]));
     const double offset = i % 5 == 0 ? 0.0 : 0.02;
-    Mesh spike =
-        cone(4 + i % 9, 1.5, uniform(random, 0.3, 1.2), i % 2 ? uniform(random, 0, 6) : 0.0);
-    const Vector3d shift = below + Vector3d(uniform(random, -offset, offset),
-                                            uniform(random, -offset, offset), -kDepth);
+    const double width = uniform(random, 0.3, 1.2), angle = i % 2 ? uniform(random, 0, 6) : 0.0;
+    Mesh spike = cone(4 + i % 9, 1.5, width, angle);
+    const Vector3d shift = below + Vector3d{uniform(random, -offset, offset),
+                                            uniform(random, -offset, offset), -kDepth};
     for (Vector3d& q : spike.positions) q += shift;
     for (const PairSettings& settings : methods)
       for (const bool isRigid : {true, false})

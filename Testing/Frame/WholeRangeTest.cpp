@@ -27,7 +27,8 @@ class Scene {
     std::vector<GeometryId> ids;
     for (int i = 0; i < 3; ++i) {
       const double size = m_random() % 3 ? m_base : length();
-      const Positions now = cloud(1 + m_random() % 12, size, kinds == 4 ? m_random() % 4 : kinds);
+      const auto count = 1 + m_random() % 12, kind = kinds == 4 ? m_random() % 4 : kinds;
+      const Positions now = cloud(count, size, kind);
       ids.push_back(add(collisions, now, size));
       if (m_random() % 2)
         move(collisions, ids.back(), now, m_random() % 2 ? 1e-3 * size : length());
@@ -44,7 +45,9 @@ class Scene {
   double coordinate(double size) {
     const auto kind = m_random() % 6;
     if (kind > 2) return within(-size, size);
-    return kind == 0 ? 0.0 : (m_random() % 2 ? 1 : -1) * (kind == 1 ? size : length());
+    if (kind == 0) return 0.0;
+    const bool isPositive = m_random() % 2;
+    return (isPositive ? 1 : -1) * (kind == 1 ? size : length());
   }
   Eigen::Vector3d point(double size) { return size * randomPoint(m_random, -1, 1); }
   static Eigen::Vector3d clamped(const Eigen::Vector3d& p) {
@@ -54,11 +57,11 @@ class Scene {
   /// kind: 0 of one size, 1 of any sizes, 2 far from the origin, 3 with coordinates of any sizes.
   Positions cloud(std::size_t count, double size, std::uint64_t kind) {
     const double far = kind == 2 ? length() : 0.0;
-    const Eigen::Vector3d centre(coordinate(far), coordinate(far), coordinate(far));
+    const Eigen::Vector3d centre{coordinate(far), coordinate(far), coordinate(far)};
     Positions positions;
     for (std::size_t i = 0; i < count; ++i) {
       if (kind == 3)
-        positions.emplace_back(coordinate(size), coordinate(size), coordinate(size));
+        positions.push_back({coordinate(size), coordinate(size), coordinate(size)});
       else
         positions.push_back(clamped((kind == 2 ? centre : Eigen::Vector3d(0, 0, 0)) +
                                     point(kind == 1 ? length() : size)));

@@ -68,10 +68,12 @@ SceneMesh prism(const std::vector<Vector3d>& polygon) {
 BodyCase plate(double height, std::size_t count, Random& random) {
   const double h = 0.5 * height;
   BodyCase made{prism({{-0.5, -h, 0}, {0.5, -h, 0}, {0.5, h, 0}, {-0.5, h, 0}}), {}};
-  for (std::size_t i = 0; i < count; ++i)
-    made.particles.emplace_back(uniform(random, -0.45, 0.45),
-                                uniform(random, -h - kThickness, h + kThickness),
-                                uniform(random, -0.45, 0.45));
+  for (std::size_t i = 0; i < count; ++i) {
+    const double z = uniform(random, -0.45, 0.45),
+                 y = uniform(random, -h - kThickness, h + kThickness),
+                 x = uniform(random, -0.45, 0.45);
+    made.particles.emplace_back(x, y, z);
+  }
   return made;
 }
 
@@ -80,9 +82,11 @@ BodyCase wedge(double degrees, std::size_t count, Random& random) {
   const double half = 0.5 * degrees * std::numbers::pi / 180;
   const Vector3d up(std::cos(half), std::sin(half), 0), down(std::cos(half), -std::sin(half), 0);
   BodyCase made{prism({Vector3d::Zero(), down, up}), {}};
-  for (std::size_t i = 0; i < count; ++i)
-    made.particles.emplace_back(uniform(random, -kThickness, 3 * kThickness),
-                                uniform(random, -2, 2) * kThickness, uniform(random, -0.4, 0.4));
+  for (std::size_t i = 0; i < count; ++i) {
+    const double z = uniform(random, -0.4, 0.4), y = uniform(random, -2, 2) * kThickness,
+                 x = uniform(random, -kThickness, 3 * kThickness);
+    made.particles.emplace_back(x, y, z);
+  }
   return made;
 }
 

@@ -52,17 +52,19 @@ Corners faceOf(const Design& design, Random& random) {
 /// A triangle with one corner at the origin and two above.
 Corners cornerDown(Random& random) {
   const double turn = uniform(random, 0, 2 * std::numbers::pi);
-  return {Vector3d::Zero(), inPlane(turn) * 0.6 + Vector3d(0, 0, uniform(random, 0.5, 0.8)),
-          inPlane(turn + uniform(random, 1, 2)) * 0.6 + Vector3d(0, 0, uniform(random, 0.5, 0.8))};
+  const double first = uniform(random, 0.5, 0.8), second = uniform(random, 0.5, 0.8),
+               angle = uniform(random, 1, 2);
+  return {Vector3d::Zero(), inPlane(turn) * 0.6 + Vector3d(0, 0, first),
+          inPlane(turn + angle) * 0.6 + Vector3d(0, 0, second)};
 }
 
 /// A triangle with an edge through the origin. The third corner is above (side 1) or below.
 Corners edgeThrough(double along, double side, double size, Random& random) {
-  const double share = uniform(random, 0.3, 0.7);
+  const double share = uniform(random, 0.3, 0.7), height = side * uniform(random, 0.5, 0.8),
+               shift = uniform(random, -0.3, 0.3);
   return {-share * size * inPlane(along), (1 - share) * size * inPlane(along),
-          size * (uniform(random, -0.3, 0.3) * inPlane(along) +
-                  0.4 * inPlane(along + std::numbers::pi / 2) +
-                  Vector3d(0, 0, side * uniform(random, 0.5, 0.8)))};
+          size * (shift * inPlane(along) + 0.4 * inPlane(along + std::numbers::pi / 2) +
+                  Vector3d(0, 0, height))};
 }
 
 /// Orders the corners so that each normal points to the other triangle.
@@ -93,8 +95,8 @@ Case build(const Design& design, Random& random, int frames = 1) {
     frame.a = cornerDown(random);
   }
   windTowardsEachOther(frame);
-  const Vector3d sideways =
-      design.slant * uniform(random, 0, 1) * inPlane(uniform(random, 0, 2 * std::numbers::pi));
+  const Vector3d direction = inPlane(uniform(random, 0, 2 * std::numbers::pi)),
+                 sideways = design.slant * uniform(random, 0, 1) * direction;
   // The sideways part is zero where the path meets b's plane.
   const auto at = [&](double height) -> Vector3d {
     return Vector3d(0, 0, height) + height * sideways;
@@ -105,10 +107,9 @@ Case build(const Design& design, Random& random, int frames = 1) {
     for (Vector3d& corner : made.frames.back().a)
       corner += at((1 - t) * design.start + t * design.end);
   }
-  const Eigen::Matrix3d turn = Eigen::Quaterniond(uniform(random, -1, 1), uniform(random, -1, 1),
-                                                  uniform(random, -1, 1), uniform(random, 0.1, 1))
-                                   .normalized()
-                                   .toRotationMatrix();
+  const double z = uniform(random, 0.1, 1), y = uniform(random, -1, 1), x = uniform(random, -1, 1),
+               w = uniform(random, -1, 1);
+  const Eigen::Matrix3d turn = Eigen::Quaterniond(w, x, y, z).normalized().toRotationMatrix();
   transform(made, [&](const Vector3d& p) -> Vector3d { return turn * p; });
   return made;
 }

@@ -54,9 +54,13 @@ std::vector<std::string> plainTexts() {
     for (char& c : text) c = static_cast<char>(random() % range);
   }
   std::string& mixed = texts.emplace_back();
-  for (unsigned i = 0; mixed.size() < 90'000; ++i)
-    mixed += std::string(random() % 300, static_cast<char>(random() % 256)) +
-             mixed.substr(random() % (mixed.size() + 1), random() % 900);
+  for (unsigned i = 0; mixed.size() < 90'000; ++i) {
+    const auto repeats = random() % 300;
+    const auto letter = static_cast<char>(random() % 256);
+    const auto start = random() % (mixed.size() + 1);
+    const std::string again = mixed.substr(start, random() % 900);
+    mixed += std::string(repeats, letter) + again;
+  }
   for (std::string& text : texts) text.resize(text.size() / 3 * 3);
   return texts;
 }

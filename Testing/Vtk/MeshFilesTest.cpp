@@ -40,8 +40,8 @@ class MeshFilesByVtk : public ::testing::Test {
     std::mt19937 random(1);
     std::uniform_int_distribution<int> coordinate(-4096, 4096);
     for (std::uint32_t v = 0; v < kVertices; ++v) {  // of few digits: text and floats keep no more
-      surface.positions.emplace_back(coordinate(random), coordinate(random), coordinate(random));
-      surface.positions.back() /= 64;
+      Eigen::Vector3d& p = surface.positions.emplace_back();
+      for (double& x : p) x = coordinate(random) / 64.0;
     }
     for (std::uint32_t v = 0; v < kVertices; v += 3) surface.triangles.push_back({v, v + 1, v + 2});
     lines = surface;

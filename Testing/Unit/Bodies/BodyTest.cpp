@@ -69,7 +69,8 @@ class Searched {
 /// elements leave no room for errors.
 Searched anySearched(Random& random, int round, double& size, Vector3d& offset) {
   size = std::exp2(uniform(random, -3, 3));
-  offset = randomPoint(random, -1, 1) * (round % 3 == 0 ? 1.0 : std::exp2(uniform(random, 20, 44)));
+  offset = randomPoint(random, -1, 1);
+  if (round % 3 != 0) offset *= std::exp2(uniform(random, 20, 44));
   return {random, offset, size, round % 2 == 1, random() % 2 ? 0.1 : 1e-9};
 }
 
@@ -149,8 +150,9 @@ TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
     const Triangle& corners =
         searched.corners(static_cast<std::uint32_t>(random() % searched.elementCount()));
     const Vector3d on = searched.at(true)[corners[random() % 3]];
-    Eigen::AlignedBox3d box(on - 0.1 * size * randomPoint(random, 0, 1),
-                            on + 0.1 * size * randomPoint(random, 0, 1));
+    const Vector3d below = 0.1 * size * randomPoint(random, 0, 1),
+                   above = 0.1 * size * randomPoint(random, 0, 1);
+    Eigen::AlignedBox3d box(on - below, on + above);
     const auto axis = static_cast<int>(random() % 3);
     (random() % 2 ? box.min() : box.max())[axis] = on[axis];
     findElementsNear(searched.geometry, box, wholeStep, found);
@@ -176,9 +178,9 @@ TEST(TreesOf, HaveAllPairsOfBoxesWithinTheThickness) {
     double size;
     Vector3d offset;
     const Searched a = anySearched(random, round, size, offset);
-    const Searched b(random, offset + size * randomPoint(random, -1, 1),
-                     size * std::exp2(uniform(random, -2, 2)), random() % 2,
-                     random() % 2 ? 0.1 : 1e-9);
+    const Searched b{random, offset + size * randomPoint(random, -1, 1),
+                     size * std::exp2(uniform(random, -2, 2)), random() % 2 != 0,
+                     random() % 2 ? 0.1 : 1e-9};
     if (a.geometry.tree.frame().scale != b.geometry.tree.frame().scale) continue;
     const bool wholeStep = random() % 2;
     const auto boxOf = [&](const Searched& of, std::uint32_t element) {
@@ -197,7 +199,8 @@ TEST(TreesOf, HaveAllPairsOfBoxesWithinTheThickness) {
       return static_cast<std::uint32_t>(random() % of.elementCount());
     };
     for (int repeat = 0; repeat < 4; ++repeat) {
-      const double thickness = gapOf(any(a), any(b));
+      const std::uint32_t elementOfA = any(a), elementOfB = any(b);
+      const double thickness = gapOf(elementOfA, elementOfB);
       const TreePair trees = treesOf(a.geometry, b.geometry, thickness, wholeStep);
       const std::vector<ElementPair> found = traversedPairs(trees);
       for (std::uint32_t i = 0; i < a.elementCount(); ++i)
@@ -219,8 +222,8 @@ TEST(GeometryOctree, DopsEncloseTheirElements) {
   Random random(23);
   Threads thread(1);
   for (int round = 0; round < 40; ++round) {
-    Searched searched(random, randomPoint(random, -5, 5), std::exp2(uniform(random, -20, 20)),
-                      true);
+    Searched searched{random, randomPoint(random, -5, 5), std::exp2(uniform(random, -20, 20)),
+                      true};
     GeometryOctree& tree = searched.geometry.tree;
     const OctreeBounds bounds = round % 2 ? OctreeBounds::Dop14 : OctreeBounds::Dop18;
     tree.updateDops(searched.geometry.mesh, bounds, thread);

@@ -370,9 +370,9 @@ TEST(FirstImpacts, OfLinesAndPointsOnAFlatFloorHaveItsNormal) {
   std::size_t contacts = 0, dropped = 0;
   for (int run = 0; run < 8; ++run) {
     TestGeometry floor = testGeometry(sheet(9, 0, 0));
+    const double angle = uniform(random, 0, 3);
     const Eigen::Matrix3d turn =
-        Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized())
-            .toRotationMatrix();
+        Eigen::AngleAxisd(angle, randomPoint(random, -1, 1).normalized()).toRotationMatrix();
     for (Vector3d& p : floor.positions) p = turn * Vector3d(p[0], p[1], 0);
     for (const double radius : {0.0, 0.03})
       for (const bool isLine : {true, false}) {

@@ -210,10 +210,13 @@ Scene randomScene(Random& random) {
       add(testGeometry(soup(random, 12, 0.2)));
       add(testGeometry(soup(random, 12, 0.2)));
       break;
-    case 1:
+    case 1: {
       add(testGeometry(sheet(4, 0.1, uniform(random, 0, 6))));
-      add(thread(random, 12, 0.2, uniform(random, 0, 0.02), random() % 2));
+      const double radius = uniform(random, 0, 0.02);
+      const bool isClosed = random() % 2;
+      add(thread(random, 12, 0.2, radius, isClosed));
       break;
+    }
     case 2:
       add(tapered(random, thread(random, 10, 0.2, 0.0, false), 0.03));
       add(particles(random, 12, uniform(random, 0, 0.03)));

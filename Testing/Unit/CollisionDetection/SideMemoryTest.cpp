@@ -169,8 +169,8 @@ struct Membrane : Motion {
   }
   void move(Random& random, double motion) {
     for (Vector3d& p : nowA) {
-      p += Vector3d(uniform(random, -0.3, 0.3) * motion, uniform(random, -0.3, 0.3) * motion,
-                    uniform(random, -1, 1) * motion);
+      p += motion *
+           Vector3d{uniform(random, -0.3, 0.3), uniform(random, -0.3, 0.3), uniform(random, -1, 1)};
       for (int k = 0; k < 2; ++k) p[k] = std::clamp(p[k], 0.25, 0.75);
       p[2] = std::clamp(p[2], 0.3, 0.7);
     }

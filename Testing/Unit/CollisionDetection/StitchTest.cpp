@@ -110,7 +110,7 @@ TEST(Stitch, EachPassageIsReportedInItsStepWithItsElements) {
     for (const std::uint32_t v : scenes::knotEnd()) thread[v] += torn;
     for (Vector3d& p : thread) p += randomPoint(random, -0.005, 0.005);
     if (fault == 2)  // the thread cuts through tissue: a hole leaves it
-      for (Vector3d& p : rims) p += Vector3d(uniform(-1, 1), uniform(-1, 1), 0);
+      for (Vector3d& p : rims) p += Vector3d{uniform(-1, 1), uniform(-1, 1), 0};
     const bool isTorn = fault == 3;
     const std::uint32_t element = static_cast<std::uint32_t>(random() % thread.size());
 

@@ -105,7 +105,7 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
   std::size_t changes = 0;
   int largest = 0;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {
-    Watched all(polygon(random, 7), polygon(random, 6), WatchKind::Closed);
+    Watched all{polygon(random, 7), polygon(random, 6), WatchKind::Closed};
     for (int i = 0; i < kSteps; ++i) {
       const int before = all.count();
       // They are drawn back, so that they do not drift apart.
@@ -113,7 +113,8 @@ TEST(ThreadTopology, CountsOfClosedThreadsAreLinkingNumbersAfterEachOfManySteps)
         for (Vector3d& q : p) q *= 0.99;
         return shaken(random, p, 0.2);
       };
-      const auto events = all.step(next(all.thread), next(all.loop));
+      const Positions thread = next(all.thread), loop = next(all.loop);
+      const auto events = all.step(thread, loop);
       ASSERT_EQ(before + sumOf(events), all.count());
       const double integral = linkingIntegral(all.thread, all.loop);
       ASSERT_NEAR(all.count(), integral, 1e-6) << repeat << ' ' << i;
@@ -129,7 +130,7 @@ TEST(ThreadTopology, EventsAreThePassagesOfRationalArithmetic) {
   Random random(2);
   std::size_t passages = 0, ends = 0;
   for (int repeat = 0; repeat < 150; ++repeat) {
-    Watched all(polygon(random, 5), polygon(random, 5), static_cast<WatchKind>(repeat % 3));
+    Watched all{polygon(random, 5), polygon(random, 5), static_cast<WatchKind>(repeat % 3)};
     for (int i = 0; i < 10; ++i) {
       const Positions thread = shaken(random, all.thread, 0.3),
                       loop = shaken(random, all.loop, 0.3);
@@ -157,10 +158,11 @@ TEST(ThreadTopology, IsConsistentWhereFeaturesOnlyTouch) {
   std::size_t changes = 0;
   for (int repeat = 0; repeat < 60; ++repeat) {
     const WatchKind kind = repeat % 2 == 0 ? WatchKind::Closed : WatchKind::Open;
-    Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), kind);
+    Watched all{snapped(polygon(random, 6)), snapped(polygon(random, 5)), kind};
     for (int i = 0; i < 20; ++i) {
       const int before = all.count();
-      const auto events = all.step(snapped(polygon(random, 6)), snapped(polygon(random, 5)));
+      const Positions thread = snapped(polygon(random, 6)), loop = snapped(polygon(random, 5));
+      const auto events = all.step(thread, loop);
       ASSERT_EQ(before + sumOf(events), all.count());
       changes += all.count() != before;
       // The same positions count the same, however they were reached.
@@ -179,7 +181,7 @@ TEST(ThreadTopology, PartsCountWhatRationalArithmeticFindsWhereFeaturesOnlyTouch
   };
   std::size_t passages = 0;
   for (int repeat = 0; repeat < 20; ++repeat) {
-    Watched all(snapped(polygon(random, 6)), snapped(polygon(random, 5)), WatchKind::Parts);
+    Watched all{snapped(polygon(random, 6)), snapped(polygon(random, 5)), WatchKind::Parts};
     for (int i = 0; i < 20; ++i) {
       const Positions thread = snapped(polygon(random, 6)), loop = snapped(polygon(random, 5));
       const auto truth = all.truth(thread, loop);

@@ -108,16 +108,17 @@ TEST(AffineClaim, HoldsOnlyIfNoSampleDisprovesIt) {
           corners[k] = positions[3 * t + k] - geometry.tree.frame().origin - centre;
         isDisproved = isDisproved || ClaimOracle{claim, side}.disproves(corners);
       }
+    const bool holds = claim.holds(geometry);
+    ASSERT_FALSE(holds && isDisproved) << "case " << i;
     for (const std::string& path : simdPaths()) {
       useSimdPath(path);
-      const bool holds = claim.holds(geometry);
-      ASSERT_FALSE(holds && isDisproved) << "case " << i << ", " << path;
-      held += holds;
+      ASSERT_EQ(claim.holds(geometry), holds) << "case " << i << ", " << path;
     }
+    useSimdPath("");
+    held += holds;
     disproved += isDisproved;
   }
-  useSimdPath("");
-  EXPECT_GT(held, casesOf(300));
+  EXPECT_GT(held, casesOf(75));
   EXPECT_GT(disproved, casesOf(300));
 }
 

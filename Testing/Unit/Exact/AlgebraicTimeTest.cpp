@@ -193,7 +193,10 @@ TEST(AlgebraicTime, LowerBoundsAreNotLateNextToADouble) {
 TEST(AlgebraicTime, SignsNextToACubicRootAreExact) {
   Random random(3);
   for (int repeat = 0; repeat < 2000; ++repeat) {
-    const auto nonzero = [&] { return random.between(1, 30) * (random.below(2) ? 1 : -1); };
+    const auto nonzero = [&] {
+      const int size = random.between(1, 30);
+      return random.below(2) ? size : -size;
+    };
     const int p = random.between(1, 30), r = random.between(1, 30), a = nonzero(), b = nonzero(),
               c = nonzero();
     // (r x - p) (a + b x + c x²)

@@ -16,7 +16,8 @@ namespace {
 using Exactly = mpq_class;
 
 double uneven(Random& random) {
-  return std::ldexp(random.unit() + 0.5, random.between(-30, 30)) * (random.below(2) ? 1 : -1);
+  const double size = random.ldexp(random.unit() + 0.5, -30, 30);
+  return random.below(2) ? size : -size;
 }
 Eigen::Vector3d unevenVector(Random& random) {
   return {uneven(random), uneven(random), uneven(random)};
@@ -192,7 +193,7 @@ TEST(WideInteger, GridsHoldDifferencesOfPositionsOrSayThatTheyDoNot) {
       return std::ldexp(std::round(std::ldexp(random.unit() - 0.5, std::min(bits, 52))),
                         exponent + low);
     };
-    const auto position = [&] { return Eigen::Vector3d(coordinate(), coordinate(), coordinate()); };
+    const auto position = [&] { return Eigen::Vector3d{coordinate(), coordinate(), coordinate()}; };
     const Eigen::Vector3d a = position(), b = position(), c = position();
     const ExponentRange range(a, b, c);
     int lowest = ExponentRange::kNone, highest = -ExponentRange::kNone;
@@ -237,7 +238,8 @@ TEST(Rational, QuotientsAreWithinAnUlpForAllSizes) {
     return value >>= random.below(60);
   };
   for (int repeat = 0; repeat < 20000; ++repeat) {
-    const Integer numerator = large() * (random.below(2) ? 1 : -1), denominator = large() + 1;
+    const Integer size = large(), numerator = random.below(2) ? size : Integer(-size),
+                  denominator = large() + 1;
     const int exponent = random.between(-300, 300);
     const double value = exact::quotient(numerator, denominator, exponent);
     Exactly truth(numerator, denominator);
@@ -255,7 +257,7 @@ TEST(Rational, DoublesKeepTheirValueAndOrder) {
   Random random(8);
   const auto any = [&] {
     return random.below(9) == 0 ? double(random.between(-2, 2))
-                                : std::ldexp(random.unit() - 0.5, random.between(-1080, 1020));
+                                : random.ldexp(random.unit() - 0.5, -1080, 1020);
   };
   for (int repeat = 0; repeat < 20000; ++repeat) {
     const double a = any(), b = random.below(5) == 0 ? a : any();
@@ -300,7 +302,7 @@ TEST(FilteredSigns, DecidedSignsAreThoseOfExactDifferences) {
     Eigen::Vector3d d = c - scaled(random.inCube(), e);
     const Eigen::Vector3d u = a - b;
     // c - d becomes perpendicular to a - b, up to a share of 1 to 2^-56 of its length.
-    const double share = std::ldexp(random.unit() - 0.5, -random.below(56));
+    const double share = random.ldexp(random.unit() - 0.5, -55, 0);
     if (u[2] != 0.0) {
       const double along = (u[0] * (c[0] - d[0]) + u[1] * (c[1] - d[1])) / u[2];
       d[2] = c[2] + along * (1 + share);
@@ -345,11 +347,11 @@ TEST(FilteredSigns, DecidedSidesAreThoseOfExactDifferences) {
                           g = position();
     // The point is on the plane through the edge and the normal, up to rounding.
     const Eigen::Vector3d edge = b - a, p = c - a, q = d - a, normal = p.cross(q);
-    Eigen::Vector3d at =
-        a + random.unit() * edge +
-        random.unit() *
-            (normal.norm() > 0 ? Eigen::Vector3d(normal / normal.norm() * edge.norm()) : g);
-    at += std::ldexp(1.0, -random.below(56)) * position();
+    Eigen::Vector3d at = a + random.unit() * edge;
+    at += random.unit() *
+          (normal.norm() > 0 ? Eigen::Vector3d(normal / normal.norm() * edge.norm()) : g);
+    const double aside = std::ldexp(1.0, -random.below(56));
+    at += aside * position();
     const Eigen::Vector3d from = at - a;
     const Sign sign = signAside(edge, from, normal, sumOfMagnitudes(p) * sumOfMagnitudes(q));
     if (sign == Sign::Unknown) continue;

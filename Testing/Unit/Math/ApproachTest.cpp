@@ -31,9 +31,9 @@ double someDistance(const ImpactCase& query, test::Random& random) {
   double size = 1e-300;
   for (std::size_t i = 1; i < 8; ++i)
     size = std::max(size, (query.positions[i] - query.positions[0]).cwiseAbs().maxCoeff());
-  if (random.below(2)) return std::ldexp(size * random.unit(), -random.below(40));
+  if (random.below(2)) return random.ldexp(size * random.unit(), -39, 0);
   const double own = oracle::rootAbove(oracle::squareDistanceAt(query, random.below(5) / 4.0));
-  const double factor = 1.0 + std::ldexp(random.unit() - 0.5, -random.below(52));
+  const double factor = 1.0 + random.ldexp(random.unit() - 0.5, -51, 0);
   return std::clamp(own * factor, 1e-300, 1e300);
 }
 
@@ -51,7 +51,7 @@ void expectTrue(const ImpactCase& query, const TimeOfImpactSettings& settings,
   const double end = time.value_or(1.0);
   const Rational distance(settings.minimumDistance);
   for (int i = 0; i < 12; ++i) {
-    double t = end * (1.0 - std::ldexp(random.unit(), -random.below(30)));
+    double t = end * (1.0 - random.ldexp(random.unit(), -29, 0));
     if (i < 5) t = end * i / 4.0;
     if (time && t >= *time) continue;
     EXPECT_TRUE(oracle::FeaturesAtTime(query, t).isAbove(distance * distance))
@@ -117,15 +117,17 @@ TEST(Approach, HoldsForSliversAndSmallDistances) {
     // Parallel edges or a sliver, and the other feature a small gap away from a point in them.
     for (std::size_t end = 0; end < 8; end += 4) {
       if (query.edges) {
-        p[end + 3] = p[end + 2] + random.unit() * (p[end + 1] - p[end]) + thin * random.inCube();
-        const Eigen::Vector3d move =
-            p[end] + random.unit() * (p[end + 1] - p[end]) + gap * random.inCube() - p[end + first];
+        p[end + 3] = p[end + 2] + random.unit() * (p[end + 1] - p[end]);
+        p[end + 3] += thin * random.inCube();
+        Eigen::Vector3d move = p[end] + random.unit() * (p[end + 1] - p[end]) - p[end + first];
+        move += gap * random.inCube();
         p[end + first] += move;
         p[end + last] += move;
       } else {
-        p[end + 3] =
-            p[end + 1] + random.unit() * (p[end + 2] - p[end + 1]) + thin * random.inCube();
-        p[end] = p[end + 1] + random.unit() * (p[end + 2] - p[end + 1]) + gap * random.inCube();
+        p[end + 3] = p[end + 1] + random.unit() * (p[end + 2] - p[end + 1]);
+        p[end + 3] += thin * random.inCube();
+        p[end] = p[end + 1] + random.unit() * (p[end + 2] - p[end + 1]);
+        p[end] += gap * random.inCube();
       }
     }
     const TimeOfImpactSettings settings{gap * random.unit(), i % 3 ? 1e-6 : 0x1p-40};

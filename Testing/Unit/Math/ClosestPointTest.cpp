@@ -253,13 +253,17 @@ TEST(ClosestPoint, ExchangedParallelEdgesAndEndsKeepTheBits) {
     Four x;
     if (i % 2 == 0) {
       const int axis = random.below(3);
-      for (Vector3d& p : x) p = Vector3d(random.below(1000), random.below(1000), 0) / 100;
+      for (Vector3d& p : x)
+        p = Vector3d{double(random.below(1000)), double(random.below(1000)), 0} / 100;
       x[1] = x[0], x[3] = x[2];
       x[1][axis] += 0.01 * (1 + random.below(1000));
       x[3][axis] -= 0.01 * (1 + random.below(1000));
     } else {
-      const Vector3d along(random.below(64), random.below(64), random.below(64));
-      const Vector3d at(random.below(9), random.below(9), random.below(9));
+      const auto onGrid = [&](int size) {
+        return Vector3d{double(random.below(size)), double(random.below(size)),
+                        double(random.below(size))};
+      };
+      const Vector3d along = onGrid(64), at = onGrid(9);
       x = {at, Vector3d(at + along), Vector3d(at + 0.5 * random.below(5) * along),
            Vector3d(at - 0.25 * random.below(9) * along)};
       if (random.below(2)) x[2] += Vector3d(3, -1, 2), x[3] += Vector3d(3, -1, 2);
@@ -512,8 +516,8 @@ TEST(ClosestPoint, EdgesOfGridsAreClassifiedExactly) {
       return far + (Vector3d(i * edge - 1, j * edge - 1, 0) + moved);
     };
     const int alongX = sideways != 1, alongY = sideways != 0;
-    const Vector3d moved(below(2) ? 0.3 * edge : 0.0, below(2) ? 0.1 * edge : 0.0,
-                         below(2) ? 0.03 * edge : std::ldexp(1.0, -1074));
+    const Vector3d moved{below(2) ? 0.3 * edge : 0.0, below(2) ? 0.1 * edge : 0.0,
+                         below(2) ? 0.03 * edge : std::ldexp(1.0, -1074)};
     Vector3d p0 = onGrid(x, y, Vector3d::Zero()),
              p1 = onGrid(x + alongX, y + alongY, Vector3d::Zero());
     const int i = x + below(3) - 1, j = y + below(3) - 1;

@@ -25,9 +25,9 @@ TriangleBatch randomTriangles(Random& random) {
 }
 
 TEST(DistanceBounds, EncloseTheDistanceOnEveryPath) {
-  Random random(1);
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
+    Random random(1);
     for (int i = 0; i < casesOf(5000); ++i) {
       const TriangleBatch batch = randomTriangles(random);
       Eigen::Vector3d p = randomPoint(random, -2, 2);

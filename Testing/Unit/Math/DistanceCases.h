@@ -41,7 +41,8 @@ class DistanceCases {
     Four x{vector(), vector(), vector(), vector()};
     switch (kind) {
       case DistanceKind::Sliver:
-        x[3] = x[1] + real() * (x[2] - x[1]) + smallPower() * vector();
+        x[3] = x[1] + real() * (x[2] - x[1]);
+        x[3] += smallVector();
         break;
       case DistanceKind::FarAway:
         for (Vector& v : x) v += Vector(1e6, -2e6, 3e5);
@@ -50,15 +51,21 @@ class DistanceCases {
         for (Vector& v : x) v = m_random.onGrid(4);
         break;
       case DistanceKind::NearlyTouching:
-        x[0] = x[1] + unit() * (x[2] - x[1]) + 0.3 * below(2) * (x[3] - x[1]) +
-               smallPower() * vector();
+        x[0] = x[1] + unit() * (x[2] - x[1]);
+        x[0] += 0.3 * below(2) * (x[3] - x[1]);
+        x[0] += smallVector();
         break;
       case DistanceKind::NearlyParallel:
-        x[3] = x[2] + real() * (x[1] - x[0]) + smallPower() * vector();
+        x[3] = x[2] + real() * (x[1] - x[0]);
+        x[3] += smallVector();
         break;
-      case DistanceKind::NearlyCoincident:
-        x[1 + below(3)] = x[below(4)] + below(3) * smallPower() * vector();
+      case DistanceKind::NearlyCoincident: {
+        Vector near = x[below(4)];
+        const int share = below(3);
+        near += share * smallVector();
+        x[1 + below(3)] = near;
         break;
+      }
       case DistanceKind::NoArea:
         x[3] = x[2];
         if (below(2)) x[1] = x[2];
@@ -74,15 +81,17 @@ class DistanceCases {
         const Vector b = x[2], c = x[3], a = 0.5 * (b + c) + 0.3 * x[1],
                      normal = (b - a).cross(c - a).normalized();
         x[1] = a;
-        x[0] = b + (0.5 + 0.1 * smallPower() * real()) * (c - b) + real() * smallPower() * normal +
-               0x1p-53 * below(3) * (a - b);
+        x[0] = b + (0.5 + 0.1 * smallReal()) * (c - b);
+        x[0] += smallReal() * normal;
+        x[0] += 0x1p-53 * below(3) * (a - b);
         break;
       }
       case DistanceKind::ShortEdge: {
         const Vector a = x[1], b = a + std::ldexp(1.0, -below(50)) * x[2], c = x[3],
                      normal = (b - a).cross(c - a).normalized();
         const double s = unit();
-        x[0] = (1 - s) * a + s * c + std::ldexp(real(), -below(60)) * (b - a) + real() * normal;
+        x[0] = (1 - s) * a + s * c + m_random.ldexp(real(), -59, 0) * (b - a);
+        x[0] += real() * normal;
         x[2] = b;
         if (below(2)) x = {x[0], b, c, a};
         break;
@@ -98,8 +107,12 @@ class DistanceCases {
       }
       case DistanceKind::FarEdges: {
         const auto whole = [&] { return m_random.onGrid(1 << 20); };
-        const Vector p = 4 * (whole() - whole()), q = 4 * (whole() - whole()), p0 = whole();
-        const Vector q0 = p0 + below(2) * p - 0.25 * below(5) * q + (1 + below(3)) * p.cross(q);
+        Vector p = 4 * whole(), q = 4 * whole();
+        p -= 4 * whole();
+        q -= 4 * whole();
+        const Vector p0 = whole();
+        const int alongP = below(2), alongQ = below(5), across = 1 + below(3);
+        const Vector q0 = p0 + alongP * p - 0.25 * alongQ * q + across * p.cross(q);
         x = {p0, p0 + p, q0, q0 + q};
         if (below(2)) x = {q0, q0 + q, p0, p0 + p};
         break;
@@ -108,7 +121,8 @@ class DistanceCases {
         const Vector origin = Vector(1.1, -1.3, 1.7) * 0x1p99,
                      edge = 0x1p50 * m_random.onGrid(1000),
                      q0 = origin + 0x1p50 * m_random.onGrid(100);
-        x = {origin, origin + edge, q0, q0 + (1 + below(3)) * edge + 0x1p50 * m_random.onGrid(2)};
+        x = {origin, origin + edge, q0, q0 + (1 + below(3)) * edge};
+        x[3] += 0x1p50 * m_random.onGrid(2);
         break;
       }
       default:
@@ -123,7 +137,15 @@ class DistanceCases {
   using Vector = Eigen::Vector3d;
   double real() { return 2 * unit() - 1; }
   double smallPower() { return std::pow(10.0, -below(18)); }
+  double smallReal() {
+    const double power = smallPower();
+    return power * real();
+  }
   Vector vector() { return m_random.inCube(); }
+  Vector smallVector() {
+    const double power = smallPower();
+    return power * vector();
+  }
 
   test::Random m_random;
 };

@@ -191,8 +191,10 @@ class HardCases {
         break;
       case ImpactKind::InOnePlane: {
         const Vector u = point(), v = point(), origin = point();
-        for (Vector& p : query.positions)
-          p = origin + (m_random.below(9) - 4) * u + (m_random.below(9) - 4) * v;
+        for (Vector& p : query.positions) {
+          p = origin + (m_random.below(9) - 4) * u;
+          p += (m_random.below(9) - 4) * v;
+        }
         break;
       }
       case ImpactKind::Parallel:
@@ -260,15 +262,15 @@ class HardCases {
   void refine(ImpactKind kind, ImpactCase& query) {
     const auto nudged = [&](double x) {
       return m_random.below(3) ? std::nextafter(x, m_random.below(2) ? 1e9 : -1e9)
-                               : x + std::ldexp(m_random.unit() - 0.5, -m_random.below(45));
+                               : x + m_random.ldexp(m_random.unit() - 0.5, -44, 0);
     };
     if (kind == ImpactKind::NearlyTouching)
       for (Vector& p : query.positions)
         if (m_random.below(3) == 0) p[m_random.below(3)] = nudged(p[m_random.below(3)]);
     if (kind == ImpactKind::FarAway) {
-      const Vector offset = m_random.below(2)
-                                ? Vector(std::ldexp(1.0, m_random.below(42)) * point())
-                                : Vector(1e6 * m_random.inCube());
+      const bool isWhole = m_random.below(2);
+      const double size = isWhole ? std::ldexp(1.0, m_random.below(42)) : 1e6;
+      const Vector offset = size * (isWhole ? point() : m_random.inCube());
       for (Vector& p : query.positions) p += offset;
     }
     if (kind == ImpactKind::ScaledAxes) scaleAxes(query);

@@ -45,9 +45,10 @@ TEST(ImpactSide, IsExactForFeaturesNearlyInOnePlane) {
     const Eigen::Vector3d u = random.inCube(), v = random.inCube(), origin = random.inCube(),
                           none = Eigen::Vector3d::Zero();
     const auto nearPlane = [&] {
-      const Eigen::Vector3d aside =
-          std::ldexp(random.unit(), -random.between(30, 60)) * random.inCube();
-      return Eigen::Vector3d(random.unit() * u + random.unit() * v + aside);
+      const double size = random.ldexp(random.unit(), -60, -30);
+      const Eigen::Vector3d aside = size * random.inCube();
+      const double alongU = random.unit(), alongV = random.unit();
+      return Eigen::Vector3d(alongU * u + alongV * v + aside);
     };
     // The end of an edge, or a corner, from which the others differ by A and B.
     const std::size_t first = query.edges ? 0 : 1;

@@ -25,7 +25,8 @@ ImpactCase someCase(test::Random& random, double distance) {
     Eigen::Vector3d &before = query.positions[i], &now = query.positions[4 + i];
     if (i < moving) {
       before.z() = distance * (1 + 1e-6 * (random.unit() - 0.5));
-      now = before + random.unit() * random.inCube().cwiseProduct(Eigen::Vector3d(1, 1, 1e-6));
+      const double size = random.unit();
+      now = before + size * random.inCube().cwiseProduct(Eigen::Vector3d(1, 1, 1e-6));
     } else {
       before.z() = random.below(2) ? 0.0 : -random.unit();
       now = before;

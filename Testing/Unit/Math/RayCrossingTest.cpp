@@ -35,7 +35,7 @@ testing::Mesh tetrahedra(testing::Random& random, int count) {
   for (int i = 0; i < count; ++i) {
     const auto first = static_cast<std::uint32_t>(mesh.positions.size());
     for (int k = 0; k < 4; ++k)
-      mesh.positions.emplace_back(coordinate(random), coordinate(random), coordinate(random));
+      for (double& x : mesh.positions.emplace_back()) x = coordinate(random);
     for (const Triangle& t : {Triangle{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}})
       mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
   }
@@ -49,7 +49,8 @@ TEST(RayCrossing, AllDirectionsCountTheSameWindingNumber) {
   for (int round = 0; round < 2000; ++round) {
     const testing::Mesh mesh = tetrahedra(random, 1 + round % 3);
     for (int i = 0; i < 20; ++i) {
-      const Vector3d p = Vector3d(coordinate(random), coordinate(random), coordinate(random)) * 0.5;
+      Vector3d p;
+      for (double& x : p) x = 0.5 * coordinate(random);
       const std::optional<int> number = windingNumber(0, false, p, mesh);
       ++(!number ? on : *number != 0 ? inside : outside);
       for (int axis = 0; axis < 3; ++axis)

@@ -47,8 +47,8 @@ TEST(RayTriangle, AgreesWithRationalArithmeticOnSmallGrids) {
   for (int i = 0; i < testing::casesOf(20000) && !::testing::Test::HasFailure(); ++i) {
     const int size = 2 + i % 3;
     Corners t = cornersOf([&] { return random.onGrid(size); });
-    Eigen::Vector3d origin = random.onGrid(size),
-                    direction = random.onGrid(size) - random.onGrid(size);
+    Eigen::Vector3d origin = random.onGrid(size), direction = random.onGrid(size);
+    direction -= random.onGrid(size);
     if (i % 2)
       for (Eigen::Vector3d* v : {&t[0], &t[1], &t[2], &origin}) v->z() = 1.0;
     if (i % 2) direction.z() = 0.0;
@@ -103,9 +103,9 @@ TEST(RayTriangle, FirstPointsAreWithinTheStatedError) {
     const int exponent = kExponents[i % 6];
     Corners t = cornersOf([&] { return random.inCube(); });
     const Eigen::Vector3d inPlane = (t[1] - t[0]) + random.unit() * (t[2] - t[0]);
-    const Eigen::Vector3d direction =
-                              inPlane + std::ldexp(1.0, -random.below(45)) * random.inCube(),
-                          origin = pointOn(t, random) - (0.2 + random.unit()) * direction;
+    const double aside = std::ldexp(1.0, -random.below(45));
+    const Eigen::Vector3d direction = inPlane + aside * random.inCube(), on = pointOn(t, random),
+                          origin = on - (0.2 + random.unit()) * direction;
     for (Eigen::Vector3d& corner : t) corner = scaled(corner, exponent);
     const RaySegment ray{scaled(origin, exponent), scaled(direction, exponent), -4.0, 4.0};
     const std::optional<RayInterval> found = intersectRay(ray, t[0], t[1], t[2]);

@@ -48,7 +48,8 @@ Case makeCase(int kind, Random& random) {
     c.q = c.p + Vector3d::Unit(axis);
     direction = Vector3d::Unit(random.below(2) ? axis : (axis + 1) % 3);
   }
-  const Vector3d through = c.p + random.unit() * (c.q - c.p) + 0.7 * random.inCube();
+  Vector3d through = c.p + random.unit() * (c.q - c.p);
+  through += 0.7 * random.inCube();
   c.ray = {through - direction, direction, -3.0 + 4.0 * random.unit(), 1.0 + 3.0 * random.unit()};
   return c;
 }
@@ -163,7 +164,7 @@ TEST(RoundSegment, IntervalsOfRaysAlongACone) {
           if (repeat % 3 == 2)
             for (double& x : through) x = 0.25 * random.between(-8, 8);
           const Vector3d direction =
-              repeat % 2 ? along : Vector3d(1, 0.4 * random.unit(), 0.4 * random.unit());
+              repeat % 2 ? along : Vector3d{1, 0.4 * random.unit(), 0.4 * random.unit()};
           const RaySegment ray{through - 2.5 * direction, direction, 0.0, 7.25};
           const auto found = intersectRay(ray, p, q, narrow, wide);
           const std::vector<RayInterval> intervals(found ? 1u : 0u, found.value_or(RayInterval{}));
@@ -192,11 +193,14 @@ TEST(RoundSegment, AnIntervalHoldsThePointsWithinTheRadiusOfATriangle) {
     }
     // Thin triangles, of which some have no area but for rounding.
     if (repeat % 6 == 4) c = a + random.unit() * (b - a);
-    if (repeat % 12 == 4) c += std::ldexp(1.0, random.between(-50, -5)) * random.inCube();
+    if (repeat % 12 == 4) {
+      const int exponent = random.between(-50, -5);
+      c += std::ldexp(1.0, exponent) * random.inCube();
+    }
     if (repeat % 12 == 10) c = random.below(2) ? a : b;
     const double radius = 0.01 + 0.5 * random.unit();
-    const Vector3d through =
-        repeat % 7 == 0 ? a : pointOn({a, b, c}, random) + 0.5 * random.inCube();
+    Vector3d through = repeat % 7 == 0 ? a : pointOn({a, b, c}, random);
+    if (repeat % 7 != 0) through += 0.5 * random.inCube();
     const RaySegment ray{through - direction, direction, -3.0 + 4.0 * random.unit(),
                          1.0 + 3.0 * random.unit()};
     // Sizes whose squares leave the range of double.

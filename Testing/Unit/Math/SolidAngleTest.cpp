@@ -29,8 +29,8 @@ TEST(SolidAngle, SharesAreWithinTheirErrorAndAtMostHalf) {
     const Vector3d a = random.inCube(), b = random.inCube(), c = random.inCube();
     Vector3d p = random.inCube();
     // Near the triangle, its border and its plane.
-    if (repeat % 4 == 1) p = pointOn({a, b, c}, random) + 1e-12 * random.inCube();
-    if (repeat % 4 == 2) p = a + random.unit() * (b - a) + 1e-9 * random.inCube();
+    if (repeat % 4 == 1) p = 1e-12 * p + pointOn({a, b, c}, random);
+    if (repeat % 4 == 2) p = 1e-9 * p + a + random.unit() * (b - a);
     const SolidAngleShare share = solidAngleShare(p, a, b, c);
     ASSERT_LE(std::abs(share.value), 0.5);
     const auto off = static_cast<double>(std::abs(share.value - shareOf(p, a, b, c)));

@@ -119,8 +119,8 @@ TEST(TimeOfImpact, AgreesWithOracleAboveAnEdge) {
     for (std::size_t end = 0; end < 8; end += 4) {
       for (std::size_t k = 0; k < 4; ++k) p[end + k].z() = 0.0;
       p[end + first].setZero();
-      p[end + first + 1] = std::ldexp(0.5 + random.unit(), random.between(-15, 15)) * edge;
-      p[end + passing] = std::ldexp(0.5 + random.unit(), random.between(-15, 15)) * edge;
+      p[end + first + 1] = random.ldexp(0.5 + random.unit(), -15, 15) * edge;
+      p[end + passing] = random.ldexp(0.5 + random.unit(), -15, 15) * edge;
       p[end + passing].z() = end == 0 ? random.unit() : -random.unit();
       if (query.edges) p[end + 3].z() = p[end + 2].z();
     }
@@ -197,8 +197,8 @@ TEST(TimeOfImpact, IsNotEarlierThanTheToleranceWhereRoundingHidesTheRoot) {
     const Eigen::Vector3d towards =
         (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
     const Eigen::Vector3d by = 0.02 * (towards + 0.3 * random.inCube());
-    const ImpactCase query =
-        still(inside + random.unit() * by, inside - random.unit() * by, triangle);
+    const double above = random.unit(), below = random.unit();
+    const ImpactCase query = still(inside + above * by, inside - below * by, triangle);
     for (const double tolerance : {1e-6, 1e-4, 0.3}) expectTrue(query, tolerance, impacts);
   }
   EXPECT_GT(impacts, 600);

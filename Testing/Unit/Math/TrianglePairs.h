@@ -17,9 +17,12 @@ class Random {
   int below(int count) { return static_cast<int>(m_engine() % static_cast<unsigned>(count)); }
   int between(int first, int last) { return first + below(last - first + 1); }
   double unit() { return static_cast<double>(m_engine() >> 11) * 0x1p-53; }
+  /// x times a power of two with an exponent from first to last.
+  double ldexp(double x, int first, int last) { return std::ldexp(x, between(first, last)); }
   Eigen::Vector3d inCube() { return {2 * unit() - 1, 2 * unit() - 1, 2 * unit() - 1}; }
   Eigen::Vector3d onGrid(int size) {
-    return Eigen::Vector3i(below(size), below(size), below(size)).cast<double>();
+    const int z = below(size), y = below(size), x = below(size);
+    return Eigen::Vector3i(x, y, z).cast<double>();
   }
 
  private:
@@ -121,7 +124,8 @@ inline CornersPair makePair(Kind kind, Random& random) {
     case Kind::CoplanarShared: {
       const Eigen::Vector3d origin = random.onGrid(9), u = random.onGrid(7), v = random.onGrid(7);
       const auto inPlane = [&] {
-        return Eigen::Vector3d(origin + random.between(-3, 3) * u + random.between(-3, 3) * v);
+        const int alongU = random.between(-3, 3), alongV = random.between(-3, 3);
+        return Eigen::Vector3d(origin + alongU * u + alongV * v);
       };
       pair = {cornersOf(inPlane), cornersOf(inPlane)};
       if (kind == Kind::CoplanarShared) {
@@ -150,10 +154,12 @@ inline CornersPair makePair(Kind kind, Random& random) {
             x = std::ldexp(x, random.below(3) ? 0 : random.between(-1060, 1020));
       break;
     case Kind::Huge:
-      pair = scaled(ofAnyKind(), random.between(980, 1020));
+      pair = ofAnyKind();
+      pair = scaled(pair, random.between(980, 1020));
       break;
     case Kind::Tiny:
-      pair = scaled(ofAnyKind(), random.between(-1020, -960));
+      pair = ofAnyKind();
+      pair = scaled(pair, random.between(-1020, -960));
       break;
     case Kind::Denormal:
       pair = scaled(gridPair, random.between(-1074, -1060));

@@ -31,7 +31,8 @@ TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
   std::vector<Vector3d> before, now;
   for (int i = 0; i < 60; ++i) {
     before.push_back({normal(random), normal(random), normal(random)});
-    now.push_back(before.back() + std::exp(normal(random)) * Vector3d(1, normal(random), -2));
+    const double size = std::exp(normal(random));
+    now.push_back(before.back() + size * Vector3d(1, normal(random), -2));
   }
   for (const std::size_t first : {0, 3})
     for (std::size_t last = first; last <= before.size(); ++last) {

@@ -143,8 +143,8 @@ TEST(OutwardRounding, SimdTriangleBoxesMatchOutwardRounding) {
   std::vector<Triangle> triangles;
   for (FloatPoint& p : points) {
     const auto value = [&] {
-      return static_cast<float>(
-          std::ldexp(testing::uniform(random, -1, 1), static_cast<int>(random() % 269) - 149));
+      const double fraction = testing::uniform(random, -1, 1);
+      return static_cast<float>(std::ldexp(fraction, static_cast<int>(random() % 269) - 149));
     };
     p = {value(), value(), value(), 0};
   }

@@ -49,13 +49,13 @@ std::set<Ids> expectedVertexTriangle(const TestGeometry& vertices, const TestGeo
       !(points && (others.type == GeometryType::Lines || !ofSecond)))
     return ids;
   const std::vector<Triangle> elements = others.elements();
-  const auto at = [&](std::uint32_t i) { return others.positions[i]; };
+  const auto& at = others.positions;
   for (std::uint32_t v = 0; v < vertices.positions.size(); ++v)
     for (std::uint32_t t = 0; t < elements.size(); ++t) {
       const auto& [i, j, k] = elements[t];
       if (&vertices == &others && !(v < t)) continue;
       const VertexTriangleDistance d =
-          vertexTriangleDistance(vertices.positions[v], at(i), at(j), at(k));
+          vertexTriangleDistance(vertices.positions[v], at[i], at[j], at[k]);
       const double radius = d.weights[0] * others.radius(i) + d.weights[1] * others.radius(j) +
                             d.weights[2] * others.radius(k);
       if (d.distance - (vertices.radius(v) + radius) <= thickness)

@@ -61,6 +61,10 @@ class RandomPoints {
   int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
   Vector3d vector() { return {real(), real(), real()}; }
   double smallPower() { return std::pow(10.0, -below(12)); }
+  int edges() {
+    const int i = below(3), j = below(3);
+    return edgeTest(i, j);
+  }
 
  private:
   std::mt19937_64 m_engine{3};
@@ -76,8 +80,10 @@ Pair pairOf(int kind, RandomPoints& random) {
       for (Vector3d& v : x) v += Vector3d(1e6, 1e6, -1e6);
       break;
     case 2:  // slivers
-      x[2] = x[0] + random.real() * (x[1] - x[0]) + random.smallPower() * random.vector();
-      x[5] = x[3] + random.real() * (x[4] - x[3]) + random.smallPower() * random.vector();
+      for (const std::size_t i : {0, 3}) {
+        const double share = random.real(), size = random.smallPower();
+        x[i + 2] = x[i] + share * (x[i + 1] - x[i]) + size * random.vector();
+      }
       break;
     case 3: {  // one much smaller than the other
       const double size = random.smallPower();
@@ -85,7 +91,8 @@ Pair pairOf(int kind, RandomPoints& random) {
       break;
     }
     case 4:  // on a small grid: parallel, coplanar, coincident
-      for (Vector3d& v : x) v = Vector3d(random.below(3), random.below(3), random.below(3));
+      for (Vector3d& v : x)
+        for (double& coordinate : v) coordinate = random.below(3);
       break;
     case 5:  // nearly parallel edges and planes
       for (int i = 3; i < 6; ++i)
@@ -160,8 +167,7 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
     const int corner = random.below(6);
     const int ofCorner = corner < 3 ? cornerTestOfA(corner) : cornerTestOfB(corner - 3);
-    const std::optional<double> ofEdges =
-        distanceOf(chosen, edgeTest(random.below(3), random.below(3)), distinct);
+    const std::optional<double> ofEdges = distanceOf(chosen, random.edges(), distinct);
     const double thickness = ofEdges && random.below(3)
                                  ? *ofEdges * (random.below(2) ? 1.0 : 1.0 + random.smallPower())
                                  : distanceOf(chosen, ofCorner, distinct).value();
@@ -190,8 +196,7 @@ TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
       if (random.below(2))  // in one plane
         for (Vector3d& v : pair) v.z() = 0.25 * v.x();
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
-    const double checked =
-        distanceOf(chosen, edgeTest(random.below(3), random.below(3)), false).value();
+    const double checked = distanceOf(chosen, random.edges(), false).value();
     if (checked == 0.0) continue;
     const Possible possible = filter(pairs, checked * (random.below(2) ? 1.0 : 1.5), true, checked);
     for (std::size_t n = 0; n < pairs.size(); ++n)

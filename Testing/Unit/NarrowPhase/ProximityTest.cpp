@@ -184,9 +184,10 @@ TEST(Proximity, TrianglesAroundOneVertexAgreeWithBruteForce) {
   std::size_t contacts = 0;
   for (int i = 0; i < 6; ++i) {
     Mesh fan{{{0, 0, 0}}, {}};
-    for (std::uint32_t k = 0; k < 240; ++k)
-      fan.positions.push_back(randomPoint(random, -1, 1) * (k % 2 ? 1.0 : 0.3) *
-                              uniform(random, 0, 1));
+    for (std::uint32_t k = 0; k < 240; ++k) {
+      fan.positions.push_back((k % 2 ? 1.0 : 0.3) * randomPoint(random, -1, 1));
+      fan.positions.back() *= uniform(random, 0, 1);
+    }
     for (std::uint32_t k = 0; k < 120; ++k) fan.triangles.push_back({0, 2 * k + 1, 2 * k + 2});
     const TriangleMesh mesh = meshOf(fan);
     for (const double thickness : {0.0, 0.004, 0.03}) {

@@ -243,7 +243,8 @@ TEST_P(TouchSides, OfMotionInOnePlaneAreInThePlane) {
     const Vector3d e = vector(4), f = vector(4);
     if (e.cross(f).isZero()) continue;
     const auto at = [&](double centre) {
-      return Vector3d((centre + between(-4, 4)) * e + between(-4, 4) * f);
+      const double alongE = centre + between(-4, 4), alongF = between(-4, 4);
+      return Vector3d(alongE * e + alongF * f);
     };
     const std::vector<Vector3d> a{at(-10), at(-10), at(-10)}, b{at(10), at(10), at(10)};
     countSides({a, b}, {a, moved(b, -24 * e + between(-3, 3) * f)}, GetParam(), addTriangle, sides);

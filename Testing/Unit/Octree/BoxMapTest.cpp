@@ -25,7 +25,8 @@ using TurnMatrix = std::array<std::array<double, 3>, 3>;
 /// Of any magnitude between two powers of two, and either sign.
 double ofAnySize(Random& random, int least, int most) {
   const auto range = static_cast<unsigned>(most - least + 1);
-  return std::ldexp(uniform(random, -1, 1), least + static_cast<int>(random() % range));
+  const double fraction = uniform(random, -1, 1);
+  return std::ldexp(fraction, least + static_cast<int>(random() % range));
 }
 
 /// Rotations about any axis, or of the axes.
@@ -55,7 +56,8 @@ TEST(BoxMap, ShiftsEncloseTheExactBounds) {
   Random random(71);
   for (int i = 0; i < casesOf(20000); ++i) {
     const double offset = ofAnySize(random, -20, 20);
-    const double thickness = std::abs(ofAnySize(random, -40, 10)) * (random() % 4 != 0);
+    double thickness = std::abs(ofAnySize(random, -40, 10));
+    if (random() % 4 == 0) thickness = 0;
     float lower, upper;
     setShift(lower, upper, offset, thickness);
     const auto bound = static_cast<float>(random() % 2 ? ofAnySize(random, -20, 20) : -offset);

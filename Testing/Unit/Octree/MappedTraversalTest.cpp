@@ -113,9 +113,11 @@ TEST(MappedTraversal, FindsThePairsWhoseMappedBoxesOverlap) {
     BoxMap* const maps[] = {&trees.mapA, &trees.mapB};
     for (std::size_t side = 0; side < 2; ++side) {
       maps[side]->count = side == 0 ? run % 3 : run / 3 % 3;
-      for (int end = 0; end < maps[side]->count; ++end)
-        setEnd(maps[side]->ends[static_cast<std::size_t>(end)], kRotations[random() % 4],
-               gridPoint(random), run % 4 == 0 ? 0.03125 : 0.0, 0.0);
+      for (int end = 0; end < maps[side]->count; ++end) {
+        const auto& rotation = kRotations[random() % 4];
+        setEnd(maps[side]->ends[static_cast<std::size_t>(end)], rotation, gridPoint(random),
+               run % 4 == 0 ? 0.03125 : 0.0, 0.0);
+      }
     }
     if (trees.mapA.count == 0 && trees.mapB.count == 0) continue;
     ASSERT_TRUE(trees.isMapped());

@@ -34,10 +34,9 @@ struct QueryCase {
     for (int ends = 1; ends <= 2; ++ends) {
       BoxMap& map = maps.emplace_back();
       for (int i = 0; i < ends; ++i) {
-        const Eigen::Matrix3d turn =
-            Eigen::AngleAxisd(uniform(random, 0.0, 3.0),
-                              testing::randomPoint(random, -1.0, 1.0).normalized())
-                .toRotationMatrix();
+        const double angle = uniform(random, 0.0, 3.0);
+        const Eigen::Vector3d axis = testing::randomPoint(random, -1.0, 1.0).normalized();
+        const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
         std::array<std::array<double, 3>, 3> matrix;
         for (int k = 0; k < 3; ++k)
           for (int j = 0; j < 3; ++j) matrix[k][j] = turn(k, j);
@@ -81,9 +80,9 @@ void forEachCase(F&& f) {
 }
 
 TEST(PointQueries, FindEveryOverlappingElement) {
-  Random random(8);
   std::size_t all = 0, none = 0;
   forEachCase([&](const QueryCase& c, const BoxMap& map, double reach) {
+    Random random(8 + c.size());
     PointQueryStack stack;
     for (int query = 0; query < 40; ++query) {
       const FloatBox box = query == 0 ? FloatBox() : randomBox(random, 1.5 * reach, 0.5 * reach);

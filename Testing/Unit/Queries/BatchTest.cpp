@@ -31,7 +31,7 @@ std::vector<Ray> raysFor(Random& random, const TestGeometry& geometry, std::size
     Ray ray{randomPoint(random, -1, 2), vertex()};
     const std::size_t kind = rays.size() % 6;
     if (kind == 1) ray.direction = randomPoint(random, 0, 1);
-    if (kind == 2) ray.direction = 0.5 * (vertex() + vertex());
+    if (kind == 2) ray.direction = 0.5 * (ray.direction + vertex());
     if (kind == 3) ray.origin = 1e3 * randomPoint(random, -1, 1);
     if (kind == 4) ray.origin = vertex();
     ray.direction -= ray.origin;

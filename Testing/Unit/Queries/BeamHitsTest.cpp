@@ -52,8 +52,8 @@ Rays bundlesFor(Random& random, const Positions& positions, std::span<const Tria
     if (kind == 4) ray = {p - 2 * (q - p), q - p};
     if (kind == 5) ray = {p + (p - q) + 0.5 * (p - r), (q - p) + 0.5 * (r - q)};
     if (kind >= 6) {
-      ray.direction =
-          (random() % 2 ? 2.0 : -0.5) * Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
+      ray.direction = Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
+      ray.direction *= random() % 2 ? 2.0 : -0.5;
       ray.origin = corner() - 2 * ray.direction;
     }
     const double atCorner = (corner() - ray.origin).norm() / ray.direction.norm();
@@ -134,13 +134,14 @@ TEST(BeamHits, AreThoseOfSingleCallsOnEveryPath) {
         collisions.setPositions(id, now);
       }
       const std::vector<Triangle> elements = geometry.elements();
+      std::vector<Rays> bundles;
+      for (const double step : {1e-3, 0.02, 0.5})
+        bundles.push_back(bundlesFor(random, now, elements, step, casesOf(600)));
       for (const std::string& path : simdPaths()) {
         SCOPED_TRACE(path + ' ' + std::to_string(threads));
         useSimdPath(path);
         std::size_t hits = 0;
-        for (const double step : {1e-3, 0.02, 0.5})
-          hits += expectSingle(collisions.queries(), id,
-                               bundlesFor(random, now, elements, step, casesOf(600)));
+        for (const Rays& rays : bundles) hits += expectSingle(collisions.queries(), id, rays);
         EXPECT_GE(hits, leastOf(50));
         if (HasFailure()) return;
       }

@@ -121,9 +121,8 @@ TEST(InsideVertices, DoNotDependOnThePreviousVertex) {
     for (std::uint32_t i = 0; i < 300; ++i) {
       // Steps of the depth's size, sometimes out of the body, and some of them onto vertices of the
       // surface.
-      at = (0.8 * at + std::pow(10.0, uniform(random, -4, 0)) * randomPoint(random, -1, 1))
-               .cwiseMax(-0.8)
-               .cwiseMin(0.8);
+      const double size = std::pow(10.0, uniform(random, -4, 0));
+      at = (0.8 * at + size * randomPoint(random, -1, 1)).cwiseMax(-0.8).cwiseMin(0.8);
       walk.positions.push_back(i % 7 ? Vector3d(scale * at + centre)
                                      : body.positions[random() % body.positions.size()]);
       if (i >= 2) walk.triangles.push_back({i - 2, i - 1, i});

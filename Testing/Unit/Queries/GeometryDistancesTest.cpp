@@ -140,8 +140,8 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOri
       for (const double most : {2.0, 1.5, 1.2, 1.0, 0.5, 0.0}) {
         const Matrix3d turn = randomTurn(random);
         both.put(both.a, a, turn, away + randomPoint(random, -most, most), placed & 1);
-        both.put(both.b, b, randomTurn(random), away + randomPoint(random, -most, most),
-                 placed & 2);
+        const Matrix3d turnOfB = randomTurn(random);
+        both.put(both.b, b, turnOfB, away + randomPoint(random, -most, most), placed & 2);
         expectSameAnswers(both, 0.05, 5.0 + 10 * far);
         ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << placed;
       }
@@ -488,8 +488,8 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForParallelPlates) {
     };
     const TestGeometry a = rough(), b = rough();
     const Matrix3d turn = randomTurn(random);
-    const Vector3d far =
-        randomPoint(random, -1, 1) * (round % 2 ? 1.0 : std::exp2(uniform(random, 10, 30)));
+    Vector3d far = randomPoint(random, -1, 1);
+    if (round % 2 == 0) far *= std::exp2(uniform(random, 10, 30));
     const double size = 5.0 + far.norm();
     {
       TwoBodies both(a, b);

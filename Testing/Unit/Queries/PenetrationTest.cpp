@@ -122,7 +122,8 @@ TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
     for (const Mesh& second : kinds)
       for (int i = 0; i < casesOf(4); ++i) {
         const Mesh a = turned(first, randomTurn(random)),
-                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -1.2, 1.2));
+                   other = turned(second, randomTurn(random)),
+                   b = moved(other, randomPoint(random, -1.2, 1.2));
         const Penetration p = Bodies(a, b).penetration();
         EXPECT_EQ(p.intersecting, !areApart(a, b));
         if (!p.intersecting) continue;
@@ -192,7 +193,8 @@ TEST(Penetration, OfConvexBodiesNoTranslationIsShorter) {
     for (const Mesh& second : kinds)
       for (int i = 0; i < 5; ++i) {
         const Mesh a = turned(first, randomTurn(random)),
-                   b = moved(turned(second, randomTurn(random)), randomPoint(random, -0.6, 0.6));
+                   other = turned(second, randomTurn(random)),
+                   b = moved(other, randomPoint(random, -0.6, 0.6));
         const Penetration p = Bodies(a, b).penetration();
         if (!p.intersecting) continue;
         EXPECT_NEAR(p.depth, leastTranslation(a, b), 1e-9);

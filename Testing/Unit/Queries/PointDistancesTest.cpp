@@ -395,7 +395,7 @@ TEST(PointDistances, SegmentsWithoutLengthHaveTheirLargerRadius) {
 TEST(PointDistances, ShapesHaveTheirClosestPoints) {
   Random random(108);
   for (const AnalyticalGeometry& geometry : shapesOfEveryKind(random)) {
-    const MeasuredShape shape(geometry, randomTurn(random), randomPoint(random, -1, 1));
+    const MeasuredShape shape{geometry, randomTurn(random), randomPoint(random, -1, 1)};
     const Both both([&](OctreeBasedCD& each) {
       const GeometryId id = each.addAnalyticalGeometry(geometry);
       each.setTransform(id, {shape.rotation, shape.translation});

@@ -109,7 +109,7 @@ TEST(QueryContacts, RigidMeshesAtThicknessZeroTouch) {
     const Both both(body);
     RigidMesh mesh(tool.positions, tool.triangles);
     const Matrix3d turn = i % 2 ? quarter : Matrix3d(Matrix3d::Identity());
-    const Vector3d shift = onLattice(random, 3) - onLattice(random, 3);
+    const Vector3d from = onLattice(random, 3), shift = onLattice(random, 3) - from;
     both.octree.queries().contacts(both.id, mesh, {turn, shift}, 0.0, found);
     both.bruteForce.queries().contacts(both.id, mesh, {turn, shift}, 0.0, truth);
     EXPECT_EQ(found.hash(), truth.hash());

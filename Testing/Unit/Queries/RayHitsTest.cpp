@@ -101,7 +101,8 @@ Ray hardRay(Random& random, const Positions& positions, std::span<const Triangle
       break;
     case 5:  // parallel to an axis
       ray.direction = Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
-      ray.origin = 0.5 * (corner() + corner());
+      ray.origin = 0.5 * corner();
+      ray.origin += 0.5 * corner();
       break;
     default:
       break;
@@ -117,7 +118,8 @@ TEST(RayHits, AreThoseOfRationalArithmeticOnALattice) {
     const TestGeometry soup = latticeSoup(random, 40, 3 + round % 3);
     const Both both(soup);
     for (int i = 0; i < 12; ++i) {
-      Ray ray{onLattice(random, 5), onLattice(random, 5) - onLattice(random, 5)};
+      Ray ray{onLattice(random, 5), onLattice(random, 5)};
+      ray.direction -= onLattice(random, 5);
       if (i % 3 == 0) ray = hardRay(random, soup.positions, soup.triangles);
       if (i % 3 == 1) ray.origin *= 0.5;
       if (ray.direction == Vector3d::Zero()) ray.direction = {0, 0, 1};
@@ -230,8 +232,8 @@ TEST(RayHits, CrossWhereTheRayChangesSide) {
       return full.contains(cell);
     };
     for (int i = 0; i < casesOf(150); ++i) {
-      Ray ray{0.5 * onLattice(random, 2 * n + 5) - Vector3d(1, 1, 1),
-              onLattice(random, 5) - onLattice(random, 5)};
+      Ray ray{0.5 * onLattice(random, 2 * n + 5) - Vector3d(1, 1, 1), onLattice(random, 5)};
+      ray.direction -= onLattice(random, 5);
       if (ray.direction == Vector3d::Zero()) continue;
       const std::vector<RayHit> hits = consistentHits(both, ray);
       const std::vector<RationalHit> parts = hitsOf(ray, solid.positions, triangles);
@@ -390,7 +392,7 @@ TEST(RayHits, AnyMagnitude) {
     const Both both(mesh);
     std::size_t hits = 0;
     for (int i = 0; i < 40; ++i) {
-      const Vector3d direction = onLattice(random, 4) - onLattice(random, 4);
+      const Vector3d from = onLattice(random, 4), direction = onLattice(random, 4) - from;
       const Ray ray{std::ldexp(1.0, exponent) * onLattice(random, 4),
                     std::ldexp(1.0, ofDirection) * direction};
       if (direction == Vector3d::Zero()) continue;

@@ -92,8 +92,8 @@ TEST(ShapeOverlap, SpheresAndCapsulesForEveryGeometryType) {
     const std::vector<Triangle> elements = geometry.elements();
     std::size_t found = 0;
     for (int i = 0; i < casesOf(6); ++i) {
-      const Vector3d p = geometry.positions[random() % geometry.positions.size()] +
-                         randomPoint(random, -0.15, 0.15),
+      const Vector3d near = geometry.positions[random() % geometry.positions.size()],
+                     p = near + randomPoint(random, -0.15, 0.15),
                      q = i % 2 ? p : Vector3d(p + randomPoint(random, -0.4, 0.4));
       const double radius = uniform(random, 0.0, 0.25);
       const PlacedShape shape{i % 2 ? AnalyticalGeometry(Sphere{p, radius})
@@ -255,8 +255,8 @@ TEST(ShapeOverlap, LargeTrianglesAtACornerOfABox) {
       const Vector3d normal = randomPoint(random, -1, 1).normalized(), u = normal.unitOrthogonal(),
                      v = normal.cross(u);
       const Vector3d corner = centre + Vector3d(half.array() * normal.array().sign());
-      const Vector3d at =
-          corner + uniform(random, -1, 1) * std::exp2(uniform(random, -40, -26)) * normal;
+      const double side = uniform(random, -1, 1);
+      const Vector3d at = corner + side * std::exp2(uniform(random, -40, -26)) * normal;
       for (int k = 0; k < 3; ++k) {
         const double angle = 2.1 * k + uniform(random, 0, 0.5);
         large.positions.push_back(at + 1e6 * (std::cos(angle) * u + std::sin(angle) * v));
@@ -328,9 +328,9 @@ TEST(ShapeOverlap, PlanesAndCylinders) {
     std::size_t found = 0;
     for (int i = 0; i < 6; ++i) {
       const Vector3d p0 = randomPoint(random, -0.3, 0.3), p1 = randomPoint(random, -0.3, 0.3);
-      const MeasuredShape shape(i < 3 ? AnalyticalGeometry(Plane{p0, p1, i == 2})
+      const MeasuredShape shape{i < 3 ? AnalyticalGeometry(Plane{p0, p1, i == 2})
                                       : AnalyticalGeometry(Cylinder{p0, p1, 0.2}),
-                                randomTurn(random), randomPoint(random, 0.3, 0.7));
+                                randomTurn(random), randomPoint(random, 0.3, 0.7)};
       found += expectGaps(both, shape, geometry.elements(), 1e-6, [&](const Triangle& t) {
         const auto& [a, b, c] = t;
         const Positions& at = geometry.positions;

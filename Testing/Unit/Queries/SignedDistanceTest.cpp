@@ -155,9 +155,10 @@ TEST(SignedDistances, NoWrongSignNearSelfCrossings) {
   const Mesh mesh = closedMeshes(random)[1];
   const Both both(testGeometry(mesh));
   Positions points;
-  for (int i = 0; i < casesOf(150); ++i)
-    points.push_back(mesh.positions[random() % mesh.positions.size()] +
-                     randomPoint(random, -0.05, 0.05));
+  for (int i = 0; i < casesOf(150); ++i) {
+    points.push_back(mesh.positions[random() % mesh.positions.size()]);
+    points.back() += randomPoint(random, -0.05, 0.05);
+  }
   EXPECT_GE(expectSigns(both, mesh.positions, mesh.triangles, points), leastOf(50));
 }
 

@@ -241,7 +241,7 @@ TEST(WindingNumber, PointsWithinRoundingOfAClosedSurfaceAreDecidedExactly) {
     for (const Triangle& t : body.triangles)
       for (int kind = 0; kind < 3; ++kind)
         for (int i = 0; i < 12; ++i) {
-          Vector3d w(uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1));
+          Vector3d w = randomPoint(random, 0, 1);
           if (kind > 0) w[0] = 0;
           if (kind > 1) w[1] = 0;
           w /= w.sum();
@@ -275,7 +275,7 @@ TEST(WindingNumber, PointsWithinRoundingOfAnOpenSurfaceAreNotDecidedWrongly) {
   for (std::size_t i = open.triangles.size() / 2; i < open.triangles.size(); ++i)
     for (int k = 0; k < 40; ++k) {
       const auto& [a, b, c] = open.triangles[i];
-      Vector3d w(uniform(random, 0.1, 1), uniform(random, 0.1, 1), uniform(random, 0.1, 1));
+      Vector3d w = randomPoint(random, 0.1, 1);
       w /= w.sum();
       Vector3d p = w[0] * open.positions[a] + w[1] * open.positions[b] + w[2] * open.positions[c];
       for (double& x : p) x += (static_cast<int>(random() % 5) - 2) * std::abs(x) * 0x1p-52;

@@ -120,7 +120,7 @@ TEST(DistinctContacts, OfAFlatFloorHaveItsNormal) {
           const double height = depthOf(shape, turn, up) + (isRound ? uniform(random, -0.3, 0.06)
                                                                     : uniform(random, 0.02, 0.06));
           const Vector3d at = floorTurn *
-                              Vector3d(uniform(random, -1, 1), uniform(random, -1, 1), height),
+                              Vector3d{uniform(random, -1, 1), uniform(random, -1, 1), height},
                          to = at + floorTurn * Vector3d(0.1, 0.05,
                                                         uniform(random, isRound ? -0.1 : -0.02, 0));
           PairSettings settings{method, 0.05};
@@ -169,8 +169,8 @@ TEST(DistinctContacts, MatchTheDefinition) {
         if (isLeftOut(run)) continue;
         const Matrix3d turn = run % 3 == 0 ? Matrix3d::Identity() : randomTurn(random);
         const bool steps = run % 2 == 0, turns = run % 4 == 0, bends = run % 8 == 0;
-        const Vector3d at(uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5),
-                          depthOf(shape, turn, Vector3d::UnitZ()) + uniform(random, -0.2, 0.1));
+        const Vector3d at{uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5),
+                          depthOf(shape, turn, Vector3d::UnitZ()) + uniform(random, -0.2, 0.1)};
         PlacedShape before{shape, turn, at}, now = before;
         Positions moved = mesh.positions;
         if (steps) now.translation += randomPoint(random, -0.15, 0.15);
@@ -328,7 +328,7 @@ TEST(DistinctContacts, OfABodyThatStandsInAFloorLeadOut) {
     Mesh floor = run % 2 ? floorOf(random, 24, 0.3, false, [](double, double) { return 0.0; })
                          : floorOf(random, 1, 7.2, false, [](double, double) { return 0.0; });
     for (Vector3d& p : floor.positions) p = floorTurn * p;
-    const Vector3d axis(uniform(random, -1, 1), uniform(random, -1, 1), 0);
+    const Vector3d axis{uniform(random, -1, 1), uniform(random, -1, 1), 0};
     for (const double tilt : {0.0, 1e-9, 0.02}) {
       const Matrix3d turn = floorTurn *
                             Eigen::AngleAxisd(tilt, axis.normalized()).toRotationMatrix() *
@@ -338,8 +338,8 @@ TEST(DistinctContacts, OfABodyThatStandsInAFloorLeadOut) {
                Cylinder{{-1, 0, 0}, {1, 0, 0}, 0.4},
                ConvexHull{{{1, 0, -0.4}, {-1, 0, -0.4}, {0, 1, -0.4}, {0, -1, -0.4}, {0, 0, 1}}}})
         for (const double depth : {0.0, 1e-14, 1e-9, 1e-3, 0.05}) {
-          const Vector3d at = floorTurn * Vector3d(uniform(random, -1, 1), uniform(random, -1, 1),
-                                                   depthOf(shape, turn, up) - depth);
+          const Vector3d at = floorTurn * Vector3d{uniform(random, -1, 1), uniform(random, -1, 1),
+                                                   depthOf(shape, turn, up) - depth};
           bool separates = false;
           for (const ShapeContact& c :
                contactsOf(floor, shape, {Method::Proximity, 0.02}, turn, at, at)) {

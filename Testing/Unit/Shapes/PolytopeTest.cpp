@@ -94,7 +94,8 @@ TEST(Polytope, IsTheHullOfManyPoints) {
   Positions sorted, ball = onSphere(random, kCount), shell, lattice, nearPlane, spindle, doubled;
   for (int i = 0; i < kCount; ++i) {
     sorted.push_back({1e-3 * i, uniform(random, 0, 1), uniform(random, 0, 1)});
-    shell.push_back(randomPoint(random, -1, 1).normalized() * uniform(random, 0.5, 1));
+    shell.push_back(randomPoint(random, -1, 1).normalized());
+    shell.back() *= uniform(random, 0.5, 1);
     lattice.push_back(Vector3d(i % 12, i / 12 % 12, i / 144));
     nearPlane.push_back({uniform(random, 0, 1), uniform(random, 0, 1), uniform(random, 0, 1e-15)});
     const double angle = 2 * EIGEN_PI * i / kCount;

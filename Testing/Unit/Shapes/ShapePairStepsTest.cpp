@@ -241,18 +241,20 @@ TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
                      std::to_string(j));
         const auto toolOf = [&](const AnalyticalGeometry& shape, double from) {
           const Matrix3d turn = randomTurn(random);
-          const Vector3d at = from * randomPoint(random, -1, 1).normalized(),
-                         past = -uniform(random, 0, 2) * at + 0.2 * randomPoint(random, -1, 1);
+          const Vector3d at = from * randomPoint(random, -1, 1).normalized();
+          Vector3d past = -uniform(random, 0, 2) * at;
+          past += 0.2 * randomPoint(random, -1, 1);
+          const double angle = run % 2 ? uniform(random, 0, 2.8) : 0.0;
           const Matrix3d further =
-              run % 2 ? Matrix3d(Eigen::AngleAxisd(uniform(random, 0, 2.8),
-                                                   randomPoint(random, -1, 1).normalized())
+              run % 2 ? Matrix3d(Eigen::AngleAxisd(angle, randomPoint(random, -1, 1).normalized())
                                      .toRotationMatrix() *
                                  turn)
                       : turn;
           return MovingShape(shape, turn, at, further, past);
         };
         const double from = run == 5 ? 0.1 : 0.8;
-        expectTrueContacts(toolOf(all[i], from), toolOf(all[j], from),
+        const MovingShape first = toolOf(all[i], from), second = toolOf(all[j], from);
+        expectTrueContacts(first, second,
                            continuousPair(run % 3 ? 0.03 : 0.0, run == 4 ? 1e-3 : 1e-6), tally);
       }
   }

@@ -313,10 +313,12 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
         tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
         tool.ends[1] = tool.ends[0];
         if (run % 3 > 0) tool.ends[1].translation += randomPoint(random, -0.5, 0.5);
-        if (run % 3 > 1)
+        if (run % 3 > 1) {
+          const double angle = uniform(random, 0, 3);
           tool.ends[1].rotation =
-              Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, -1, 1).normalized()) *
+              Eigen::AngleAxisd(angle, randomPoint(random, -1, 1).normalized()) *
               tool.ends[1].rotation;
+        }
         const PairSettings pair = continuous(run % 4 < 2 ? 0.0 : 0.03, run % 5 ? 1e-6 : 1e-3);
         SCOPED_TRACE("run " + std::to_string(run) + ", shape " + std::to_string(geometry.index()));
         const CollisionData data = answer(settingsOf(Engine::Octree), body, tool, pair);

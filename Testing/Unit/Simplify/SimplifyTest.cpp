@@ -327,8 +327,10 @@ TEST(SimplifyCertificate, BoundsHoldForAllPoints) {
       const Eigen::Vector3d at =
           randomPointOf(random, mesh.positions, mesh.triangles[random() % mesh.triangles.size()]);
       Corners corners;
-      for (Eigen::Vector3d& p : corners)
-        p = at + randomPoint(random, -1, 1) * most * uniform(random, 0, 3);
+      for (Eigen::Vector3d& p : corners) {
+        const Eigen::Vector3d aside = most * randomPoint(random, -1, 1);
+        p = at + uniform(random, 0, 3) * aside;
+      }
       bool touches = false;
       for (const auto& [a, b, c] : mesh.triangles)
         touches |= trianglesIntersect(corners[0], corners[1], corners[2], mesh.positions[a],

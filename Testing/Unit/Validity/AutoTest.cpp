@@ -138,8 +138,9 @@ TEST(Auto, FindsEverythingThatContinuousFinds) {
   std::size_t found = 0;
   for (int i = 0; i < casesOf(1500); ++i) {
     const Motion& motion = kMotions[i % std::size(kMotions)];
-    const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
-                              motion.fast * uniform(random, 0, 1));
+    const double slow = motion.slow * uniform(random, 0, 2),
+                 fast = motion.fast * uniform(random, 0, 1);
+    const Case c = randomCase(random, slow, motion.fastShare, fast);
     const double thickness = i % 4 == 0 ? 0.0 : kThickness;
     const PairSettings continuous{Method::Continuous, thickness, Contacts::All};
     const PairSettings automatic{.method = Method::Auto,
@@ -178,8 +179,9 @@ TEST(Auto, DistinctContactsRepresentAllThatContinuousFinds) {
   std::size_t found = 0;
   for (int i = 0; i < casesOf(1500); ++i) {
     const Motion& motion = kMotions[i % std::size(kMotions)];
-    const Case c = randomCase(random, motion.slow * uniform(random, 0, 2), motion.fastShare,
-                              motion.fast * uniform(random, 0, 1));
+    const double slow = motion.slow * uniform(random, 0, 2),
+                 fast = motion.fast * uniform(random, 0, 1);
+    const Case c = randomCase(random, slow, motion.fastShare, fast);
     PairRun truth(settingsOf(Engine::Octree), c.a, c.b,
                   {Method::Continuous, kThickness, Contacts::All}, false);
     PairRun run(settingsOf(Engine::Octree), c.a, c.b, {Method::Auto, kThickness}, false);
