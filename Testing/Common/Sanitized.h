@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdlib>
 
 namespace palpate::testing {
 
@@ -33,7 +34,8 @@ inline constexpr bool kSanitized = kAddressSanitizer || kThreadSanitizer;
 
 /// Sanitizers make tests ten times slower. In such a build, a test with many random cases may run a
 /// part of them: one of a prime number, so that loops over few kinds of case keep all kinds. The
-/// ordinary builds run all. -DPALPATE_SHARE_OF_CASES=1 makes a sanitizer run all, too.
+/// ordinary builds run all, but those that isLongRun() leaves out. -DPALPATE_SHARE_OF_CASES=1 makes
+/// a sanitizer run all, too.
 #ifdef PALPATE_SHARE_OF_CASES
 inline constexpr int kShareOfCases = PALPATE_SHARE_OF_CASES;
 #else
@@ -47,5 +49,26 @@ constexpr int casesOf(int all) { return (all + kShareOfCases - 1) / kShareOfCase
 
 /// The least number that a test of all cases must find; 0 if the build runs a part of them.
 constexpr std::size_t leastOf(std::size_t all) { return kShareOfCases == 1 ? all : 0; }
+
+// Of some tests, an ordinary run takes a part of the cases. A long run takes all: `ctest -L long`
+// sets PALPATE_LONG for the suites that call one of these functions.
+
+inline bool isLongRun() {
+  static const bool isLong = std::getenv("PALPATE_LONG") != nullptr;
+  return isLong;
+}
+
+/// One case of so many runs: of `ordinary` in an ordinary run, which should be a prime number.
+inline std::size_t shareOfCases(int ordinary) {
+  const int share = kShareOfCases > 1 ? kShareOfCases : isLongRun() ? 1 : ordinary;
+  return static_cast<std::size_t>(share);
+}
+inline bool isLeftOut(std::size_t number, int share) { return number % shareOfCases(share) != 0; }
+inline int casesOf(int all, int few) {
+  return kShareOfCases > 1 ? casesOf(all) : isLongRun() ? all : few;
+}
+inline std::size_t leastOf(std::size_t all, std::size_t ofFew) {
+  return isLongRun() ? leastOf(all) : leastOf(ofFew);
+}
 
 }  // namespace palpate::testing

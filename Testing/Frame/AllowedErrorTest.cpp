@@ -262,7 +262,7 @@ void expectWithinError(const CollisionData& data, const SpatialQueries& queries,
 TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
   std::map<MethodReason, std::size_t> byField, exactly;
   std::size_t contacts = 0, impacts = 0, nearby = 0;
-  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(12)); ++seed)
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(12, 3)); ++seed)
     for (const Kind kind : kKinds)
       for (const bool isOpen : {false, true}) {
         const Body& body = ring(isOpen);
@@ -317,16 +317,16 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
           if (HasFailure()) return;
         }
       }
-  EXPECT_GE(byField[MethodReason::Still], leastOf(20));
-  EXPECT_GE(byField[MethodReason::Slow], leastOf(200));
-  EXPECT_GE(byField[MethodReason::Cheapest], leastOf(100));
-  EXPECT_GE(byField[MethodReason::NoAlternative], leastOf(400));
-  EXPECT_GE(exactly[MethodReason::Slow], leastOf(100));
-  EXPECT_GE(exactly[MethodReason::Fast], leastOf(100));
-  EXPECT_GE(exactly[MethodReason::NoAlternative], leastOf(200));
-  EXPECT_GE(contacts, leastOf(5000));
-  EXPECT_GE(impacts, leastOf(300));
-  EXPECT_GE(nearby, leastOf(100));
+  EXPECT_GE(byField[MethodReason::Still], leastOf(20, 5));
+  EXPECT_GE(byField[MethodReason::Slow], leastOf(200, 40));
+  EXPECT_GE(byField[MethodReason::Cheapest], leastOf(100, 20));
+  EXPECT_GE(byField[MethodReason::NoAlternative], leastOf(400, 80));
+  EXPECT_GE(exactly[MethodReason::Slow], leastOf(100, 20));
+  EXPECT_GE(exactly[MethodReason::Fast], leastOf(100, 20));
+  EXPECT_GE(exactly[MethodReason::NoAlternative], leastOf(200, 40));
+  EXPECT_GE(contacts, leastOf(5000, 1000));
+  EXPECT_GE(impacts, leastOf(300, 60));
+  EXPECT_GE(nearby, leastOf(100, 20));
 }
 
 /// A triangle that slides at a height over a box, by a distance of about that height.

@@ -1,4 +1,5 @@
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/DegenerateCases.h"
 #include "Frame/ExactContacts.h"
 #include "Frame/Placement.h"
@@ -83,8 +84,9 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
                         std::back_inserter(gained));
     m_same += own.size() - lost.size();
     m_different += lost.size() + gained.size();
-    for (std::size_t i = 0; i < lost.size(); i += kShareOfCases) check(lost[i], true);
-    for (std::size_t i = 0; i < gained.size(); i += kShareOfCases) check(gained[i], false);
+    const std::size_t step = shareOfCases(11);
+    for (std::size_t i = 0; i < lost.size(); i += step) check(lost[i], true);
+    for (std::size_t i = 0; i < gained.size(); i += step) check(gained[i], false);
   }
 
   void compare(const StepScene& scene, Transformation how) {

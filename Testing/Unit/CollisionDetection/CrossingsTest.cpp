@@ -129,7 +129,7 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
   for (const double motion : {0.05, 0.5})
     for (const double thickness : {0.0, 0.02})
       for (const auto& [a, b] : pairs) {
-        if (isLeftOut(number++)) continue;
+        if (isLeftOut(number++, 5)) continue;
         const CrossingStep step{*a, *b, moved(random, a->positions, motion),
                                 moved(random, b->positions, motion)};
         passages += expectCrossings(step, thickness);
@@ -138,7 +138,7 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
         };
         expectCrossings(step, thickness, everyThird);
       }
-  EXPECT_GE(passages, leastOf(500));
+  EXPECT_GE(passages, leastOf(500, 80));
 }
 
 /// All positions have small whole coordinates: features pass through borders, and planes hold
@@ -152,14 +152,14 @@ TEST(Crossings, AreThoseOfRationalArithmeticOnAGrid) {
     return all;
   };
   std::size_t passages = 0;
-  for (int i = 0; i < casesOf(12); ++i) {
+  for (int i = 0; i < casesOf(12, 3); ++i) {
     TestGeometry a = testGeometry(soup(random, 12, 1)), b = testGeometry(soup(random, 12, 1));
     a.positions = grid(a.positions.size());
     b.positions = grid(b.positions.size());
     passages += expectCrossings({a, b, grid(a.positions.size()), grid(b.positions.size())}, 0.0);
     passages += expectCrossings({a, a, grid(a.positions.size()), {}}, 0.0);
   }
-  EXPECT_GE(passages, leastOf(1000));
+  EXPECT_GE(passages, leastOf(1000, 200));
 }
 
 TEST(Crossings, NeedContinuousWithContacts) {

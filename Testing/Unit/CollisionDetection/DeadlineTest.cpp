@@ -217,7 +217,8 @@ TEST_P(DeadlineWith, EveryPlaceOfStopping) {
   bool isComplete = false;
   std::size_t stops = 0, seenPartly = 0;
   std::size_t number = 1;
-  for (std::int64_t budget = 0; !isComplete; budget += kShareOfCases) {
+  const std::size_t share = shareOfCases(3);
+  for (std::int64_t budget = 0; !isComplete; budget += static_cast<std::int64_t>(share)) {
     SCOPED_TRACE("budget " + std::to_string(budget));
     step(number++);
     const std::vector<Answer> before = answersOf(found);
@@ -240,8 +241,8 @@ TEST_P(DeadlineWith, EveryPlaceOfStopping) {
     expectFreeMotions(world, found, truth);
     if (HasFailure()) return;
   }
-  EXPECT_GT(stops * kShareOfCases, 40u);
-  EXPECT_GT(seenPartly, 20u / kShareOfCases);
+  EXPECT_GT(stops * share, 40u);
+  EXPECT_GT(seenPartly, 20u / share);
 }
 
 Settings withAudit(const Settings& settings) {

@@ -210,7 +210,7 @@ TEST_P(KeptPairs, SlowFramesHaveTheAnswersOfASearch) {
       SCOPED_TRACE(std::to_string(threads) + " threads, " + std::to_string(speed));
       Random random(5);
       KeptAndSearched both(GetParam(), threads);
-      for (int frame = 0; frame < casesOf(60); ++frame) {
+      for (int frame = 0; frame < casesOf(60, 30); ++frame) {
         both.setAsksStatistics(frame % 3 != 1);
         both.advance();
         for (std::size_t body = 0; body < GetParam().bodies.size(); ++body)

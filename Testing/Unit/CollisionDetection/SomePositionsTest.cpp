@@ -100,7 +100,7 @@ TEST_P(SomePositions, HaveTheAnswersOfAllPositions) {
     Random random(31);
     SomeAndAll both({testGeometry(sheet(24, 0.5, 0.0)), testGeometry(sheet(24, 0.51, 1.0))},
                     GetParam(), threads);
-    for (int frame = 0; frame < casesOf(160); ++frame) {
+    for (int frame = 0; frame < casesOf(160, 60); ++frame) {
       SCOPED_TRACE("frame " + std::to_string(frame));
       if (frame % 5 != 3) both.forBoth([](OctreeBasedCD& object) { object.advance(); });
       const double length = frame % 20 < 10 ? 1e-4 : 0.01;

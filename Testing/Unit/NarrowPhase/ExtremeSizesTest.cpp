@@ -4,6 +4,7 @@
 
 #include "Common/DegenerateCases.h"
 #include "Common/PairRun.h"
+#include "Common/Sanitized.h"
 #include "Common/SupportedMethods.h"
 #include "NarrowPhase/FeatureTests.h"
 #include "NarrowPhase/ProximityFilter.h"
@@ -83,7 +84,7 @@ TEST(ExtremeSizes, TrianglesAtOnePointNeedNoExactArithmetic) {
 
 TEST(ExtremeSizes, TrianglesAroundOneVertex) {
   for (const double thickness : {1e-4, 0.05, 0.4})
-    compare(star(kShareOfCases == 1 ? 80 : 20), star(7), thickness);
+    compare(star(isLongRun() ? 80 : 25), star(7), thickness);
 }
 
 /// The number of pairs of a star's triangles that are near each other only at its vertex.

@@ -136,13 +136,13 @@ TEST(BeamHits, AreThoseOfSingleCallsOnEveryPath) {
       const std::vector<Triangle> elements = geometry.elements();
       std::vector<Rays> bundles;
       for (const double step : {1e-3, 0.02, 0.5})
-        bundles.push_back(bundlesFor(random, now, elements, step, casesOf(600)));
+        bundles.push_back(bundlesFor(random, now, elements, step, casesOf(600, 200)));
       for (const std::string& path : simdPaths()) {
         SCOPED_TRACE(path + ' ' + std::to_string(threads));
         useSimdPath(path);
         std::size_t hits = 0;
         for (const Rays& rays : bundles) hits += expectSingle(collisions.queries(), id, rays);
-        EXPECT_GE(hits, leastOf(50));
+        EXPECT_GE(hits, leastOf(30, 5));
         if (HasFailure()) return;
       }
       useSimdPath("");
@@ -156,7 +156,7 @@ TEST(BeamHits, AreThoseOfRationalArithmetic) {
     if (geometry.type != GeometryType::Triangles) continue;
     const Both both(geometry);
     const Rays rays =
-        bundlesFor(random, geometry.positions, geometry.triangles, 0.25, casesOf(300));
+        bundlesFor(random, geometry.positions, geometry.triangles, 0.25, casesOf(300, 100));
     hits += expectSingle(both.octree.queries(), both.id, rays);
     std::vector<RayHit> all, byBruteForce;
     std::vector<std::size_t> begins, beginsByBruteForce;
@@ -171,7 +171,7 @@ TEST(BeamHits, AreThoseOfRationalArithmetic) {
         ASSERT_EQ(all[begins[i] + h].element, truth[h].element) << i;
     }
   }
-  EXPECT_GE(hits, leastOf(1000));
+  EXPECT_GE(hits, leastOf(1000, 300));
 }
 
 /// A raster of a sphere of 40,000 triangles, and a fan from inside.

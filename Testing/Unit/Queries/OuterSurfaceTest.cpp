@@ -145,7 +145,7 @@ TEST(OuterSurface, VerticesInBoxesWithACommonPlaneLeaveByIt) {
 /// Where an edge of a cavity enters another part, three faces meet.
 TEST(OuterSurface, VerticesNearACoveredEdgeOfACavityLeaveByIt) {
   Random random(4);
-  for (int i = 0; i < casesOf(30); ++i) {
+  for (int i = 0; i < casesOf(30, 5); ++i) {
     const Matrix3d both = randomTurn(random);
     const Boxes body{
         {{both, {0, 0, 0}, Vector3d::Constant(3.0)},

@@ -229,10 +229,10 @@ TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
     const Matrix3d turn = randomTurn(random) * stretch;
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, -(turn * far)}); });
     const Positions world = placed(farAway.positions, turn, -(turn * far));
-    expectSameAnswers(both, pointsAround(random, world, casesOf(300)));
+    expectSameAnswers(both, pointsAround(random, world, casesOf(300, 60)));
     std::size_t hits = 0, overlaps = 0;
     std::vector<std::uint32_t> found, truth;
-    for (int i = 0; i < casesOf(700); ++i) {
+    for (int i = 0; i < casesOf(700, 150); ++i) {
       const Vector3d p = randomPoint(random, -1.5, 1.5);
       hits += consistentHits(both, {p, randomPoint(random, -1, 1)}).size();
       if (i % 10) continue;
@@ -245,8 +245,8 @@ TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
         overlaps += found.size();
       }
     }
-    EXPECT_GE(hits, leastOf(200));
-    EXPECT_GE(overlaps, leastOf(500));
+    EXPECT_GE(hits, leastOf(200, 40));
+    EXPECT_GE(overlaps, leastOf(500, 100));
   }
 }
 

@@ -433,7 +433,7 @@ TEST(RayHits, AreTheSameOnEverySimdPath) {
 TEST(RayHits, AscendAtAnyMagnitude) {
   Random random(207);
   for (const double scale : {1e-66, 1.0, 1e66}) {
-    for (int i = 0; i < casesOf(40); ++i) {
+    for (int i = 0; i < casesOf(40, 12); ++i) {
       TestGeometry mesh;
       for (int k = 0; k < 30; ++k) mesh.positions.push_back(scale * onLattice(random, 4));
       const auto vertex = [&] { return static_cast<std::uint32_t>(random() % 30); };

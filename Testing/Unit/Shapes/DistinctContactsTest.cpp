@@ -107,7 +107,7 @@ TEST(DistinctContacts, OfAFlatFloorHaveItsNormal) {
   std::size_t contacts = 0, impacts = 0, tilted = 0;
   for (const bool irregular : {false, true})
     for (int run = 0; run < 40; ++run) {
-      if (isLeftOut(run)) continue;
+      if (isLeftOut(run, 5)) continue;
       const Matrix3d floorTurn = randomTurn(random);
       const Mesh floor = flatFloor(random, irregular, floorTurn);
       const Vector3d up = floorTurn.col(2);
@@ -140,9 +140,9 @@ TEST(DistinctContacts, OfAFlatFloorHaveItsNormal) {
           tilted += std::count_if(all.begin(), all.end(), isTilted);
         }
     }
-  EXPECT_GT(contacts, leastOf(1000));
-  EXPECT_GT(impacts, leastOf(50));
-  EXPECT_GT(tilted, 10 * leastOf(1000));
+  EXPECT_GT(contacts, leastOf(1000, 200));
+  EXPECT_GT(impacts, leastOf(50, 10));
+  EXPECT_GT(tilted, 10 * leastOf(1000, 200));
 }
 
 std::set<std::uint32_t> sorted(const Triangle& vertices) {
@@ -166,7 +166,7 @@ TEST(DistinctContacts, MatchTheDefinition) {
   for (const Mesh& mesh : meshes)
     for (int run = 0; run < 24; ++run)
       for (const AnalyticalGeometry& shape : bodies(random)) {
-        if (isLeftOut(run)) continue;
+        if (isLeftOut(run, 5)) continue;
         const Matrix3d turn = run % 3 == 0 ? Matrix3d::Identity() : randomTurn(random);
         const bool steps = run % 2 == 0, turns = run % 4 == 0, bends = run % 8 == 0;
         const Vector3d at{uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5),

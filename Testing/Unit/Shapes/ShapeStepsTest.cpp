@@ -308,7 +308,7 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
     for (const int kind : {0, 1, 2}) {
       const Moving body = movingBody(random, kind, kind == 0 || run % 2 ? 0.0 : 0.02);
       for (const AnalyticalGeometry& geometry : geometries(random)) {
-        if (isLeftOut(number++)) continue;
+        if (isLeftOut(number++, 5)) continue;
         Tool tool{geometry, {}};
         tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
         tool.ends[1] = tool.ends[0];
@@ -341,8 +341,8 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
         EXPECT_EQ(only.earliestTimeOfImpact(), all.earliestTimeOfImpact());
       }
     }
-  EXPECT_GT(contacts, leastOf(50));
-  EXPECT_GT(within, leastOf(25));
+  EXPECT_GT(contacts, leastOf(50, 10));
+  EXPECT_GT(within, leastOf(25, 5));
 }
 
 // ---- Hand-computed contacts ----

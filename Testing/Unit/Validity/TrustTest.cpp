@@ -319,7 +319,7 @@ TEST(TrustOfTypes, IsNeverGivenToAnAnswerThatMissesATouchOrHasAWrongSide) {
   for (int kindA = 0; kindA < 9; ++kindA)
     for (int kindB = std::max(1, kindA); kindB < 9; ++kindB) {
       if (kindA == 5 && kindB == 5) continue;  // two planes
-      for (int history = 0; history < casesOf(60); ++history) {
+      for (int history = 0; history < casesOf(60, 20); ++history) {
         const bool swapped = random() % 2;
         runHistory(random, swapped ? kindB : kindA, swapped ? kindA : kindB, tallies);
         ASSERT_FALSE(HasFailure());
@@ -337,7 +337,7 @@ TEST(TrustOfTypes, IsNeverGivenToAnAnswerThatMissesATouchOrHasAWrongSide) {
               << tally.withContacts << "\n";
   for (const auto& [name, sum] : sums) {
     EXPECT_GT(sum.trusted, sum.right / 3);
-    EXPECT_GE(sum.withContacts, leastOf(50));
+    EXPECT_GE(sum.withContacts, leastOf(50, 15));
   }
 }
 
