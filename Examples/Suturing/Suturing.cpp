@@ -1,5 +1,6 @@
 // A thread of 1,000 segments goes through two sheets and around itself, and is pulled tight. Beside
-// it a guide sews a stitch and ties it by an overhand knot. ThreadTopology grades both.
+// it a guide sews a stitch and ties it by an overhand knot. ThreadTopology grades the stitch, and says
+// when the thread's end goes through the loop of the knot. It does not say whether a knot is tied.
 #include "CommandLine.h"
 #include "SceneProgram.h"
 #include "SelfImpacts.h"
@@ -168,7 +169,7 @@ class Suturing : public LiveScene {
             {"stretch", stretch()},
             {"holes", m_holes[0] + m_holes[1]},
             {"stitched edges", passed(m_edges[0]) + passed(m_edges[1])},
-            {"knot", m_knot ? m_topology.count(*m_knot) : 0},
+            {"end through loop", m_knot ? m_topology.count(*m_knot) : 0},
             {"knot gap mm", knotGap()},
             {"touches itself", m_world.contacts(m_thread, m_thread).edgeEdge().size()},
             {"wound mm", m_world.positions(m_sheets[1])[kMiddle].x() -
@@ -186,7 +187,7 @@ class Suturing : public LiveScene {
       add("needle, " + edge, m_pierced[side], "through");
       add("stitch, " + edge, m_edges[side], "through");
     }
-    add("knot", m_knot, "tied");
+    add("end, loop of the knot", m_knot, "through");
     return lines;
   }
 
@@ -360,7 +361,7 @@ int main(int count, char** arguments) {
        .keys = "n",
        .addOptions =
            [&](CLI::App& app) {
-             app.add_option("--fault", fault, "by which the tied stitch loses its knot")
+             app.add_option("--fault", fault, "by which the thread's end leaves the loop")
                  ->type_name("FAULT")
                  ->check(oneOf({"wall", "end", "disabled"}));
            },

@@ -42,8 +42,8 @@ struct ThreadEvent {
 };
 PALPATE_EXPORT const char* toString(ThreadEvent::Cause) noexcept;  ///< its name, or "unknown"
 
-/// How often threads pass through loops: whether a stitch holds, whether a knot is tied, and the
-/// step in which that changed. Docs/HowTo/Sutures.md has an example.
+/// How often threads pass through loops and through each other, for example whether a stitch goes
+/// through a hole, and the step in which that changed. Docs/HowTo/Sutures.md has an example.
 /// Thread   consecutive vertices are joined by an edge of an enabled element. The first vertex may
 ///          be the last one, too: the thread is then closed.
 /// Loop     a closed polygon: the rim of a hole, or a part of a thread. Its sides need no edges. An
@@ -51,6 +51,10 @@ PALPATE_EXPORT const char* toString(ThreadEvent::Cause) noexcept;  ///< its name
 ///          Its surface is the fan of triangles at its first vertex.
 /// Count    how often the thread passes through the surface to the side of its winding normal, less
 ///          how often to the other side. Of a closed thread it is the linking number.
+/// Knots    no count says whether a knot is tied. Of a loop that the same thread forms, the count
+///          depends on which vertices the loop has, and on the fan: it may become 0 while the knot
+///          stays tied, as when the end has gone on through the fan, and it may be 1 or -1 for a
+///          thread without a knot.
 /// Exact    for the positions as they are, whatever detection and filters find. Where features only
 ///          touch, vertices count as moved by infinitesimal lengths that depend on ids alone.
 /// Parts    the count of two parts of threads is how often an edge of the first passed through an

@@ -290,7 +290,7 @@ TEST(ThreadTopology, TwoPartsCountOnlyWhatPassesThroughThem) {
   EXPECT_TRUE(all.topology.isLost(all.index));
 }
 
-/// A knot: the thread's end goes through a loop that the same thread forms.
+/// The thread's end goes through a loop that the same thread forms.
 TEST(ThreadTopology, AThreadPassesThroughALoopOfItself) {
   OctreeBasedCD collisions;
   Positions positions{{-3, 0, 0}};
