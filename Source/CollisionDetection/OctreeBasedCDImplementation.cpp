@@ -245,21 +245,49 @@ void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> re
   }
 }
 
+void OctreeBasedCD::Implementation::listUnfinished(std::span<PairRecord* const> records) {
+  const PairRecord* const exceeding = findExceeding(records);
+  unfinishedPairs.clear();
+  for (const auto& record : pairs.records()) {
+    if (!record->isUnfinished) continue;
+    const Validity& kept = CollisionData::Contents::of(record->data).validity;  // makes it
+    unfinishedPairs.push_back({record->pair.a, record->pair.b, record->distanceBound, kept.age + 1,
+                               record.get() == exceeding});
+  }
+}
+
 void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> records,
-                                                   FrameStatistics& next) {
+                                                   FrameStatistics& next) noexcept {
+  const PairRecord* const exceeding = findExceeding(records);
   for (std::size_t i = 0; i < records.size(); ++i) {
     PairRecord& record = *records[i];
-    record.yields = i == 0 && record.isUnfinished;
+    record.yields = &record == exceeding;
     if (!record.isUnfinished) continue;
     record.trust = trustBefore[i];
     record.keepLastAnswer(geometries.stepNumber());
   }
-  next.unfinishedPairs.swap(statistics.unfinishedPairs);  // for its memory
-  next.unfinishedPairs.clear();
-  for (const auto& record : pairs.records())
-    if (record->isUnfinished)
-      next.unfinishedPairs.push_back(
-          {record->pair.a, record->pair.b, record->distanceBound, record->data.validity().age});
+  next.unfinishedPairs.swap(unfinishedPairs);
+  unfinishedPairs.swap(statistics.unfinishedPairs);  // for its memory
+}
+
+void OctreeBasedCD::Implementation::commit(std::span<PairRecord* const> records) noexcept {
+  for (PairRecord* record : records) {
+    if (record->isUnfinished) continue;
+    record->commit();
+    reviewLists(*record);
+    record->workedPairs = record->searchedCandidates + record->statistics.featurePairs;
+  }
+}
+
+void OctreeBasedCD::Implementation::reviewMemory() {
+  const MemoryUse& held = statistics.memory;
+  BurstMemory::Work work{0, statistics.contacts + statistics.intersectingTriangles};
+  for (const auto& record : pairs.records()) work.pairs += record->workedPairs;
+  if (!burst.isOver(work, held.pairs + held.narrowPhase + held.results)) return;
+  countCandidates();
+  frame = Frame();
+  for (const auto& record : pairs.records()) record->releaseBurst();
+  statistics.memory = budget->now();
 }
 
 void OctreeBasedCD::Implementation::followSides() {
@@ -330,17 +358,15 @@ bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
     for (const auto& record : pairs.records())
       if (!deadline || !record->collides() || record->dataVersion.isCurrent(record->state()))
         frame.track(*record, geometries.stepNumber());
-    if (deadline) keepUnfinished(records, next);
     for (PairRecord* record : records)
       if (!record->isUnfinished) record->addTags();
+    if (deadline) listUnfinished(records);
     next.milliseconds.order += watch.lap();
   }
+  // Nothing below throws but the audit: a detection that fails leaves the last answers.
+  if (deadline) keepUnfinished(records, next);
   freeMotions.commit(geometries);
-  for (PairRecord* record : records) {
-    if (record->isUnfinished) continue;
-    record->commit();
-    reviewLists(*record);
-  }
+  commit(records);
   for (const auto& record : pairs.records()) {
     if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
       record->commitEmpty();
@@ -357,6 +383,7 @@ bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
   hasUpdates = false;
   const TraceSpan auditSpan(traced, "audit");
   auditFrame(settings, geometries, pairs, audit);
+  reviewMemory();
   return isComplete;
 }
 

@@ -2,6 +2,7 @@
 
 #include <palpate/OctreeBasedCD.h>
 
+#include "CollisionDetection/BurstMemory.h"
 #include "CollisionDetection/DiagnosticsInterface.h"
 #include "CollisionDetection/Frame.h"
 #include "CollisionDetection/FreeMotionSearch.h"
@@ -51,7 +52,9 @@ struct OctreeBasedCD::Implementation {
   bool hasUpdates = false;
   LooseOctree::State shownOctrees;  ///< what octree() shows
   std::vector<PairRecord*> selectedPairs;
-  std::vector<Trust> trustBefore;  ///< of selectedPairs, of a detection with a budget
+  std::vector<Trust> trustBefore;               ///< of selectedPairs, of a detection with a budget
+  std::vector<UnfinishedPair> unfinishedPairs;  ///< of the detection that runs
+  BurstMemory burst;
   AuditRecord audit;
   std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
@@ -169,8 +172,13 @@ struct OctreeBasedCD::Implementation {
   void prepare(std::span<PairRecord* const> records, const Deadline*, Trace*);
   void findContacts(std::span<PairRecord* const> records, const Deadline*, FrameStatistics&,
                     Trace*);
-  /// records: all that had to be found, in the order of urgency.
-  void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&);
+  /// records: all that had to be found, in the order of urgency. The first call lists those that
+  /// are unfinished, and may throw; the second keeps their last answers.
+  void listUnfinished(std::span<PairRecord* const> records);
+  void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&) noexcept;
+  void commit(std::span<PairRecord* const> records) noexcept;
+  /// Gives back what only earlier detections needed, after many that needed much less.
+  void reviewMemory();
 
   std::vector<std::byte> save() const;
   mutable std::atomic<std::size_t> savedSize = 0;  ///< about that of the last state; any thread

@@ -74,6 +74,13 @@ double distanceOf(const AlignedBox3d& a, const AlignedBox3d& b) {
   return stableLength(gap);
 }
 
+std::int64_t highestPriority(std::span<PairRecord* const> records) {
+  std::int64_t highest = std::numeric_limits<std::int64_t>::min();
+  for (const PairRecord* record : records)
+    highest = std::max(highest, std::int64_t{record->pair.settings.priority});
+  return highest;
+}
+
 }  // namespace
 
 double distanceBoundOf(const PairRecord& record) {
@@ -101,16 +108,28 @@ double distanceBoundOf(const PairRecord& record) {
 
 void orderByUrgency(std::span<PairRecord*> records) {
   for (PairRecord* record : records) record->distanceBound = distanceBoundOf(*record);
-  const auto rank = [](const PairRecord& record) {
+  const std::int64_t highest = highestPriority(records);
+  const auto rank = [highest](const PairRecord& record) {
     const Validity& last = record.data.validity();
     const std::int64_t age = record.yields ? 0 : last.age, priority = record.pair.settings.priority;
+    const bool isLower = record.yields || priority < highest;
     const bool isApart =
         last.atEnd + last.atImpact == 0 && record.data.intersectingTriangles().empty();
     const double distance = std::min(record.distanceBound, std::numeric_limits<double>::max());
-    return std::tuple(-age, -priority, isApart, distance - record.plan.motion, record.index);
+    return std::tuple(isLower, -age, -priority, isApart, distance - record.plan.motion,
+                      record.index);
   };
   std::sort(records.begin(), records.end(),
             [&](const PairRecord* l, const PairRecord* r) { return rank(*l) < rank(*r); });
+}
+
+const PairRecord* findExceeding(std::span<PairRecord* const> records) {
+  const std::int64_t highest = highestPriority(records);
+  for (const PairRecord* record : records) {
+    if (record->isUnfinished) return record;
+    if (record->pair.settings.priority < highest) return nullptr;
+  }
+  return nullptr;
 }
 
 }  // namespace palpate

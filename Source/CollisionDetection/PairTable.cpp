@@ -232,10 +232,21 @@ void PairRecord::releaseMemory() {
   releaseSpare(contents.intersectingTriangles);
 }
 
+void PairRecord::releaseBurst() {
+  next = {};
+  if (!keeps && !gathers) kept.releaseMemory();
+  fieldScratch.reset();
+  releaseResults();
+}
+
 void PairRecord::commitEmpty() noexcept {
   commit();
   trust.forget();
 }
+  releaseResults();
+}
+
+void PairRecord::releaseResults() {
 
 void PairRecord::takeOver(PairRecord& former) noexcept {
   PALPATE_ASSERT(a == former.a && b == former.b);

@@ -44,6 +44,7 @@ struct PairRecord : CountedObject {
   int slowFrames = 0;                  ///< consecutive detections in which candidates could be kept
   double recentSpeed = 0;              ///< L: PairPlan::motion, recently the largest that was slow
   std::size_t searchedCandidates = 0;  ///< of the last search
+  std::size_t workedPairs = 0;         ///< with feature pairs, of the last detection of the pair
   int pauseFrames = 0;                 ///< detections for which candidates are not kept
   int nextPause = 0;                   ///< how many that are the next time
   std::array<ElementsState, 2> keptElements;  ///< those of a and b in `kept`
@@ -114,6 +115,7 @@ struct PairRecord : CountedObject {
   void releaseMemory();  ///< keeps the result
 
   /// What `former` has derived and holds for this pair, too. Both are of the same geometries.
+  void releaseBurst();   ///< the same, but for lists that detections use
   void takeOver(PairRecord& former) noexcept;
 
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
@@ -137,6 +139,8 @@ struct PairRecord : CountedObject {
 
   /// The pair whose filters apply: that which a StepGuard guards, or whose crossings are found.
   /// Null: a pair of the table.
+  void releaseResults();  ///< what the result does not need
+
   const PairRecord* guarded = nullptr;
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;

@@ -21,7 +21,7 @@ namespace {
 using namespace description;
 
 constexpr std::string_view kStateTitle = "palpate-state";
-constexpr std::uint32_t kStateVersion = 1;
+constexpr std::uint32_t kStateVersion = 2;
 
 using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;
@@ -285,7 +285,7 @@ void describeKnown(File& file, std::vector<FreeMotionSearch::Known>& known, Reco
 template <class File>
 void describeUnfinished(File& file, FrameStatistics& statistics) {
   fieldOf(file, statistics.freeMotionUnfinished);
-  itemsOf(file, statistics.unfinishedPairs, 20, [&](UnfinishedPair& pair) {
+  itemsOf(file, statistics.unfinishedPairs, 21, [&](UnfinishedPair& pair) {
     for (GeometryId* id : {&pair.a, &pair.b}) file.integer(*id);
     file.real(pair.distanceBound);
     file.integer(pair.age);
@@ -299,6 +299,7 @@ SavedRevisions revisionsOf(const Geometry& geometry) {
           {},
           topology.vertexCount,
           topology.elements.size()};
+    fieldOf(file, pair.exceedsBudget);
 }
 
 /// Of a geometry that restore() will change so.

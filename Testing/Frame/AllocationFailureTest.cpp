@@ -14,11 +14,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 
 #include <bit>
 #include <functional>
 #include <new>
+#include <optional>
 #include <string>
 
 // Makes every allocation of every public call fail once. A call that changes the object leaves it
@@ -498,6 +500,87 @@ TEST(AllocationFailureOfThreadTopology, LeavesItUnchanged) {
     EXPECT_EQ(run(n), truth) << n;
   }
   EXPECT_GT(failures, 10u);
+}
+
+/// All that a pair's answer says.
+struct WholeAnswer {
+  explicit WholeAnswer(const CollisionData& data)
+      : hash(data.hash()),
+        validity(data.validity()),
+        crossings(data.crossings().begin(), data.crossings().end()),
+        sides(data.rememberedSides().begin(), data.rememberedSides().end()),
+        tracked(data.trackedVertexTriangle().begin(), data.trackedVertexTriangle().end()),
+        ended(data.ended().begin(), data.ended().end()) {}
+  friend bool operator==(const WholeAnswer&, const WholeAnswer&) = default;
+
+  std::uint64_t hash;
+  Validity validity;
+  std::vector<Crossing> crossings, sides;
+  std::vector<TrackedContact> tracked, ended;
+};
+
+/// A detection that throws leaves the last answers: age, crossings, trust and contacts over time,
+/// with any budget, in the same step and in the next. The next one is as if it had not been.
+TEST(AllocationFailureOfDetections, LeavesEveryAnswer) {
+  const Mesh ground = sheet(2, 0.0, 0.0);
+  std::size_t failures = 0;
+  // n: the allocation that fails. Returns the answers at the end.
+  const auto run = [&](std::size_t n, std::optional<std::chrono::microseconds> budget,
+                       bool inNextStep) {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree, 1));
+    Positions drops{{0.3, 0.4, 0.1}, {0.6, 0.2, 0.1}};
+    const GeometryId organ = addMesh(collisions, ground), points = collisions.addPointSet(drops);
+    collisions.addCollisionPair(points, organ,
+                                {.method = Method::Continuous,
+                                 .thickness = 0.3,
+                                 .trackContacts = true,
+                                 .reportCrossings = true,
+                                 .rememberSides = true});
+    collisions.advance();
+    const auto move = [&](double z) {
+      for (Vector3d& p : drops) p[2] += z;
+      collisions.setPositions(points, drops);
+    };
+    const CollisionPair pair = collisions.pairs()[0];
+    const auto answer = [&] { return WholeAnswer(collisions.collisionData(pair.a, pair.b)); };
+    move(-0.2);
+    collisions.detectCollision();
+    EXPECT_EQ(answer().crossings.size(), 2u);
+    const auto isComplete = [&] { return collisions.statistics().unfinishedPairs.empty(); };
+    for (int i = 0; i < 3; ++i) {
+      if (inNextStep) collisions.advance();
+      move(-0.05);
+      const WholeAnswer before = answer();
+      const bool wasComplete = isComplete();
+      const auto detect = [&] {
+        if (budget)
+          collisions.detectCollision(*budget);
+        else
+          collisions.detectCollision();
+      };
+      if (FailingAllocation::throwsAt(n, detect)) {
+        ++failures;
+        EXPECT_EQ(answer(), before) << n;
+        EXPECT_EQ(isComplete(), wasComplete) << n;
+        detect();
+      }
+    }
+    collisions.detectCollision();
+    return answer();
+  };
+  using std::chrono::microseconds;
+  for (const auto budget : {std::optional<microseconds>(), std::optional(microseconds(0)),
+                            std::optional(microseconds::max())})
+    for (const bool inNextStep : {false, true}) {
+      failures = 0;
+      const WholeAnswer truth = run(1'000'000, budget, inNextStep);
+      EXPECT_EQ(failures, 0u);
+      for (std::size_t n = 1, before = 1; failures != before; ++n) {
+        before = failures;
+        EXPECT_EQ(run(n, budget, inNextStep), truth) << n;
+      }
+      EXPECT_GT(failures, budget == microseconds(0) ? 2u : 10u);
+    }
 }
 
 /// Vectors that appendRows() and appendMotions() extend keep their content.

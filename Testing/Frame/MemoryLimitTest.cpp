@@ -135,6 +135,45 @@ TEST_P(MemoryLimit, ReleaseMemoryEndsAPeak) {
   EXPECT_EQ(run.data().hash(), hash);
 }
 
+/// What a burst allocated is given back within so many detections, without a call. Answers are
+/// those of an object that never had the burst. It is given back once: later frames allocate
+/// nothing.
+TEST_P(MemoryLimit, ABurstIsGivenBackAfterAWhile) {
+  const Mesh a = fan(300, 0), b = fan(300, 1);
+  std::vector<Positions> away(7, b.positions);
+  for (std::size_t i = 0; i < away.size(); ++i)
+    for (Vector3d& p : away[i]) p[2] += 100 + 1e-3 * static_cast<double>(i);
+  const auto settings = limited(GetParam(), 0);
+  const PairSettings pair{.method = Method::Intersection, .trackContacts = true};
+  PairRun bursting(settings, a, b, pair, false), calm(settings, a, b, pair, false);
+  const auto set = [](PairRun& run, const Positions& positions) {
+    run.detection().advance();
+    run.detection().setPositions(run.b(), positions);
+    run.detect();
+  };
+  for (PairRun* run : {&bursting, &calm}) set(*run, away[0]);
+  for (int burst = 0; burst < 2; ++burst) {
+    for (int frame = 0; frame < 50 * burst; ++frame) set(bursting, away[1]);
+    set(bursting, b.positions);
+    EXPECT_EQ(bursting.data().intersectingTriangles().size(), 90000u);
+    EXPECT_GT(bursting.detection().memoryUse().total, 10 * calm.detection().memoryUse().total);
+    for (std::size_t frame = 0; frame < 256; ++frame)
+      for (PairRun* run : {&bursting, &calm}) set(*run, away[frame % away.size()]);
+    const std::size_t use = calm.detection().memoryUse().total;
+    EXPECT_LT(bursting.detection().memoryUse().total, use + use / 4 + 100'000);
+    EXPECT_EQ(bursting.data().hash(), calm.data().hash());
+    EXPECT_EQ(bursting.data().validity(), calm.data().validity());
+  }
+  for (std::size_t frame = 0; frame < 8; ++frame) set(bursting, away[frame % away.size()]);
+  FailingAllocation::arm(0);
+  for (std::size_t frame = 0; frame < 300; ++frame) set(bursting, away[frame % away.size()]);
+  FailingAllocation::disarm();
+  EXPECT_EQ(FailingAllocation::count(), 0u);
+  set(bursting, b.positions);
+  set(calm, b.positions);
+  EXPECT_EQ(bursting.data().hash(), calm.data().hash());
+}
+
 /// Each limit gives complete answers or the error. The last answers stay, and frames that fit work
 /// again.
 void expectEveryLimitIsKept(int threads, bool withProxy, std::size_t limits) {

@@ -30,6 +30,7 @@ def test_pairs_out_of_time_keep_their_answer():
     assert collisions.detect_collision(budget=0) is False
     (pair,) = collisions.statistics().unfinished_pairs
     assert (pair.a, pair.b, pair.age) == (tips, sheet, 1)
+    assert pair.exceeds_budget is True  # it was the first, and there was no time
     assert 0.1 - 1e-9 < pair.distance_bound <= 0.1
     assert collisions.statistics().free_motion_unfinished is False
     data = collisions.collision_data(tips, sheet)

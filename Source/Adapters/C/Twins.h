@@ -109,6 +109,7 @@ PALPATE_SAME(palpate_unfinished_pair, a, UnfinishedPair, a);
 PALPATE_SAME(palpate_unfinished_pair, b, UnfinishedPair, b);
 PALPATE_SAME(palpate_unfinished_pair, distance_bound, UnfinishedPair, distanceBound);
 PALPATE_SAME(palpate_unfinished_pair, age, UnfinishedPair, age);
+PALPATE_SAME(palpate_unfinished_pair, exceeds_budget, UnfinishedPair, exceedsBudget);
 
 PALPATE_TWIN(palpate_memory, MemoryUse);
 PALPATE_SAME(palpate_memory, geometries, MemoryUse, geometries);

@@ -143,7 +143,8 @@ inline constexpr const char* kClass<UnfinishedPair> = "UnfinishedPair";
 template <>
 inline constexpr auto kFields<UnfinishedPair> = std::tuple(
     field("a", &UnfinishedPair::a), field("b", &UnfinishedPair::b),
-    field("distance_bound", &UnfinishedPair::distanceBound), field("age", &UnfinishedPair::age));
+    field("distance_bound", &UnfinishedPair::distanceBound), field("age", &UnfinishedPair::age),
+    field("exceeds_budget", &UnfinishedPair::exceedsBudget));
 template <>
 inline constexpr const char* kClass<FrameStatistics> = "FrameStatistics";
 template <>

@@ -27,6 +27,9 @@ struct UnfinishedPair {
   /// step. Proven from boxes around the geometries. 0: they may touch.
   double distanceBound = 0.0;
   std::uint32_t age = 0;  ///< Validity::age of the answer that the pair keeps
+  /// The detection began with the pair, and the whole time was not enough for it: while the pair
+  /// moves so, no detection with this budget can finish it.
+  bool exceedsBudget = false;
   friend bool operator==(const UnfinishedPair&, const UnfinishedPair&) = default;
 };
 

@@ -198,9 +198,10 @@ class PALPATE_EXPORT OctreeBasedCD {
   ///          executor; InvalidSettings if run() returns too early; NotAvailable after fork() in a
   ///          task.
   void detectCollision();
-  /// The same within a budget of time, which begins with the call. Pairs go in this order: those
-  /// that were unfinished before, by age; higher PairSettings::priority; those with contacts in
-  /// their last answer, then those whose boxes are nearest, less the motion in the step. Pairs that
+  /// The same within a budget of time, which begins with the call. Pairs go in this order: those of
+  /// the highest PairSettings::priority; those that were unfinished before, by age; higher
+  /// priority; those with contacts in their last answer, then those whose boxes are nearest, less
+  /// the motion in the step. A pair that exceeds the budget gives way every second time. Pairs that
   /// are not finished keep their last answer, and FrameStatistics::unfinishedPairs names them.
   /// Returns   whether everything was finished.
   /// Overrun   octrees are always updated; beyond that by one part of the work

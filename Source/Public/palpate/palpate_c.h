@@ -612,6 +612,7 @@ typedef struct palpate_unfinished_pair {
   double distance_bound;  ///< L
   uint32_t age;           ///< in detections
 } palpate_unfinished_pair;
+  uint8_t exceeds_budget;
 
 typedef struct palpate_pair_statistics {
   size_t size;

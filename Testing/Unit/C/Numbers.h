@@ -50,10 +50,10 @@ inline Numbers bitsOf(Tag, const palpate_pair& p) { return listOf(p.a, p.b); }
 inline Numbers bitsOf(Tag, const ElementPair& p) { return listOf(p.a, p.b); }
 
 inline Numbers bitsOf(Tag, const palpate_unfinished_pair& p) {
-  return listOf(p.a, p.b, p.distance_bound, p.age);
+  return listOf(p.a, p.b, p.distance_bound, p.age, p.exceeds_budget);
 }
 inline Numbers bitsOf(Tag, const UnfinishedPair& p) {
-  return listOf(p.a, p.b, p.distanceBound, p.age);
+  return listOf(p.a, p.b, p.distanceBound, p.age, p.exceedsBudget);
 }
 
 inline Numbers bitsOf(Tag, const palpate_vertex_triangle& c) {

@@ -376,6 +376,83 @@ TEST(Deadline, APairThatIsTooLargeYields) {
   EXPECT_EQ(finished, 3u);
 }
 
+/// Pairs of the highest priority are finished in every detection, whichever they are and however
+/// long others wait. The others go on in turn.
+TEST(Deadline, TheHighestPriorityIsServedInEveryFrame) {
+  constexpr std::size_t kPairs = 12;
+  for (std::size_t chosen = 0; chosen < 2 * kPairs; ++chosen) {
+    SCOPED_TRACE(chosen);
+    Row row(kPairs + 1, kTouching, {.threads = chosen % 3 == 0 ? 3 : 1});
+    const std::size_t first = chosen % kPairs,
+                      second = chosen < kPairs ? first : (first + 5) % kPairs;  // two of them
+    for (const std::size_t i : {first, second}) {
+      PairSettings pair = kTouching;
+      pair.priority = 7;
+      row.collisions.setPairSettings(row.ids[i], row.ids[i + 1], pair);
+    }
+    row.collisions.detectCollision();
+    LooksClock clock(row.collisions);
+    row.moveAll({0, 1e-3, 0});
+    row.collisions.detectCollision(microseconds::max());
+    const std::int64_t budget = clock.looks() / 2;
+    std::size_t unfinished = 0;
+    for (int frame = 0; frame < 40; ++frame) {
+      row.collisions.advance();
+      row.moveAll({0, frame % 2 == 0 ? 1e-3 : -1e-3, 0});
+      row.collisions.detectCollision(microseconds(budget));
+      for (std::size_t i = 0; i < kPairs; ++i) {
+        const UnfinishedPair* const found =
+            findUnfinished(row.collisions, row.collisions.pairs()[i]);
+        unfinished += found != nullptr;
+        if (!found) continue;
+        EXPECT_TRUE(i != first && i != second) << frame;
+        EXPECT_LT(found->age, 12u) << frame;
+      }
+    }
+    EXPECT_GT(unfinished, 40u);
+  }
+}
+
+/// A pair for which a whole budget is not enough says so, also behind one of the highest priority.
+/// It does not keep the others from being finished, and with a budget that is large enough it is.
+TEST(Deadline, APairThatExceedsTheBudgetSaysSo) {
+  for (const bool isBehind : {false, true}) {
+    Row row(4, kTouching, {.threads = 1});
+    const Mesh large = sphere(60, 90, {0, 0, 0}, 5.0);
+    const GeometryId a = addMesh(row.collisions, large), b = addMesh(row.collisions, large);
+    row.collisions.addCollisionPair(a, b, kTouching);
+    if (isBehind) {
+      PairSettings pair = kTouching;
+      pair.priority = 1;
+      row.collisions.setPairSettings(row.ids[0], row.ids[1], pair);
+    }
+    row.collisions.detectCollision();
+    LooksClock clock(row.collisions);
+    std::size_t said = 0;
+    for (int i = 0; i < 12; ++i) {
+      row.moveAll({0, 1e-3, 0});
+      auto positions = large.positions;
+      for (Vector3d& x : positions) x[2] += 1e-4 * (i + 1);
+      row.collisions.setPositions(a, positions);
+      row.collisions.detectCollision(microseconds(60));
+      for (std::size_t p = 0; p < 3; ++p) {
+        const UnfinishedPair* const small =
+            findUnfinished(row.collisions, row.collisions.pairs()[p]);
+        EXPECT_FALSE(small && small->exceedsBudget);
+        EXPECT_FALSE(small && small->age > 2);
+      }
+      const UnfinishedPair* const found = findUnfinished(row.collisions, row.collisions.pairs()[3]);
+      ASSERT_TRUE(found);
+      said += found->exceedsBudget;
+      row.collisions.advance();
+    }
+    EXPECT_GE(said, 5u);
+    EXPECT_LT(said, 12u);
+    row.moveAll({0, 1e-3, 0});
+    EXPECT_TRUE(row.collisions.detectCollision(microseconds(1'000'000)));
+  }
+}
+
 template <class F>
 void forEachContact(const CollisionData& data, F&& f) {
   const auto each = [&](const auto& list) { std::for_each(list.begin(), list.end(), f); };

@@ -263,12 +263,14 @@ class UnfinishedPair:
 
     distance_bound  L: features of the two are proven not to be nearer
     age             that of the answer which the pair keeps, in detections
+    exceeds_budget  the detection began with the pair, and the whole time was not enough for it
     """
 
     a: int
     b: int
     distance_bound: float
     age: int
+    exceeds_budget: bool
 
 
 @dataclass(frozen=True, kw_only=True)
