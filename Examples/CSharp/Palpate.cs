@@ -162,6 +162,8 @@ public struct Validity {
   public double Displacement, DisplacementLimit, ArcDeviation, EffectiveThickness, ProxyDepth;
   Indices untrustedA, untrustedB, degenerateA, degenerateB, outsideBand, nearThreshold, unreliableSign;
   public uint Age;
+  byte advanceMayBeMissing;
+  public bool AdvanceMayBeMissing { get { return advanceMayBeMissing != 0; } }
   public bool Trusted { get { return trusted != 0; } }
   public bool StartedApart { get { return startedApart != 0; } }
   public bool SideMayBeWrong { get { return sideMayBeWrong != 0; } }

@@ -1,5 +1,6 @@
 #include <palpate/CollisionData.h>
 
+#include "CollisionDetection/StepRows.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <algorithm>
@@ -51,7 +52,9 @@ const ContactTags* tagsIn(std::span<const Contact> list, std::span<const Contact
 
 CollisionData::CollisionData() noexcept = default;
 CollisionData::CollisionData(const CollisionData& other)
-    : m_contents(other.m_contents ? std::make_unique<Contents>(*other.m_contents) : nullptr) {}
+    : m_contents(other.m_contents ? std::make_unique<Contents>(*other.m_contents) : nullptr) {
+  if (m_contents) keepOffsets(*m_contents);
+}
 CollisionData::CollisionData(CollisionData&&) noexcept = default;
 CollisionData& CollisionData::operator=(const CollisionData& other) {
   return *this = CollisionData(other);
@@ -73,6 +76,7 @@ CollisionData::CollisionData(const Parts& parts) {
                          parts.earliestTimeOfImpact,
                          parts.errorBound,
                          parts.validity,
+                         {},
                          {},
                          {},
                          {},

@@ -1,11 +1,18 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "CollisionDetection/PairResults.h"
+#include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/StepRows.h"
 #include "Mesh/PointMotion.h"
 #include "Mesh/Rotation.h"
+#include "Math/Tolerances.h"
 #include "Core/FloatingPoint.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
+#include <utility>
 
 namespace palpate {
 
@@ -18,16 +25,201 @@ Stencil stencil(const EdgeEdgeContact& contact) {
 
 double ConstraintRow::gap(std::span<const Eigen::Vector3d> positions) const {
   const StandardFloatingPoint standard;
+  for (const std::uint32_t vertex : vertices)
+    if (vertex >= positions.size())
+      throw Error(ErrorCode::WrongPositionCount,
+                  "gap(): a row has vertex " + std::to_string(vertex) +
+                      " of the solver, but there are " + std::to_string(positions.size()) +
+                      " positions",
+                  {}, vertex);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < 4; ++i) sum += weights[i] * positions[vertices[i]];
   return standard.evaluated(normal.dot(sum) - offset);
 }
 
+namespace {
+
+using Eigen::Vector3d;
+using Contents = CollisionData::Contents;
+
+/// On which side each of a contact's four vertices is: 0, the pair's first geometry, or 1.
+using Sides = std::array<std::size_t, 4>;
+constexpr Sides kVertexOfFirst{0, 1, 1, 1}, kVertexOfSecond{1, 0, 0, 0}, kEdges{0, 0, 1, 1};
+
+/// Appends the rows of all lists. first: the solver's numbers of vertex 0 of both sides.
+/// of(contact, normal, stencil, sides): the offset of a contact with vertices on both sides.
+/// ofShape(contact, normal): of one with a shape. If these throw, no row is added.
+template <class Of, class OfShape>
+void addRows(const CollisionData& contacts, const std::array<std::uint32_t, 2>& first,
+             std::size_t sideOfElements, std::vector<ConstraintRow>& rows, Of&& of,
+             OfShape&& ofShape) {
+  const std::size_t initialSize = rows.size();
+  // Calls f(contact, normal) with the smooth normals if there are any.
+  const auto forEach = [](const auto& list, std::span<const Vector3d> smooth, auto&& f) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      f(list[i], smooth.empty() ? list[i].normal : smooth[i]);
+  };
+  const auto add = [&](const Sides& sides) {
+    return [&](const auto& contact, const Vector3d& normal) {
+      const Stencil s = stencil(contact);
+      ConstraintRow row{s.vertices, s.weights, normal, of(contact, normal, s, sides)};
+      for (std::size_t i = 0; i < 4; ++i) row.vertices[i] += first[sides[i]];
+      rows.push_back(row);
+    };
+  };
+  try {
+    forEach(contacts.vertexTriangle(), contacts.smoothVertexTriangle(), add(kVertexOfFirst));
+    forEach(contacts.triangleVertex(), contacts.smoothTriangleVertex(), add(kVertexOfSecond));
+    forEach(contacts.edgeEdge(), contacts.smoothEdgeEdge(), add(kEdges));
+    forEach(contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const auto& normal) {
+      const auto& [i, j, k] = contact.vertices;
+      const double offset = ofShape(contact, normal);
+      const std::uint32_t number = first[sideOfElements];
+      rows.push_back({{number + i, number + j, number + k, number + i},
+                      {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
+                      normal,
+                      offset});
+    });
+  } catch (...) {
+    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
+    throw;
+  }
+}
+
+/// The weighted sum of a contact's positions at its time. at(side, vertex): those before and now.
+template <class At>
+Vector3d sumOf(const Stencil& stencil, const Sides& sides, double time, At&& at) {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& [before, now] = at(sides[i], stencil.vertices[i]);
+    sum += stencil.weights[i] * ((1 - time) * before + time * now);
+  }
+  return sum;
+}
+
+/// body: the motion of the shape, or of the field's body.
+double offsetOf(const ShapeContact& contact, const Vector3d& normal, const RigidMotion& body) {
+  const double time = contact.timeOfImpact;
+  const Vector3d rest =
+      (1 - time) * displacementAt(body.before, body.now, contact.pointOnShape, time);
+  return normal.dot(contact.point + rest) - contact.distance;
+}
+
+/// Whether the ends of the step are those for which the pair's answer holds. Positions now may have
+/// been corrected since.
+bool isInStep(const PairRecord& record) {
+  if (!record.dataVersion.isValid()) return false;
+  const PairRecord::State& state = record.dataVersion.state();
+  const auto isOf = [](const BodyState& found, const Geometry& geometry) {
+    return found.elements.topology == geometry.body.revisions.elements.topology &&
+           found.before == geometry.body.mesh.before.state() &&
+           found.now == geometry.step.detected().state();
+  };
+  return isOf(state.a, *record.a) && isOf(state.b, *record.b);
+}
+
+/// The offsets of rows with the positions of a pair's step. isInStep().
+class StepOffsets {
+ public:
+  StepOffsets(const PairRecord& record, bool elementsOfSecond)
+      : m_sides{record.a, record.b}, m_body(motionOf(*m_sides[elementsOfSecond ? 0 : 1])) {}
+
+  double operator()(const auto& contact, const Vector3d& normal, const Stencil& stencil,
+                    const Sides& sides) const {
+    const auto at = [&](std::size_t side, std::uint32_t vertex) {
+      const Geometry& geometry = *m_sides[side];
+      return std::pair<Vector3d, Vector3d>(geometry.body.mesh.before[vertex],
+                                           geometry.step.detected()[vertex]);
+    };
+    return normal.dot(sumOf(stencil, sides, contact.timeOfImpact, at)) - contact.distance;
+  }
+  double operator()(const ShapeContact& contact, const Vector3d& normal) const {
+    return offsetOf(contact, normal, m_body);
+  }
+
+ private:
+  static RigidMotion motionOf(const Geometry& geometry) {
+    return {geometry.body.mesh.before.transform(), geometry.step.detected().transform()};
+  }
+
+  std::array<const Geometry*, 2> m_sides;
+  RigidMotion m_body;
+};
+
+/// Throws unless the offset of a row is a sum of radii, which is the law of contacts.
+/// largest: the largest coordinate of its positions, L; motion: the sum of their motions, L.
+void checkOffset(const Contents::Step& step, double errorBound, double offset, double largest,
+                 double motion, std::uint32_t vertex) {
+  const double error = errorBound + step.timeTolerance * motion + kRowPositions * largest;
+  // Not for NaN, which is in no step.
+  if (offset >= -error && offset <= step.radii + error) return;
+  throw Error(ErrorCode::InvalidCall,
+              "appendRows(): these positions are not those of the detected step, as a contact of "
+              "vertex " +
+                  std::to_string(vertex) +
+                  " is not at its distance with them: pass the positions before and now that the "
+                  "detection had, or call CollisionData::appendRows()",
+              {}, vertex);
+}
+
+}  // namespace
+
+void keepOffsets(Contents& contents) {
+  const PairRecord* const record = std::exchange(contents.step.record, nullptr);
+  if (!record || !isInStep(*record)) return;
+  const StandardFloatingPoint standard;
+  const StepOffsets offsets(*record, contents.step.elementsOfSecond);
+  CountedVector<double>& kept = contents.step.offsets;
+  kept.clear();
+  kept.reserve(sizeOf(contents));
+  const auto keep = [&](const auto& list, const auto& smooth, auto&& of) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      kept.push_back(of(list[i], smooth.empty() ? list[i].normal : smooth[i]));
+  };
+  const auto with = [&](const Sides& sides) {
+    return [&](const auto& contact, const Vector3d& normal) {
+      return offsets(contact, normal, stencil(contact), sides);
+    };
+  };
+  const Contents::Smooth& smooth = contents.smooth;
+  keep(contents.vertexTriangle, smooth.vertexTriangle, with(kVertexOfFirst));
+  keep(contents.triangleVertex, smooth.triangleVertex, with(kVertexOfSecond));
+  keep(contents.edgeEdge, smooth.edgeEdge, with(kEdges));
+  keep(contents.shape, smooth.shape, offsets);
+  contents.step.hasOffsets = true;
+}
+
+void CollisionData::appendRows(std::vector<ConstraintRow>& rows, std::uint32_t firstOfA,
+                               std::uint32_t firstOfB) const {
+  const StandardFloatingPoint standard;
+  const Contents::Step& step = read().step;
+  const std::array first{firstOfA, firstOfB};
+  const std::size_t sideOfElements = step.elementsOfSecond ? 1 : 0;
+  if (step.hasOffsets) {
+    const double* next = step.offsets.data();
+    const auto offset = [&](const auto&...) { return *next++; };
+    return addRows(*this, first, sideOfElements, rows, offset, offset);
+  }
+  if (!step.record)
+    throw Error(ErrorCode::NotAvailable,
+                "appendRows(): the step of these contacts is not known, as they were made of "
+                "Parts, or copied when the step was over: pass positions");
+  if (!isInStep(*step.record))
+    throw Error(ErrorCode::InvalidCall,
+                "appendRows(): the step of these contacts of " +
+                    nameOf(*step.record->a, *step.record->b) +
+                    " is over: call it, or copy the CollisionData, after the detection and before "
+                    "advance()",
+                step.record->pair.a);
+  const StepOffsets offsets(*step.record, step.elementsOfSecond);
+  addRows(*this, first, sideOfElements, rows, offsets, offsets);
+}
+
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
                 std::vector<ConstraintRow>& rows, const RigidMotion& body) {
   const StandardFloatingPoint standard;
-  const std::size_t initialSize = rows.size();
   const RigidMotion motion = withExactRotations(body);
+  const std::array<const SolverVertices*, 2> both{&a, &b};
   const auto require = [&](const SolverVertices& side, std::uint32_t vertex) {
     if (vertex < side.before.size() && vertex < side.now.size()) return;
     throw Error(ErrorCode::WrongPositionCount,
@@ -37,61 +229,38 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                     std::to_string(side.now.size()) + " now",
                 {}, vertex);
   };
-  const auto add = [&](const auto& contact, const Eigen::Vector3d& normal,
-                       const std::array<const SolverVertices*, 4>& sides) {
-    const auto [vertices, weights] = stencil(contact);
-    const double time = contact.timeOfImpact;
-    ConstraintRow row{{}, weights, normal, 0.0};
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < 4; ++i) {
-      const SolverVertices& side = *sides[i];
-      require(side, vertices[i]);
-      row.vertices[i] = side.first + vertices[i];
-      sum += weights[i] * ((1 - time) * side.before[vertices[i]] + time * side.now[vertices[i]]);
-    }
-    row.offset = normal.dot(sum) - contact.distance;
-    rows.push_back(row);
-  };
-  try {
-    // Calls f(contact, normal) with the smooth normals if there are any.
-    const auto forEach = [](const auto& list, std::span<const Eigen::Vector3d> smooth, auto&& f) {
-      for (std::size_t i = 0; i < list.size(); ++i)
-        f(list[i], smooth.empty() ? list[i].normal : smooth[i]);
+  const Contents* const contents = Contents::in(contacts);
+  const auto of = [&](const auto& contact, const Vector3d& normal, const Stencil& s,
+                      const Sides& sides) {
+    double largest = 0.0, moved = 0.0;
+    const auto at = [&](std::size_t side, std::uint32_t vertex) {
+      require(*both[side], vertex);
+      return std::pair<const Vector3d&, const Vector3d&>(both[side]->before[vertex],
+                                                         both[side]->now[vertex]);
     };
-    forEach(contacts.vertexTriangle(), contacts.smoothVertexTriangle(),
-            [&](const auto& contact, const auto& normal) {
-              add(contact, normal, {&a, &b, &b, &b});
-            });
-    forEach(contacts.triangleVertex(), contacts.smoothTriangleVertex(),
-            [&](const auto& contact, const auto& normal) {
-              add(contact, normal, {&b, &a, &a, &a});
-            });
-    forEach(contacts.edgeEdge(), contacts.smoothEdgeEdge(),
-            [&](const auto& contact, const auto& normal) {
-              add(contact, normal, {&a, &a, &b, &b});
-            });
-    if (!contacts.shape().empty() && !(a.before.empty() && a.now.empty()) &&
-        !(b.before.empty() && b.now.empty()))
-      throw Error(ErrorCode::WrongPositionCount,
-                  "appendRows(): both sides have positions, but one of them is a shape, or a body "
-                  "whose distance field answered; leave that one empty");
-    const SolverVertices& mesh = a.before.empty() && a.now.empty() ? b : a;  // the other: the shape
-    forEach(contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const auto& normal) {
-      const auto& [i, j, k] = contact.vertices;
-      for (const std::uint32_t vertex : contact.vertices) require(mesh, vertex);
-      const std::uint32_t first = mesh.first;
-      const double time = contact.timeOfImpact;
-      const Eigen::Vector3d rest =
-          (1 - time) * displacementAt(motion.before, motion.now, contact.pointOnShape, time);
-      rows.push_back({{first + i, first + j, first + k, first + i},
-                      {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                      normal,
-                      normal.dot(contact.point + rest) - contact.distance});
-    });
-  } catch (...) {
-    rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
-    throw;
-  }
+    const Vector3d sum = sumOf(s, sides, contact.timeOfImpact, at);
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto& [before, now] = at(sides[i], s.vertices[i]);
+      largest = std::max({largest, before.cwiseAbs().maxCoeff(), now.cwiseAbs().maxCoeff()});
+      moved += std::abs(s.weights[i]) * (now - before).cwiseAbs().sum();
+    }
+    checkOffset(contents->step, contents->errorBound, contact.normal.dot(sum) - contact.distance,
+                largest, moved, s.vertices[0]);
+    return normal.dot(sum) - contact.distance;
+  };
+  const auto isEmpty = [](const SolverVertices& side) {
+    return side.before.empty() && side.now.empty();
+  };
+  if (!contacts.shape().empty() && !isEmpty(a) && !isEmpty(b))
+    throw Error(ErrorCode::WrongPositionCount,
+                "appendRows(): both sides have positions, but one of them is a shape, or a body "
+                "whose distance field answered; leave that one empty");
+  const std::size_t sideOfElements = isEmpty(a) ? 1 : 0;  // the other: the shape
+  const auto ofShape = [&](const ShapeContact& contact, const Vector3d& normal) {
+    for (const std::uint32_t vertex : contact.vertices) require(*both[sideOfElements], vertex);
+    return offsetOf(contact, normal, motion);
+  };
+  addRows(contacts, {a.first, b.first}, sideOfElements, rows, of, ofShape);
 }
 
 void forEachEntry(std::span<const ConstraintRow> rows, void (*entry)(void*, int, int, double),

@@ -137,6 +137,7 @@ GeometryTable::Restored GeometryTable::restored(const SavedGeometry& saved,
   step.isNew = saved.isNew;
   step.bodyGiven = saved.bodyGiven;
   step.transformGiven = saved.transformGiven;
+  step.sets = saved.sets;
   if (!saved.freeMotion.empty() && saved.freeMotion.size() != geometry.freeMotionCount())
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(geometry) + ": the number of free motions is wrong", body.id);

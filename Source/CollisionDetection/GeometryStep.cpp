@@ -5,6 +5,7 @@
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
 #include "Mesh/Rotation.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
@@ -22,6 +23,7 @@ static_assert(2.74 * kLargestMeasure < kLargestPlaced);
 void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
   m_isNew = true;
   m_bodyGiven = false;
+  m_sets = {};
   mesh.now.setBody(std::move(body), m_revisions.next());
   mesh.before.setBodyOf(mesh.now);
   if (!m_transformGiven) mesh.before.placeAs(mesh.now);
@@ -216,9 +218,36 @@ void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
     m_bodyGiven = true;
     setBody(mesh, mesh.before, start);
   }
+  const Positions last = mesh.now;
   setBody(mesh, mesh.now, end);
   if (followsNow) mesh.before.setBodyOf(mesh.now);
   if (measures) *moved = motion;
+  noteSet(mesh, last, before.has_value());
+}
+
+/// L: about the longest way of a vertex; of a placed body that of its middle.
+static double motionOf(const Positions& before, const Positions& now) {
+  if (before.isSameAs(now) || before.size() != now.size()) return 0.0;
+  if (!before.isPlaced() && !now.isPlaced()) return largestMotion(motionRange(before, now), {});
+  const auto middle = [](const Positions& end) {
+    const Eigen::AlignedBox3d& box = end.bounds();
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    if (!box.isEmpty()) centre = box.center();
+    return end.isPlaced() ? end.transform()(centre) : centre;
+  };
+  return stableLength(middle(now) - middle(before));
+}
+
+/// Positions now were set, and were `last` before. begins: with those at the step's start.
+void GeometryStep::noteSet(const TriangleMesh& mesh, const Positions& last, bool begins) noexcept {
+  if (begins || m_isNew) {
+    m_sets = {};
+  } else if (m_sets.isSet) {
+    if (m_sets.count == 0) m_sets.begin(motionOf(mesh.before, last));
+    if (m_sets.count > 0) m_sets.add(motionOf(last, mesh.now), motionOf(mesh.before, mesh.now));
+  }
+  m_sets.isSet = true;
+  m_sets.isDetected = false;
 }
 
 void GeometryStep::place(TriangleMesh& mesh, Positions& end, const Pose& transform) noexcept {
@@ -246,12 +275,14 @@ void GeometryStep::setTransform(const GeometryLabel& label, TriangleMesh& mesh, 
     if (followsNow) m_spareBefore->place(shape->analytical, now);
   }
   // Nothing below throws.
+  const Positions last = mesh.now;
   if (before) {
     m_transformGiven = true;
     place(mesh, mesh.before, *before);
   }
   place(mesh, mesh.now, now);
   if (followsNow) mesh.before.placeAs(mesh.now);
+  noteSet(mesh, last, before.has_value());
   if (!shape) return;
   std::swap(shape->now, *m_spare);
   if (before || followsNow) std::swap(shape->before, *m_spareBefore);
@@ -264,7 +295,7 @@ void GeometryStep::restoreNow(TriangleMesh& mesh, PlacedShape* shape,
 }
 
 GeometryStep::State GeometryStep::state(const TriangleMesh& mesh) const {
-  return {mesh.now, mesh.before, m_detected, m_isNew, m_bodyGiven, m_transformGiven};
+  return {mesh.now, mesh.before, m_detected, m_isNew, m_bodyGiven, m_transformGiven, m_sets};
 }
 
 Positions GeometryStep::positionsOf(const GeometryLabel& label, const TriangleMesh& mesh,
@@ -305,6 +336,7 @@ void GeometryStep::restore(TriangleMesh& mesh, PlacedShape* shape, const State& 
   m_isNew = state.isNew;
   m_bodyGiven = state.bodyGiven;
   m_transformGiven = state.transformGiven;
+  m_sets = state.sets;
   if (!shape) return;
   shape->now.place(shape->analytical, mesh.now.transform());  // into its own memory
   shape->before.place(shape->analytical, mesh.before.transform());
@@ -315,6 +347,7 @@ void GeometryStep::advance(TriangleMesh& mesh, PlacedShape* shape) noexcept {
   if (shape && !mesh.before.isSameAs(mesh.now)) shape->before = shape->now;
   mesh.before = mesh.now;
   m_isNew = m_bodyGiven = m_transformGiven = false;
+  m_sets = {};
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <palpate/Types.h>
 
+#include "CollisionDetection/StepSets.h"
 #include "Bodies/Body.h"
 #include "Shapes/PlacedShape.h"
 #include "Mesh/Motion.h"
@@ -75,17 +76,20 @@ class GeometryStep {
   /// A detection has used the end `now`.
   void recordDetection(const TriangleMesh& mesh) noexcept {
     m_detected = mesh.now;
+    m_sets.isDetected = true;
     m_cuts.after = {};
     m_cuts.gone.clear();
   }
   /// The end `now` of the last detection; a solver may have corrected it since.
   const Positions& detected() const { return m_detected; }
   bool isNew() const { return m_isNew; }
+  bool setsAddUp() const { return m_sets.addUp; }  ///< StepSets
 
   /// All on which the next calls depend.
   struct State {
     Positions now, before, detected;
     bool isNew = true, bodyGiven = false, transformGiven = false;
+    StepSets sets{};
   };
   State state(const TriangleMesh&) const;
   /// An end of a saved state: positions in the body's frame, and the pose if it is placed.
@@ -122,11 +126,13 @@ class GeometryStep {
     return {&mesh.now, &mesh.before, &m_detected};
   }
   void place(TriangleMesh&, Positions& end, const Pose&) noexcept;
+  void noteSet(const TriangleMesh&, const Positions& last, bool begins) noexcept;
 
   Positions m_detected;
   CutsSince m_cuts;
   bool m_isNew = true;
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
+  StepSets m_sets;
   Revision::Counter m_revisions;
   /// Three ends, two incoming arrays and the copies of snapshots use them.
   CountedVector<std::unique_ptr<BodyMemory>> m_bodies;

@@ -36,6 +36,7 @@ struct SavedGeometry {
   bool isDetectedBefore = false;               ///< else: they are those before
   std::vector<Eigen::Vector3d> detected{};     ///< with isDetectedOther
   bool isNew = false, bodyGiven = false, transformGiven = false;
+  StepSets sets{};
   std::vector<double> freeMotion{};
 };
 

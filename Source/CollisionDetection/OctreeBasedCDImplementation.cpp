@@ -274,6 +274,8 @@ void OctreeBasedCD::Implementation::commit(std::span<PairRecord* const> records)
   for (PairRecord* record : records) {
     if (record->isUnfinished) continue;
     record->commit();
+    CollisionData::Contents::of(record->data).validity.advanceMayBeMissing =
+        record->a->step.setsAddUp() || record->b->step.setsAddUp();
     reviewLists(*record);
     record->workedPairs = record->searchedCandidates + record->statistics.featurePairs;
   }

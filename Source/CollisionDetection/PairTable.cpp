@@ -191,11 +191,23 @@ void PairRecord::commit() noexcept {
   PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
                  sizeOf(CollisionData::Contents::of(next)));
   std::swap(data, next);
+  CollisionData::Contents& contents = CollisionData::Contents::of(data);
+  contents.step.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
+  linkData();
   if (tracker) tracker->hold(CollisionData::Contents::of(next));
   hasData = true;
   dataTopologies = topologies();
   if (sides) sides->commit();
   dataVersion.commit(state());
+}
+
+void PairRecord::linkData() noexcept {
+  using Contents = CollisionData::Contents;
+  if (!Contents::isIn(data)) return;
+  Contents& contents = Contents::of(data);
+  contents.step.record = this;
+  contents.step.radii = a->body.mesh.largestRadius + b->body.mesh.largestRadius;
+  contents.step.timeTolerance = pair.settings.continuous.timeTolerance;
 }
 
 void PairRecord::keepLastAnswer(std::uint64_t step) {
@@ -220,10 +232,21 @@ void PairRecord::keepLastAnswer(std::uint64_t step) {
   dataVersion.invalidate();
 }
 
+void PairRecord::releaseBurst() {
+  next = {};
+  if (!keeps && !gathers) kept.releaseMemory();
+  fieldScratch.reset();
+  releaseResults();
+}
+
 void PairRecord::releaseMemory() {
   next = {};
   kept.releaseMemory();
   fieldScratch.reset();
+  releaseResults();
+}
+
+void PairRecord::releaseResults() {
   CollisionData::Contents& contents = CollisionData::Contents::of(data);
   forEachTimed(contents, [](auto& list) { releaseSpare(list); });
   if (tracker) tracker->releaseMemory(contents);
@@ -232,21 +255,10 @@ void PairRecord::releaseMemory() {
   releaseSpare(contents.intersectingTriangles);
 }
 
-void PairRecord::releaseBurst() {
-  next = {};
-  if (!keeps && !gathers) kept.releaseMemory();
-  fieldScratch.reset();
-  releaseResults();
-}
-
 void PairRecord::commitEmpty() noexcept {
   commit();
   trust.forget();
 }
-  releaseResults();
-}
-
-void PairRecord::releaseResults() {
 
 void PairRecord::takeOver(PairRecord& former) noexcept {
   PALPATE_ASSERT(a == former.a && b == former.b);

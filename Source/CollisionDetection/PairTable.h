@@ -106,6 +106,8 @@ struct PairRecord : CountedObject {
   void followSides();
   /// Makes `next` the pair's result.
   void commit() noexcept;
+  /// For rows: the contents of `data` are those of this pair.
+  void linkData() noexcept;
   /// The detection in the step with this number did not finish the pair: its result becomes that of
   /// an earlier detection, or empty if there is none for the topologies now.
   void keepLastAnswer(std::uint64_t step);
@@ -113,9 +115,9 @@ struct PairRecord : CountedObject {
   void commitEmpty() noexcept;
 
   void releaseMemory();  ///< keeps the result
+  void releaseBurst();   ///< the same, but for lists that detections use
 
   /// What `former` has derived and holds for this pair, too. Both are of the same geometries.
-  void releaseBurst();   ///< the same, but for lists that detections use
   void takeOver(PairRecord& former) noexcept;
 
   /// Whether the pair is answered by element pairs of two octrees. Auto's always is, for those who
@@ -137,10 +139,10 @@ struct PairRecord : CountedObject {
     return !plan.swept() && (a->body.tree.isSwept() || b->body.tree.isSwept());
   }
 
-  /// The pair whose filters apply: that which a StepGuard guards, or whose crossings are found.
-  /// Null: a pair of the table.
   void releaseResults();  ///< what the result does not need
 
+  /// The pair whose filters apply: that which a StepGuard guards, or whose crossings are found.
+  /// Null: a pair of the table.
   const PairRecord* guarded = nullptr;
   std::size_t index = 0;  ///< in the table
   Revision settingsRevision;

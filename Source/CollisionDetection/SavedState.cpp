@@ -36,6 +36,13 @@ void poseOf(File& file, Pose& pose) {
 }
 
 template <class File>
+void describeSets(File& file, StepSets& sets) {
+  for (double* value : {&sets.first, &sets.whole}) file.real(*value);
+  file.integer(sets.count);
+  for (bool* flag : {&sets.isSet, &sets.isDetected, &sets.addUp}) fieldOf(file, *flag);
+}
+
+template <class File>
 void describeGeometry(File& file, SavedGeometry& geometry) {
   CollisionProblem::Geometry& problem = geometry.problem;
   meshLines(file, problem, kVersion);
@@ -49,6 +56,7 @@ void describeGeometry(File& file, SavedGeometry& geometry) {
   for (bool* flag : {&geometry.isDetectedOther, &geometry.isDetectedBefore, &geometry.isNew,
                      &geometry.bodyGiven, &geometry.transformGiven})
     fieldOf(file, *flag);
+  describeSets(file, geometry.sets);
   itemsOf(file, geometry.detected, sizeof(Eigen::Vector3d),
           [&](Eigen::Vector3d& p) { fieldOf(file, p); });
   itemsOf(file, geometry.freeMotion, sizeof(double), [&](double& value) { file.real(value); });
@@ -121,8 +129,8 @@ void describeContact(File& file, Crossing& c) {
 
 template <class File>
 void describeValidity(File& file, Validity& validity) {
-  for (bool* flag :
-       {&validity.trusted, &validity.startedApart, &validity.sideMayBeWrong, &validity.unwelded})
+  for (bool* flag : {&validity.trusted, &validity.startedApart, &validity.sideMayBeWrong,
+                     &validity.unwelded, &validity.advanceMayBeMissing})
     fieldOf(file, *flag);
   file.word(validity.method, kMethods);
   enumeratorOf(file, validity.reason, MethodReason::OutOfTime);
@@ -219,6 +227,7 @@ void describeContents(File& file, Contents& c) {
   lists(34, t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended);
   lists(29, c.crossings, c.rememberedSides);
   fieldOf(file, t.elementsOfSecond);
+  fieldOf(file, c.step.elementsOfSecond);
   for (auto& list : c.tags)
     itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
   auto& s = c.smooth;
@@ -249,6 +258,7 @@ void describePair(File& file, PairRecord& record, const PairStates& states) {
   if (hasContents) {
     Contents& contents = Contents::of(record.data);
     describeContents(file, contents);
+    if constexpr (File::kReads) record.linkData();
     if constexpr (File::kReads)
       if (record.dataTopologies == record.topologies()) checkIds(file, contents, states);
   }
@@ -289,6 +299,7 @@ void describeUnfinished(File& file, FrameStatistics& statistics) {
     for (GeometryId* id : {&pair.a, &pair.b}) file.integer(*id);
     file.real(pair.distanceBound);
     file.integer(pair.age);
+    fieldOf(file, pair.exceedsBudget);
   });
 }
 
@@ -299,7 +310,6 @@ SavedRevisions revisionsOf(const Geometry& geometry) {
           {},
           topology.vertexCount,
           topology.elements.size()};
-    fieldOf(file, pair.exceedsBudget);
 }
 
 /// Of a geometry that restore() will change so.
@@ -348,6 +358,7 @@ SavedGeometry savedOf(const Geometry& geometry) {
   saved.isNew = step.isNew;
   saved.bodyGiven = step.bodyGiven;
   saved.transformGiven = step.transformGiven;
+  saved.sets = step.sets;
   saved.freeMotion.assign(geometry.freeMotion.begin(), geometry.freeMotion.end());
   return saved;
 }

@@ -324,6 +324,10 @@ constexpr double kSmallestSlowSquare = 0x1p-900;
 /// roundings, so that faces in opposite directions cancel.
 constexpr double kOpposedNormals = 0x1p-40;
 
+/// Relative to the largest coordinate: by how much positions that a caller passes for a contact may
+/// be off those of the step. Some roundings to float, as callers may keep floats.
+constexpr double kRowPositions = 0x1p-20;
+
 // ---- Surface proxies (DistanceField) ----
 
 /// Relative: more than all roundings of a distance, a height or a bound along the way of a proof,

@@ -12,6 +12,8 @@
 
 namespace palpate {
 
+struct PairRecord;
+
 /// What a CollisionData holds.
 struct CollisionData::Contents : CountedObject {
   CountedVector<VertexTriangleContact> vertexTriangle, triangleVertex;
@@ -37,7 +39,20 @@ struct CollisionData::Contents : CountedObject {
     CountedVector<Eigen::Vector3d> vertexTriangle, triangleVertex, edgeEdge, shape;
   } smooth{};
   CountedVector<Crossing> rememberedSides{};
+  /// What CollisionData::appendRows() needs beside the contacts.
+  struct Step {
+    const PairRecord* record = nullptr;  ///< whose answer this is; null: a copy, or Parts
+    bool elementsOfSecond = false;       ///< shape() has elements of the pair's second geometry
+    /// L: the largest sum of the radii at a contact. Infinity: it is not known.
+    double radii = std::numeric_limits<double>::infinity();
+    double timeTolerance = 0.0;
+    /// Of a copy: the offset of each row, if the step was not over.
+    bool hasOffsets = false;
+    CountedVector<double> offsets{};
+  } step{};
 
+  /// Null if `data` has none.
+  static const Contents* in(const CollisionData& data) { return data.m_contents.get(); }
   static bool isIn(const CollisionData& data) { return data.m_contents != nullptr; }
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {

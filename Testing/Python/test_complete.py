@@ -30,6 +30,7 @@ FUNCTIONS = {
     "appendMotions": "CollisionData.motions()",
 }
 METHODS = {
+    "CollisionData.appendRows": "CollisionData.constraint_rows() and rows() without a and b",
     "CollisionData.parts": "the properties of CollisionData",
     "CollisionData.tagsOf": "rows of CollisionData.tags()",
     "Executor.run": "a Python executor would run all tasks under the GIL",

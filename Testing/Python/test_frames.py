@@ -57,6 +57,24 @@ def test_rows_give_the_gaps():
     assert wide.jacobian.shape[1] == 15000
 
 
+def test_rows_without_arrays_take_the_positions_of_the_step():
+    scene = Balls()
+    data = scene.step(30)
+    first = len(scene.positions)
+    given = data.constraint_rows(scene.positions, scene.collisions.positions(scene.b))
+    assert np.array_equal(data.constraint_rows(first_b=first), given)
+    rows = data.rows(first_b=first, vertex_count=5000)
+    assert np.array_equal(rows.offsets, given["offset"])
+    assert rows.jacobian.shape == (len(given), 15000)
+    assert data.rows(first_b=first).jacobian.shape[1] == 3 * (given["vertices"].max() + 1)
+    scene.step(31)
+    assert np.array_equal(data.constraint_rows(first_b=first), given)  # it is a copy
+    with pytest.raises(palpate.Error, match="not known"):
+        pickle.loads(pickle.dumps(data)).constraint_rows()
+    with pytest.raises(palpate.Error, match="not those of the detected step"):
+        data.constraint_rows(scene.positions + 1.0, scene.positions)
+
+
 def test_rows_of_a_moving_shape():
     collisions = palpate.OctreeBasedCD()
     mesh = collisions.add_triangle_mesh(TETRAHEDRON, [[0, 1, 2]])

@@ -151,7 +151,8 @@ palpate_status palpate_get_validity(const palpate_cd* cd, palpate_id a, palpate_
                  .outside_band = indices(v.outsideBand),
                  .near_threshold = indices(v.nearThreshold),
                  .unreliable_sign = indices(v.unreliableSign),
-                 .age = v.age};
+                 .age = v.age,
+                 .advance_may_be_missing = v.advanceMayBeMissing};
   });
 }
 palpate_status palpate_get_earliest_time(const palpate_cd* cd, palpate_id a, palpate_id b,
@@ -309,6 +310,16 @@ palpate_status palpate_get_rows(const palpate_cd* cd, palpate_id a, palpate_id b
     std::vector<ConstraintRow> all;
     appendRows(dataOf(cd, a, b), verticesOf(side_a, "side_a"), verticesOf(side_b, "side_b"), all,
                body ? motionOf(body, "body") : RigidMotion{});
+    list.fill(all);
+  });
+}
+palpate_status palpate_get_step_rows(const palpate_cd* cd, palpate_id a, palpate_id b,
+                                     uint32_t first_of_a, uint32_t first_of_b, palpate_row* rows,
+                                     size_t capacity, size_t* count) {
+  return guarded(__func__, [&] {
+    const List<palpate_row> list(rows, capacity, count, "rows");
+    std::vector<ConstraintRow> all;
+    dataOf(cd, a, b).appendRows(all, first_of_a, first_of_b);
     list.fill(all);
   });
 }

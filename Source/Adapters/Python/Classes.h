@@ -203,6 +203,7 @@ inline constexpr auto kFields<Validity> = std::tuple(
     field("arc_deviation", &Validity::arcDeviation),
     field("effective_thickness", &Validity::effectiveThickness),
     field("proxy_depth", &Validity::proxyDepth), field("age", &Validity::age),
+    field("advance_may_be_missing", &Validity::advanceMayBeMissing),
     field("untrusted_vertices_a", &Validity::untrustedVerticesA),
     field("untrusted_vertices_b", &Validity::untrustedVerticesB),
     field("degenerate_triangles_a", &Validity::degenerateTrianglesA),

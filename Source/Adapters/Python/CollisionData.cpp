@@ -107,20 +107,35 @@ struct TwoSides {
       : a(first, 0), b(second, first.is(second) ? 0 : a.end()) {}
 };
 
-std::vector<ConstraintRow> rowsOf(const CollisionData& data, const TwoSides& sides,
-                                  const py::object& motion) {
+/// Rows, and one more than the last vertex of the solver that is known.
+struct NumberedRows {
   std::vector<ConstraintRow> rows;
-  appendRows(data, sides.a.vertices, sides.b.vertices, rows, motionOf(motion));
-  return rows;
+  std::size_t vertexCount = 0;
+};
+
+/// Without a and b: those of the positions of the step.
+NumberedRows rowsOf(const CollisionData& data, const py::object& a, const py::object& b,
+                    const py::object& motion, const py::object& firstA, const py::object& firstB) {
+  NumberedRows result;
+  if (a.is_none() && b.is_none() && motion.is_none()) {
+    data.appendRows(result.rows, elementIndex(firstA, "first_a"), elementIndex(firstB, "first_b"));
+    for (const ConstraintRow& row : result.rows)
+      for (const std::uint32_t vertex : row.vertices)
+        result.vertexCount = std::max(result.vertexCount, std::size_t{vertex} + 1);
+  } else {
+    const TwoSides sides(a, b);
+    result.vertexCount = std::max(sides.a.end(), sides.b.end());
+    appendRows(data, sides.a.vertices, sides.b.vertices, result.rows, motionOf(motion));
+  }
+  return result;
 }
 
 py::object sparseRows(const CollisionData& data, const py::object& a, const py::object& b,
-                      const py::object& motion, const py::object& vertexCount) {
-  const TwoSides sides(a, b);
-  const std::vector<ConstraintRow> rows = rowsOf(data, sides, motion);
+                      const py::object& motion, const py::object& vertexCount,
+                      const py::object& firstA, const py::object& firstB) {
+  const auto [rows, known] = rowsOf(data, a, b, motion, firstA, firstB);
   const std::size_t columns =
-      3 * (vertexCount.is_none() ? std::max(sides.a.end(), sides.b.end())
-                                 : std::size_t{elementIndex(vertexCount, "vertex_count")});
+      3 * (vertexCount.is_none() ? known : std::size_t{elementIndex(vertexCount, "vertex_count")});
   struct Entries {
     std::vector<std::uint32_t> rows, columns;
     std::vector<double> values;
@@ -319,21 +334,27 @@ weight 1; those of an edge-edge contact are p0, p1, q0, q1. first_a, first_b: ad
 the first and the second geometry, such as the number of its first vertex in a solver.)")
       .def("rows", &sparseRows, py::arg("a") = py::none(), py::arg("b") = py::none(),
            py::arg("motion") = py::none(), py::arg("vertex_count") = py::none(),
-           R"(rows(a=None, b=None, motion=None, vertex_count=None) -> Rows
+           py::arg("first_a") = 0, py::arg("first_b") = 0,
+           R"(rows(a=None, b=None, motion=None, vertex_count=None, first_a=0, first_b=0) -> Rows
 
 A SciPy sparse Jacobian (n, 3 m) and offsets (n,): with stacked positions x of the solver, the gaps
-are jacobian @ x - offsets, in L. Needs SciPy.
+are jacobian @ x - offsets, in L. Needs SciPy. Without a, b and motion the positions are those of
+the detected step; pickled data has none.
 
-a, b          SolverVertices of the two geometries; or positions (n, 3) at rest, those of b after
-              those of a; None for a shape
-motion        RigidMotion of the pair's shape
-vertex_count  m; None: as many as a and b have)")
+a, b              SolverVertices of the two geometries; or positions (n, 3) at rest, those of b
+                  after those of a; None for a shape
+motion            RigidMotion of the pair's shape
+vertex_count      m; None: as many as a and b have, or as the rows name
+first_a, first_b  without a and b: the solver's numbers of the first vertices)")
       .def(
           "constraint_rows",
           [](const CollisionData& self, const py::object& a, const py::object& b,
-             const py::object& motion) { return recordsOf(rowsOf(self, TwoSides(a, b), motion)); },
+             const py::object& motion, const py::object& firstA, const py::object& firstB) {
+            return recordsOf(rowsOf(self, a, b, motion, firstA, firstB).rows);
+          },
           py::arg("a") = py::none(), py::arg("b") = py::none(), py::arg("motion") = py::none(),
-          R"(constraint_rows(a=None, b=None, motion=None) -> numpy.ndarray
+          py::arg("first_a") = 0, py::arg("first_b") = 0,
+          R"(constraint_rows(a=None, b=None, motion=None, first_a=0, first_b=0) -> numpy.ndarray
 
 The rows of rows() as records: vertices (4,), weights (4,), normal (3,), offset.)")
       .def("motions", &motions, py::arg("a"), py::arg("b"),

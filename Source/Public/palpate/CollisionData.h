@@ -13,8 +13,11 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
 namespace palpate {
+
+struct ConstraintRow;
 
 // Contacts of every method satisfy one law. With the positions at timeOfImpact, the sum of the
 // positions of stencil() times their weights is (distance + radii) * normal, with the radii at the
@@ -206,6 +209,15 @@ class PALPATE_EXPORT CollisionData {
   /// step began. Each names the features that were nearest then; its time is 0.
   /// Order    by kind, ids.
   std::span<const Crossing> rememberedSides() const;
+
+  /// Appends the rows of palpate::appendRows() (<palpate/ConstraintRows.h>) with the positions and
+  /// poses of the detected step, which Palpate has. Call it before the step changes: before
+  /// advance(), and before `before` or a topology is set. A copy made until then keeps its rows.
+  /// firstOfA, firstOfB: the solver's numbers of vertex 0 of both geometries; of a shape any.
+  /// Errors   InvalidCall if the step is over, and NotAvailable for contacts of Parts. No row is
+  ///          added then.
+  void appendRows(std::vector<ConstraintRow>& rows, std::uint32_t firstOfA = 0,
+                  std::uint32_t firstOfB = 0) const;
 
   /// Of all contacts in their order, without validity(), tracking, tags and smooth normals: the
   /// same bits on every machine.

@@ -36,7 +36,8 @@ struct ConstraintRow {
   Eigen::Vector3d normal;         ///< unit
   double offset;                  ///< L
 
-  PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;  ///< L
+  /// L. Throws WrongPositionCount if there are fewer positions than the row names.
+  PALPATE_EXPORT double gap(std::span<const Eigen::Vector3d> positions) const;
 };
 
 /// One geometry's vertices in the detected step. Leave it empty for a shape or a field's body.
@@ -46,11 +47,15 @@ struct SolverVertices {
 };
 
 /// Appends a row for each contact of (a, b), linearised at its timeOfImpact, in linear time.
+/// CollisionData::appendRows() does it with the positions that the OctreeBasedCD has.
 /// body     the motion of the pair's shape or field's body, which turns by less than 90 degrees in
 ///          the step. By default the shape rests from timeOfImpact on.
 /// Order    vertexTriangle(), triangleVertex(), edgeEdge(), shape(). shapeShape() has no rows.
 /// Errors   WrongPositionCount for the first contact with a vertex without position, and if both
-///          sides have positions but shape() has contacts. No row is added then.
+///          sides have positions but shape() has contacts. InvalidCall if the positions are not
+///          those of the step: a contact with vertices on both sides then breaks its law by more
+///          than 2^-20 of the coordinates. Contacts of Parts may have radii of any length. No row
+///          is added then.
 PALPATE_EXPORT void appendRows(const CollisionData& contacts, const SolverVertices& a,
                                const SolverVertices& b, std::vector<ConstraintRow>& rows,
                                const RigidMotion& body = {});

@@ -28,7 +28,7 @@ enum class ErrorCode {
   InvalidShape,      ///< A shape has an invalid measure, direction or number of points.
   InvalidTransform,  ///< No rotation, or a translation that is beyond kLargestMeasure.
   SharedFace,        ///< A face belongs to more than two tetrahedra.
-  InvalidCall,       ///< The object was moved from, is outdated, or is at work on another call.
+  InvalidCall,       ///< An object was moved from, is outdated, or at work; positions of no step.
   ImpactRemains,     ///< Features touch within a step, and StepGuard cannot shorten their steps.
   MemoryLimit,       ///< The answer needs more memory than the limit that you set.
   Cancelled,         ///< A progress callback returned false.

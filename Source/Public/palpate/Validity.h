@@ -79,6 +79,11 @@ struct Validity {
   /// time. Above 0 `reason` is OutOfTime, and the answer is not trusted.
   std::uint32_t age = 0;
 
+  /// A geometry of the pair was set again in this step, and the motions added up: twice without a
+  /// detection between, or four times. A call of advance() may be missing. The answer is that of
+  /// the whole motion since the last one.
+  bool advanceMayBeMissing = false;
+
   /// Vertices that make the answer untrusted, ascending. By Proximity and Intersection: the first
   /// kMaxFastVertices of each geometry with a relative motion above `displacementLimit`; by
   /// Proximity also those that may have touched within the step. Else, and with shapes: none.

@@ -458,6 +458,7 @@ typedef struct palpate_validity {
   palpate_indices degenerate_triangles_a, degenerate_triangles_b;
   palpate_indices outside_band, near_threshold, unreliable_sign;
   uint32_t age;  ///< in detections
+  uint8_t advance_may_be_missing;
 } palpate_validity;
 
 /// Set the size of `contacts` first. (a, b) is in the order of palpate_add_pair().
@@ -611,8 +612,8 @@ typedef struct palpate_unfinished_pair {
   palpate_id a, b;
   double distance_bound;  ///< L
   uint32_t age;           ///< in detections
-} palpate_unfinished_pair;
   uint8_t exceeds_budget;
+} palpate_unfinished_pair;
 
 typedef struct palpate_pair_statistics {
   size_t size;
@@ -667,6 +668,11 @@ PALPATE_EXPORT palpate_status palpate_get_rows(const palpate_cd* cd, palpate_id 
                                                const palpate_side* side_b,
                                                const palpate_motion* body, palpate_row* rows,
                                                size_t capacity, size_t* count);
+/// The same list with the positions of the step: CollisionData::appendRows().
+PALPATE_EXPORT palpate_status palpate_get_step_rows(const palpate_cd* cd, palpate_id a,
+                                                    palpate_id b, uint32_t first_of_a,
+                                                    uint32_t first_of_b, palpate_row* rows,
+                                                    size_t capacity, size_t* count);
 /// A list in the order of the rows, or one item for two shapes in contact.
 PALPATE_EXPORT palpate_status palpate_get_motions(const palpate_cd* cd, palpate_id a, palpate_id b,
                                                   const palpate_side* side_a,

@@ -2,6 +2,7 @@
 #include "Common/WholeScene.h"
 #include "Unit/C/Numbers.h"
 
+#include <palpate/Capture.h>
 #include <palpate/Meshes.h>
 #include <palpate/Snapshot.h>
 #include <palpate/ThreadTopology.h>
@@ -193,12 +194,13 @@ TEST_F(CScene, ContactsValidityAndStatisticsAreThoseOfCpp) {
       const auto same = [](const palpate_indices& list, const std::vector<std::uint32_t>& of) {
         return std::vector<std::uint32_t>(list.data, list.data + list.count) == of;
       };
-      EXPECT_EQ(listOf(w.trusted, w.started_apart, w.side_may_be_wrong, w.unwelded, w.method,
-                       w.reason, w.at_end, w.at_impact, w.displacement, w.displacement_limit,
-                       w.arc_deviation, w.effective_thickness, w.proxy_depth),
-                listOf(v.trusted, v.startedApart, v.sideMayBeWrong, v.unwelded, v.method, v.reason,
-                       v.atEnd, v.atImpact, v.displacement, v.displacementLimit, v.arcDeviation,
-                       v.effectiveThickness, v.proxyDepth));
+      EXPECT_EQ(
+          listOf(w.trusted, w.started_apart, w.side_may_be_wrong, w.unwelded, w.method, w.reason,
+                 w.at_end, w.at_impact, w.displacement, w.displacement_limit, w.arc_deviation,
+                 w.effective_thickness, w.proxy_depth, w.age, w.advance_may_be_missing),
+          listOf(v.trusted, v.startedApart, v.sideMayBeWrong, v.unwelded, v.method, v.reason,
+                 v.atEnd, v.atImpact, v.displacement, v.displacementLimit, v.arcDeviation,
+                 v.effectiveThickness, v.proxyDepth, v.age, v.advanceMayBeMissing));
       EXPECT_TRUE(same(w.untrusted_vertices_a, v.untrustedVerticesA) &&
                   same(w.untrusted_vertices_b, v.untrustedVerticesB) &&
                   same(w.degenerate_triangles_a, v.degenerateTrianglesA) &&
@@ -295,12 +297,14 @@ TEST_F(CScene, RowsAndMotionsAreThoseOfCpp) {
   advance();
   step(1, -0.1);
   std::size_t rowCount = 0, motionCount = 0;
+  const CollisionProblem problem = cpp().problem();
   const auto side = [&](palpate_id id, palpate_side& c, std::vector<Vector3d>& before) {
     EXPECT_OK(palpate_init_side(&c, sizeof c));
     ContactSide s;
     const auto now = cpp().positions(GeometryId{id});
     before.assign(now.begin(), now.end());
-    for (Vector3d& p : before) p[2] += 0.1;
+    for (const CollisionProblem::Geometry& geometry : problem.geometries)
+      if (geometry.id == GeometryId{id} && !geometry.before.empty()) before = geometry.before;
     if (id == tool || id == hull || id == field || id == bone) {
       s.motion = {{}, cpp().transform(GeometryId{id})};
     } else {
@@ -325,6 +329,13 @@ TEST_F(CScene, RowsAndMotionsAreThoseOfCpp) {
     const auto cRows = listFrom<palpate_row>(
         [&](auto... list) { return palpate_get_rows(m_cd, a, b, &cA, &cB, &cB.motion, list...); });
     expectSame<palpate_row, ConstraintRow>(cRows, rows);
+    rows.clear();
+    cpp().collisionData(pair.a, pair.b).appendRows(rows, a * 1000, b * 1000);
+    const auto stepRows = listFrom<palpate_row>([&](auto... list) {
+      return palpate_get_step_rows(m_cd, a, b, a * 1000, b * 1000, list...);
+    });
+    expectSame<palpate_row, ConstraintRow>(stepRows, rows);
+    EXPECT_EQ(stepRows.size(), cRows.size());
     std::vector<ContactMotion> motions;
     appendMotions(cpp().collisionData(pair.a, pair.b), sideA, sideB, motions);
     const auto cMotions = listFrom<palpate_contact_motion>(

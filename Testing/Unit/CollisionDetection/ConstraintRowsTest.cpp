@@ -7,7 +7,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/SparseCore>
 
+#include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 
 namespace palpate::testing {
 namespace {
@@ -253,6 +256,183 @@ TEST(ConstraintRows, TooFewPositionsThrowAnErrorThatNamesTheVertex) {
   appendRows(beside, {0, high, high}, {}, rows);
   ASSERT_EQ(rows.size(), 3u);
   EXPECT_NEAR(rows[0].gap(high), 0.1, 1e-15);
+}
+
+std::vector<double> numbersOf(std::span<const ConstraintRow> rows) {
+  std::vector<double> numbers;
+  for (const ConstraintRow& row : rows) {
+    numbers.insert(numbers.end(), row.vertices.begin(), row.vertices.end());
+    numbers.insert(numbers.end(), row.weights.begin(), row.weights.end());
+    numbers.insert(numbers.end(), row.normal.begin(), row.normal.end());
+    numbers.push_back(row.offset);
+  }
+  return numbers;
+}
+
+/// The rows with Palpate's own positions have the bits of those with the caller's, for every type
+/// of geometry and method, and so have those of a copy, whatever happens after it.
+TEST(ConstraintRows, WithoutArraysTakeThePositionsOfTheStep) {
+  Random random(77);
+  const TestGeometry sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     triangles = testGeometry(soup(random, 60, 0.1)),
+                     line = thread(random, 60, 0.1, 0.01, false),
+                     points = particles(random, 60, 0.02);
+  const Pairs pairs{{&sheets, &triangles}, {&triangles, &sheets}, {&triangles, &triangles},
+                    {&sheets, &line},      {&line, &line},        {&line, &points},
+                    {&points, &triangles}};
+  std::size_t rows = 0, impacts = 0;
+  for (const auto& [a, b] : pairs)
+    for (const Method method : {Method::Auto, Method::Proximity, Method::Continuous}) {
+      OctreeBasedCD collisions;
+      const GeometryId first = a->addTo(collisions), second = a == b ? first : b->addTo(collisions);
+      PairSettings pair{method, 0.05, Contacts::All};
+      pair.smoothNormals = method == Method::Proximity && a == &sheets && b == &triangles;
+      collisions.addCollisionPair(first, second, pair);
+      collisions.advance();
+      const auto moved = [&](Positions positions) {
+        for (Vector3d& p : positions) p += randomPoint(random, -0.05, 0.05);
+        return positions;
+      };
+      const Positions nowA = moved(a->positions), nowB = a == b ? nowA : moved(b->positions);
+      collisions.setPositions(first, nowA);
+      collisions.setPositions(second, nowB);
+      collisions.detectCollision();
+      const CollisionData& data = collisions.collisionData(first, second);
+      for (const auto& contact : data.edgeEdge()) impacts += contact.timeOfImpact < 1.0;
+      std::vector<ConstraintRow> given, own, copied, later;
+      appendRows(data, {10, a->positions, nowA}, {a == b ? 10u : 1000u, b->positions, nowB}, given);
+      data.appendRows(own, 10, a == b ? 10 : 1000);
+      const CollisionData copy = data;
+      collisions.setPositions(first, moved(nowA));  // a correction: the step is the same
+      data.appendRows(later, 10, a == b ? 10 : 1000);
+      EXPECT_EQ(numbersOf(later), numbersOf(given));
+      collisions.advance();
+      expectRefused(
+          ErrorCode::InvalidCall, "is over", [&] { data.appendRows(later); }, first);
+      EXPECT_EQ(numbersOf(later), numbersOf(given));
+      const CollisionData tooLate = data;
+      expectRefused(ErrorCode::NotAvailable, "not known", [&] { tooLate.appendRows(later); });
+      expectRefused(ErrorCode::NotAvailable, "not known",
+                    [&] { CollisionData(data.parts()).appendRows(later); });
+      const CollisionData copyOfCopy = copy;
+      copyOfCopy.appendRows(copied, 10, a == b ? 10 : 1000);
+      EXPECT_EQ(numbersOf(own), numbersOf(given));
+      EXPECT_EQ(numbersOf(copied), numbersOf(given));
+      rows += given.size();
+    }
+  EXPECT_GT(rows, 500u);
+  EXPECT_GT(impacts, 20u);
+}
+
+/// With shapes and placed meshes the poses are those of the step, in either order.
+TEST(ConstraintRows, WithoutArraysTakeThePosesOfTheStep) {
+  Random random(78);
+  const TestGeometry points = particles(random, 200, 0.02);
+  const auto turned = [](double angle) {
+    return Eigen::AngleAxisd(angle, Vector3d(0.6, 0, 0.8)).toRotationMatrix();
+  };
+  const Pose before{turned(0.1), {0.1, 0, 0}}, now{turned(0.3), {0.15, 0.02, 0}};
+  const std::vector<AnalyticalGeometry> shapes{Sphere{{0.5, 0.5, 0.5}, 0.25},
+                                               Capsule{{0.3, 0.4, 0.5}, {0.7, 0.5, 0.6}, 0.2}};
+  for (const AnalyticalGeometry& shape : shapes)
+    for (const bool shapeFirst : {false, true}) {
+      OctreeBasedCD collisions;
+      const GeometryId mesh = points.addTo(collisions),
+                       tool = collisions.addAnalyticalGeometry(shape);
+      const GeometryId a = shapeFirst ? tool : mesh, b = shapeFirst ? mesh : tool;
+      collisions.addCollisionPair(a, b, {.thickness = 0.02});
+      collisions.setTransform(tool, before, now);
+      collisions.detectCollision();
+      const CollisionData& data = collisions.collisionData(a, b);
+      const SolverVertices vertices{5, points.positions, points.positions};
+      std::vector<ConstraintRow> given, own;
+      appendRows(data, shapeFirst ? SolverVertices{} : vertices,
+                 shapeFirst ? vertices : SolverVertices{}, given, {before, now});
+      data.appendRows(own, shapeFirst ? 77 : 5, shapeFirst ? 5 : 77);
+      EXPECT_EQ(numbersOf(own), numbersOf(given));
+      EXPECT_GT(own.size(), 3u);
+    }
+}
+
+/// Positions that are not those of the step are refused where a row would be wrong: both ends the
+/// same, exchanged ends or sides, other positions. Those of the step pass, also as floats.
+TEST(ConstraintRows, RefusePositionsOfAnotherStep) {
+  Random random(79);
+  std::size_t refused = 0, wrong = 0, right = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double size = std::exp2(uniform(random, -20, 20)),
+                 radius = i % 2 == 0 ? 0.0 : 0.05 * size;
+    const auto scaled = [&](Positions all) {
+      for (Vector3d& p : all)
+        for (double& x : p) x = static_cast<float>(size * x);
+      return all;
+    };
+    const Positions ground = scaled({{-9, -9, 0}, {9, -9, 0}, {0, 15, 0}});
+    Positions ends[2];
+    for (int end : {0, 1})
+      ends[end] = scaled({{uniform(random, -1, 1), uniform(random, -1, 1),
+                           end == 0 ? uniform(random, 0.3, 1) : uniform(random, -1, -0.1)}});
+    OctreeBasedCD collisions;
+    const GeometryId organ = collisions.addTriangleMesh(ground, std::vector<Triangle>{{0, 1, 2}}),
+                     drop = collisions.addPointSet(ends[0], radius);
+    collisions.addCollisionPair(organ, drop, {.thickness = 0.1 * size});
+    collisions.advance();
+    collisions.setPositions(drop, ends[1]);
+    collisions.detectCollision();
+    const CollisionData& data = collisions.collisionData(organ, drop);
+    ASSERT_EQ(data.triangleVertex().size(), 1u);
+    const double time = data.triangleVertex()[0].timeOfImpact;
+    ASSERT_LT(time, 1.0);
+    const auto offsetWith = [&](const Positions& before,
+                                const Positions& now) -> std::optional<double> {
+      std::vector<ConstraintRow> rows;
+      try {
+        appendRows(data, {0, ground, ground}, {3, before, now}, rows);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::InvalidCall);
+        EXPECT_TRUE(rows.empty());
+        return {};
+      }
+      return rows.at(0).offset;
+    };
+    const auto truth = offsetWith(ends[0], ends[1]);
+    ASSERT_TRUE(truth);
+    EXPECT_NEAR(*truth, radius, 1e-5 * size);
+    ++right;
+    const Positions other = scaled({{0.1, 0.2, uniform(random, -2, 2)}});
+    for (const auto& [before, now] :
+         {std::pair(ends[1], ends[1]), std::pair(ends[0], ends[0]), std::pair(ends[1], ends[0]),
+          std::pair(ends[0], other), std::pair(other, ends[1])}) {
+      const auto offset = offsetWith(before, now);
+      refused += !offset;
+      // What passes is a sum of radii that the pair may have.
+      if (!offset) continue;
+      EXPECT_GT(*offset, -1e-4 * size);
+      EXPECT_LT(*offset, radius + 1e-4 * size);
+      ++wrong;
+    }
+  }
+  EXPECT_EQ(right, 200u);
+  EXPECT_GT(refused, 800u);
+  EXPECT_LT(wrong, 200u);
+}
+
+TEST(ConstraintRows, GapNeedsAPositionForEachVertex) {
+  const Positions ground{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, tip{{1, 1, 0.05}};
+  OctreeBasedCD collisions;
+  const GeometryId a = collisions.addPointSet(tip),
+                   b = collisions.addTriangleMesh(ground, std::vector<Triangle>{{0, 1, 2}});
+  collisions.addCollisionPair(a, b, {.thickness = 0.1});
+  collisions.detectCollision();
+  std::vector<ConstraintRow> rows;
+  collisions.collisionData(a, b).appendRows(rows, 3, 0);
+  ASSERT_EQ(rows.size(), 1u);
+  const Positions all = joined(ground, tip);
+  EXPECT_NEAR(rows[0].gap(all), 0.05, 1e-15);
+  for (std::size_t count = 0; count < all.size(); ++count)
+    expectRefused(
+        ErrorCode::WrongPositionCount, "gap(): a row has vertex 3 ",
+        [&] { rows[0].gap(std::span<const Vector3d>(all.data(), count)); }, {}, std::size_t{3});
 }
 
 /// The third law of ConstraintRow, of triangles that intersect and of triangles that are near.

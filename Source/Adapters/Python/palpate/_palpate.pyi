@@ -124,12 +124,16 @@ class CollisionData:
         b: SolverVertices | _Array | None = None,
         motion: RigidMotion | None = None,
         vertex_count: int | None = None,
+        first_a: int = 0,
+        first_b: int = 0,
     ) -> Rows: ...
     def constraint_rows(
         self,
         a: SolverVertices | _Array | None = None,
         b: SolverVertices | _Array | None = None,
         motion: RigidMotion | None = None,
+        first_a: int = 0,
+        first_b: int = 0,
     ) -> _Records: ...
     def motions(self, a: ContactSide, b: ContactSide) -> _Records: ...
     def __eq__(self, other: object) -> bool: ...

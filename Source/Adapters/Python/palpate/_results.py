@@ -348,6 +348,7 @@ class Validity:
     effective_thickness: float = 0.0
     proxy_depth: float = 0.0
     age: int = 0
+    advance_may_be_missing: bool = False
     untrusted_vertices_a: list[int]
     untrusted_vertices_b: list[int]
     degenerate_triangles_a: list[int]

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "NarrowPhase/CollisionContents.h"
+
+namespace palpate {
+
+/// Makes the contents those of a copy, which knows no record. It keeps the offsets of its rows if
+/// the step that was detected is not over.
+void keepOffsets(CollisionData::Contents&);
+
+}  // namespace palpate
