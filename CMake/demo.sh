@@ -9,7 +9,8 @@ CMake/packages.sh demo
 echo "2 of 3: compilation (at most 3 minutes on two idle cores)"
 # Of SIMD code only the path that this machine takes.
 mkdir -p build
-cmake --preset release -DPALPATE_BUILD_TESTING=OFF -DPALPATE_SIMD_NATIVE=ON -B build/demo >build/demo.log || { cat build/demo.log; exit 1; }
+cmake --preset release -DPALPATE_SIMD_NATIVE=ON -DPALPATE_BUILD_TESTING=OFF -DPALPATE_WITH_FCL=OFF \
+  -DPALPATE_WITH_SIMPLIFY=OFF -DPALPATE_WITH_PYTHON=OFF -B build/demo >build/demo.log || { cat build/demo.log; exit 1; }
 cmake --build build/demo --parallel "$(nproc)" --target OrganScene
 echo "3 of 3: the scene"
 xvfb-run -a build/demo/Examples/OrganScene/OrganScene "$@"

@@ -6,12 +6,17 @@ set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
   libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
+# All that CMake/demo.sh needs.
+demo="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libvtk9-dev libcli11-dev nlohmann-json3-dev
+  xvfb xauth libgl1-mesa-dri"
 # All that pip needs to build the Python package, and SciPy for rows().
 python="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libmeshoptimizer-dev python3-dev
   pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel"
 test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev clang-format-14 clang-tidy-14 qemu-user
-  clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu chromium python3-vtk9 python3-matplotlib
+  chromium python3-vtk9 python3-matplotlib
   mono-mcs mono-runtime"
+# What CMake/test.sh --all needs besides: sanitizers and 64-bit ARM.
+matrix="clang-14 libclang-rt-14-dev g++-aarch64-linux-gnu"
 docs="doxygen python3-sphinx furo python3-myst-parser python3-breathe python3-sphinx-copybutton nodejs chromium"
 windows="g++-mingw-w64-x86-64-posix wine64 dpkg-dev libgtest-dev"
 package="lintian dpkg-dev fakeroot help2man"

@@ -40,6 +40,7 @@ struct Options {
   int threads = 0;
   bool paraView = false;
   bool view = false;
+  bool stages = false;
   std::vector<int> pictures{};  // the first frame to draw, and the step from picture to picture
   std::array<int, 2> size{1600, 1000};
   std::string keys{}, unit{};
@@ -94,8 +95,9 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-/// A line for each column that is not zero throughout. "!" marks what exceeds the budget.
-std::string summary(const RunLog& log) {
+/// A line for each column that is not zero throughout. "!" marks what exceeds the budget. columns:
+/// those of the table; empty: all.
+std::string summary(const RunLog& log, const std::vector<std::string>& columns) {
   std::array<char, 256> line;
   std::string text, zero;
   const auto add = [&](const char* format, auto... values) {
@@ -103,6 +105,8 @@ std::string summary(const RunLog& log) {
   };
   add("%-20s %11s %11s %11s %11s\n", "", "median ", "p99 ", "worst ", "budget ");
   for (const Series& column : log.columns()) {
+    if (!columns.empty() && std::find(columns.begin(), columns.end(), column.name) == columns.end())
+      continue;
     if (std::all_of(column.values.begin(), column.values.end(), [](double v) { return v == 0; })) {
       zero += (zero.empty() ? "" : ", ") + column.name;
       continue;
@@ -318,7 +322,7 @@ void run(const SceneProgram& program, Options options) {
   const std::string own = scene->settings(),
                     settings = own + (own.empty() ? "" : ", ") + "lengths in " + options.unit;
   std::printf("%s, %d frames, %s\n%s", program.name.c_str(), options.frames, settings.c_str(),
-              summary(log).c_str());
+              summary(log, options.stages ? std::vector<std::string>{} : program.table).c_str());
   std::printf("%-20s %016" PRIx64 "\n", "result hash", hash);
   const std::vector<std::string> findings = scene->findings();
   for (const std::string& finding : findings) std::printf("%s\n", finding.c_str());
@@ -374,6 +378,8 @@ int runScene(const SceneProgram& program, int count, char** arguments) {
         ->capture_default_str();
   app.add_flag("--paraview", options.paraView,
                "also write OUT/paraview: .vtp files of bodies, contacts and octree, and a .pvd");
+  if (!program.table.empty())
+    app.add_flag("--stages", options.stages, "print the figures of each stage, too");
 #ifdef PALPATE_HAS_VTK
   app.add_flag("--view", options.view,
                "shows each frame in a window; keys: o cells, b translucent bodies, c contacts, n "

@@ -94,6 +94,7 @@ struct SceneProgram {
   std::string keys{};                ///< of vtk::Window, pressed before it shows anything
   std::string unit = "mm";           ///< of lengths
   bool isUnitFree = false;           ///< lengths are those of the user's meshes: option --unit
+  std::vector<std::string> table{};  ///< columns of the printed table, without --stages; empty: all
   std::function<void(CLI::App&)> addOptions{};
   std::function<std::unique_ptr<LiveScene>(int threads)> make{};
 };

@@ -1,6 +1,9 @@
 # Methods, meshes of one's own, and refusals.
 frames=40
 run
+grep -q "5 meshes, 11100 triangles, 10 pairs, auto" "$folder/text" || fail "the default is not auto: $(cat "$folder/text")"
+grep -q "untrusted pairs\|narrow phase" "$folder/text" && fail "the short table has rows of stages: $(cat "$folder/text")"
+run --stages --method proximity
 column contacts | grep -qvx 0 || fail "no contacts"
 for stage in frame collision boxes octree pairs "narrow phase" order; do
   grep -q "^$stage ms " "$folder/text" || fail "no line for $stage"
