@@ -88,9 +88,7 @@ class OrganScene : public LiveScene {
     std::size_t untrusted = 0;
     for (const World::Pair& pair : m_world.pairs()) {
       const Validity& validity = m_world.contacts(pair.a, pair.b).validity();
-      if (validity.trusted) continue;
-      ++untrusted;
-      m_reason = validity.reason;
+      untrusted += !validity.trusted && !validity.startedApart;
     }
     m_untrusted = std::max(m_untrusted, untrusted);
     m_world.commit();
@@ -117,9 +115,11 @@ class OrganScene : public LiveScene {
   std::vector<std::string> findings() override {
     if (m_untrusted == 0) return {};
     std::array<char, 160> text;
-    std::snprintf(text.data(), text.size(),
-                  "not trusted          up to %zu of %zu pairs: %s; nothing keeps these organs apart",
-                  m_untrusted, m_scene.pairs.size(), toString(m_reason));
+    std::snprintf(
+        text.data(), text.size(),
+        "not trusted          at most %zu of %zu pairs: nothing keeps these bodies apart, "
+        "and they overlap",
+        m_untrusted, m_scene.pairs.size());
     return {text.data()};
   }
 
@@ -137,8 +137,7 @@ class OrganScene : public LiveScene {
   Method m_method;
   double m_thickness;
   World m_world;
-  std::size_t m_untrusted = 0;  ///< the most pairs that are not trusted in one frame
-  ValidityReason m_reason{};    ///< of one of them
+  std::size_t m_untrusted = 0;  ///< the most pairs that overlap in one frame
   std::vector<Eigen::Vector3d> m_positions;
   std::vector<std::pair<std::size_t, int>> m_found;  ///< in each frame
 };
