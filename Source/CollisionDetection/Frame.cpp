@@ -40,8 +40,13 @@ std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& th
   m_pairs.clear();
   m_places.clear();
   m_nodePairs.clear();
-  const std::size_t enough =
+  std::size_t enough =
       threads.count() > 1 ? kJobsPerThread * static_cast<std::size_t>(threads.count()) : 1;
+  // Where the deadline ends a group, none of its pairs is joined. Groups therefore become smaller
+  // the longer the first pair waits, until it is alone.
+  if (deadline && !records.empty())
+    enough =
+        std::max<std::size_t>(1, enough >> std::min(records.front()->data.validity().age, 16u));
   const FrameStart frame{threads, m_nodePairs, m_stack, deadline};
   for (PairRecord* record : records) {
     if (deadline && (m_places.size() >= enough || deadline->isOver())) break;
@@ -218,8 +223,18 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
     statistics.milliseconds.order += spent;
   };
   for (PairRecord* record : records) record->isUnfinished = true;
+  // Pairs that run together are joined together: those of the highest priority do not wait for
+  // others. A pair that yields comes after them.
+  const auto isFirst = [first = records.empty() ? 0 : records.front()->pair.settings.priority](
+                           const PairRecord* record) {
+    return !record->yields && record->pair.settings.priority == first;
+  };
+  auto urgent = static_cast<std::size_t>(std::find_if_not(records.begin(), records.end(), isFirst) -
+                                         records.begin());
   while (!records.empty()) {
-    const std::size_t count = start(records, threads, &deadline, kStartWork);
+    const std::size_t count =
+        start(urgent > 0 ? records.first(urgent) : records, threads, &deadline, kStartWork);
+    urgent -= std::min(urgent, count);
     if (count == 0) return;
     runRounds(threads, &deadline, trace);
     addTimes(watch.lap(), statistics);

@@ -125,11 +125,17 @@ void orderByUrgency(std::span<PairRecord*> records) {
 
 const PairRecord* findExceeding(std::span<PairRecord* const> records) {
   const std::int64_t highest = highestPriority(records);
-  for (const PairRecord* record : records) {
-    if (record->isUnfinished) return record;
-    if (record->pair.settings.priority < highest) return nullptr;
-  }
-  return nullptr;
+  const auto unfinished =
+      std::find_if(records.begin(), records.end(),
+                   [](const PairRecord* record) { return record->isUnfinished; });
+  if (unfinished == records.end()) return nullptr;
+  const auto isHighest = [highest](const PairRecord* record) {
+    return record->pair.settings.priority == highest;
+  };
+  const bool hadAll =
+      unfinished == records.begin() ||
+      (!isHighest(*unfinished) && std::all_of(records.begin(), unfinished, isHighest));
+  return hadAll ? *unfinished : nullptr;
 }
 
 }  // namespace palpate

@@ -14,8 +14,9 @@ double distanceBoundOf(const PairRecord&);
 /// detection with a budget takes them (OctreeBasedCD::detectCollision()). Every pair is planned.
 void orderByUrgency(std::span<PairRecord*> records);
 
-/// Of pairs in that order: the first one that is unfinished, if only pairs with the highest
-/// priority were before it. It had all the time that a pair can have. Null: there is none.
+/// Of pairs in that order: the first one that is unfinished, if no pair was before it, or only
+/// pairs of a higher priority, the highest. It had all the time that it can have. Null: there is
+/// none.
 const PairRecord* findExceeding(std::span<PairRecord* const> records);
 
 }  // namespace palpate

@@ -149,7 +149,7 @@ TEST_P(MemoryLimit, ABurstIsGivenBackAfterAWhile) {
   const auto set = [](PairRun& run, const Positions& positions) {
     run.detection().advance();
     run.detection().setPositions(run.b(), positions);
-    run.detect();
+    run.detection().detectCollision();
   };
   for (PairRun* run : {&bursting, &calm}) set(*run, away[0]);
   for (int burst = 0; burst < 2; ++burst) {
