@@ -12,7 +12,7 @@ build/benchmark/Testing/Benchmark/palpate_race --csv $csv \
   --commit "$(git describe --always --dirty 2>/dev/null || echo unknown)${*:+ ${*//,/ }}" "$@"
 if [[ ! " $* " =~ " --"(tables|scenes|engines|threads|frames|csv|cpu-clock)[\ =] ]]; then  # the whole table
   cp $csv Docs/Data/Performance.csv
-  for page in Docs/Performance.md Docs/HowTo/RestingContact.md; do
+  for page in README.md Docs/Performance.md Docs/HowTo/RestingContact.md; do
     python3 Testing/Benchmark/tables.py Docs/Data/Performance.csv $page
   done
 fi

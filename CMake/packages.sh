@@ -1,7 +1,7 @@
 #!/bin/bash
-# CMake/packages.sh SET...: installs the Debian packages of the named sets (build, python, test, docs, figures, benchmark, coverage, package, windows),
-# as root or through sudo. Returns at once when all are there. Otherwise it says first how many packages come, of what
-# size. Where it cannot install all of them it installs none, and says why in one line.
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (demo, build, python, test, matrix, docs, figures,
+# benchmark, coverage, package, windows), as root or through sudo. Returns at once when all are there. Otherwise it says first
+# how many packages come, of what size. Where it cannot install all of them it installs none, and says why in one line.
 set -euo pipefail
 
 build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev

@@ -1,6 +1,7 @@
 // A thread of 1,000 segments goes through two sheets and around itself, and is pulled tight. Beside
-// it a guide sews a stitch and ties it by an overhand knot. ThreadTopology grades the stitch, and says
-// when the thread's end goes through the loop of the knot. It does not say whether a knot is tied.
+// it a guide sews a stitch and ties it by an overhand knot. ThreadTopology grades the stitch, and
+// says when the thread's end goes through the loop of the knot. It does not say whether a knot is
+// tied.
 #include "CommandLine.h"
 #include "SceneProgram.h"
 #include "SelfImpacts.h"

@@ -30,6 +30,7 @@ struct ClaimSearch {
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
+namespace affineClaim {
 
 using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
 using V = hn::Vec<SetTag>;
@@ -312,6 +313,10 @@ HWY_ATTR bool proveClaimKernel(const AffineClaim& claim, const ClaimSearch& sear
   leaveLanes();
   return holds;
 }
+
+}  // namespace affineClaim
+
+using affineClaim::proveClaimKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -37,7 +37,7 @@ def test_old_arrays_stay_while_frames_go_on():
             snapshot.positions_before(scene.b),
             queries.closest_points(scene.b, points),
             snapshot.queries().closest_points(scene.b, points),
-            data.constraint_rows(scene.positions, scene.positions),
+            data.constraint_rows(),
             collisions.octree().nodes(scene.a)[0].bounds,
             collisions.octree().nodes(scene.a)[-1].elements,
         ]

@@ -27,9 +27,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Contacts, or pairs of intersecting triangles, by their features.
-using Features = std::set<std::tuple<std::size_t, int, std::array<std::uint32_t, 4>>>;
+using FeatureSet = std::set<std::tuple<std::size_t, int, std::array<std::uint32_t, 4>>>;
 
-void addFeatures(const OctreeBasedCD& collisions, Features& features) {
+void addFeatures(const OctreeBasedCD& collisions, FeatureSet& features) {
   for (std::size_t i = 0; i < collisions.pairs().size(); ++i) {
     const CollisionPair& pair = collisions.pairs()[i];
     const CollisionData& data = collisions.collisionData(pair.a, pair.b);
@@ -98,9 +98,9 @@ class SceneRun {
       else
         m_collisions.setPositions(m_ids[i], positions[i]);
   }
-  Features detect() {
+  FeatureSet detect() {
     m_collisions.detectCollision();
-    Features features;
+    FeatureSet features;
     addFeatures(m_collisions, features);
     return features;
   }
@@ -156,7 +156,7 @@ double expectNothingNew(Random& random, const Scene& scene, int steps) {
     search.move(now, translations);
     search.detect();
     const auto free = search.freeMotions();
-    std::vector<Features> before;
+    std::vector<FeatureSet> before;
     for (SceneRun& check : checks) {
       check.move(now, translations);
       check.collisions().advance();  // at rest
@@ -180,7 +180,7 @@ double expectNothingNew(Random& random, const Scene& scene, int steps) {
     }
     for (std::size_t i = 0; i < checks.size(); ++i) {
       checks[i].move(now, translations);
-      const Features after = checks[i].detect();
+      const FeatureSet after = checks[i].detect();
       for (const auto& [pair, kind, ids] : after)
         EXPECT_TRUE(before[i].contains({pair, kind, ids}))
             << "method " << i << ", step " << step << ", pair " << pair << ", kind " << kind << ": "

@@ -95,8 +95,9 @@ TEST_P(MissingAdvance, CorrectionsAreNotNoticed) {
           EXPECT_FALSE(falling.detect());
         }
         // Back along the prediction, less each time, and aside.
-        falling.move(-uniform(random, 0, 0.15) * predicted +
-                     0.1 * predicted.norm() * randomPoint(random, -1, 1));
+        const double back = uniform(random, 0, 0.15);
+        const Vector3d aside = randomPoint(random, -1, 1);
+        falling.move(-back * predicted + 0.1 * predicted.norm() * aside);
         falling.set(falling.place());  // the same again
       }
       EXPECT_FALSE(falling.detect());
