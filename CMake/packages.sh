@@ -25,7 +25,7 @@ benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libn
   libopenvdb-dev"
 coverage="python3 gcovr"
 
-sets="build python test docs figures benchmark coverage package windows"
+sets="demo build python test matrix docs figures benchmark coverage package windows"
 page="Docs/CMakeOptions.md#dependencies says what each part needs"
 spareMegabytes=500  # stay free on the disk
 

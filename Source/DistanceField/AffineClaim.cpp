@@ -30,7 +30,7 @@ struct ClaimSearch {
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace affineClaim {
+namespace affine_claim {
 
 using SetTag = hn::CappedTag<double, 8>;  ///< up to eight boxes or triangles
 using V = hn::Vec<SetTag>;
@@ -314,9 +314,9 @@ HWY_ATTR bool proveClaimKernel(const AffineClaim& claim, const ClaimSearch& sear
   return holds;
 }
 
-}  // namespace affineClaim
+}  // namespace affine_claim
 
-using affineClaim::proveClaimKernel;
+using affine_claim::proveClaimKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

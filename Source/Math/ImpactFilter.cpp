@@ -13,7 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace impactFilter {
+namespace impact_filter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -188,9 +188,9 @@ HWY_ATTR unsigned mayImpactKernel(ImpactQuery::Kind kind, const ImpactBlock& blo
              : mayImpactOf<ImpactQuery::Kind::EdgeEdge>(block, distance, tolerance);
 }
 
-}  // namespace impactFilter
+}  // namespace impact_filter
 
-using impactFilter::mayImpactKernel;
+using impact_filter::mayImpactKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

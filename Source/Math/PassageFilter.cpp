@@ -13,7 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace passageFilter {
+namespace passage_filter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -185,9 +185,9 @@ HWY_ATTR void findPassagesKernel(ImpactQuery::Kind kind, const ImpactBlock& bloc
   leaveLanes();
 }
 
-}  // namespace passageFilter
+}  // namespace passage_filter
 
-using passageFilter::findPassagesKernel;
+using passage_filter::findPassagesKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -10,7 +10,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace rayTriangles {
+namespace ray_triangles {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -148,10 +148,10 @@ HWY_ATTR void firstPointsKernel(const RayTriangles& pairs, const double (&t)[Ray
   leaveLanes();
 }
 
-}  // namespace rayTriangles
+}  // namespace ray_triangles
 
-using rayTriangles::firstPointsKernel;
-using rayTriangles::intersectRaysKernel;
+using ray_triangles::firstPointsKernel;
+using ray_triangles::intersectRaysKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

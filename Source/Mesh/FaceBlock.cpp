@@ -10,7 +10,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace faceBlock {
+namespace face_block {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -57,9 +57,9 @@ HWY_ATTR void weightedNormalsKernel(const FaceBlock& block, FaceBlockNormals& no
   leaveLanes();
 }
 
-}  // namespace faceBlock
+}  // namespace face_block
 
-using faceBlock::weightedNormalsKernel;
+using face_block::weightedNormalsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -11,7 +11,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace unfoldedStars {
+namespace unfolded_stars {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -88,9 +88,9 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
   }
 }
 
-}  // namespace unfoldedStars
+}  // namespace unfolded_stars
 
-using unfoldedStars::viewsKernel;
+using unfolded_stars::viewsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

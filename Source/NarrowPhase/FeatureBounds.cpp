@@ -18,7 +18,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace featureBounds {
+namespace feature_bounds {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -184,9 +184,9 @@ HWY_ATTR void featureBoundsKernel(const FloatMeshes& meshes, std::span<const Ele
   }
 }
 
-}  // namespace featureBounds
+}  // namespace feature_bounds
 
-using featureBounds::featureBoundsKernel;
+using feature_bounds::featureBoundsKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

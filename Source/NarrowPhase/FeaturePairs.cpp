@@ -15,7 +15,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace featurePairs {
+namespace feature_pairs {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -401,10 +401,10 @@ HWY_ATTR void keepOverlappingKernel(const MeshTopology& a, const MeshTopology& b
   pairs.resize(kept);
 }
 
-}  // namespace featurePairs
+}  // namespace feature_pairs
 
-using featurePairs::findFeaturePairsKernel;
-using featurePairs::keepOverlappingKernel;
+using feature_pairs::findFeaturePairsKernel;
+using feature_pairs::keepOverlappingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

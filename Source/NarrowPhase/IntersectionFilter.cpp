@@ -12,7 +12,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace intersectionFilter {
+namespace intersection_filter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -255,9 +255,9 @@ HWY_ATTR void keepPossiblyIntersectingKernel(const PlacedTriangles& a, const Pla
   out.resize(static_cast<std::size_t>(end - out.data()));
 }
 
-}  // namespace intersectionFilter
+}  // namespace intersection_filter
 
-using intersectionFilter::keepPossiblyIntersectingKernel;
+using intersection_filter::keepPossiblyIntersectingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -31,7 +31,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace proximityFilter {
+namespace proximity_filter {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -243,9 +243,9 @@ HWY_ATTR void filterKernel(const TrianglePairBatch& batch, double thickness, boo
     filterScaled<true, false>(scaled, possible);
 }
 
-}  // namespace proximityFilter
+}  // namespace proximity_filter
 
-using proximityFilter::filterKernel;
+using proximity_filter::filterKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -13,7 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace nearestElements {
+namespace nearest_elements {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -199,9 +199,9 @@ HWY_ATTR void searchNearestKernel(const NearestSearch& search, float bound, std:
   Search(search, bound, count, context, take).run();
 }
 
-}  // namespace nearestElements
+}  // namespace nearest_elements
 
-using nearestElements::searchNearestKernel;
+using nearest_elements::searchNearestKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -13,7 +13,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace overlapSearch {
+namespace overlap_search {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -343,9 +343,9 @@ HWY_ATTR void searchOverlappingKernel(const OverlapSearch& search,
   OverlapDescent(search, elements, undecided).run();
 }
 
-}  // namespace overlapSearch
+}  // namespace overlap_search
 
-using overlapSearch::searchOverlappingKernel;
+using overlap_search::searchOverlappingKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -17,7 +17,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace palpate::HWY_NAMESPACE {
-namespace rayTraversal {
+namespace ray_traversal {
 
 constexpr std::size_t kSide = 16;  ///< elements tested together
 
@@ -269,10 +269,10 @@ HWY_ATTR void traverseRaysKernel(const Octree& octree, std::span<const RayTask> 
   }
 }
 
-}  // namespace rayTraversal
+}  // namespace ray_traversal
 
-using rayTraversal::traverseRayKernel;
-using rayTraversal::traverseRaysKernel;
+using ray_traversal::traverseRayKernel;
+using ray_traversal::traverseRaysKernel;
 
 }  // namespace palpate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

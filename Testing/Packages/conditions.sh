@@ -67,7 +67,7 @@ grep -q . "$here/out" && say "all are there" "prints $(cat "$here/out")"
 grep -q '^apt-get' "$log" && say "all are there" "asks apt"
 
 reset
-expect "an unknown set" 1 'there is no set bulid; the sets are: build python test' bulid
+expect "an unknown set" 1 'there is no set bulid; the sets are: demo build python test matrix' bulid
 nothing "an unknown set"
 
 reset
