@@ -6,7 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 echo "1 of 3: packages (at most a minute)"
 CMake/packages.sh demo
-echo "2 of 3: compilation (at most 3 minutes on two idle cores)"
+echo "2 of 3: compilation (about 4 minutes on two idle cores)"
 # Of SIMD code only the path that this machine takes.
 mkdir -p build
 cmake --preset release -DPALPATE_SIMD_NATIVE=ON -DPALPATE_BUILD_TESTING=OFF -DPALPATE_WITH_FCL=OFF \

@@ -73,7 +73,7 @@ if ((all)); then
   stage packages CMake/packages.sh build python test matrix || exit 1
   stage documentation CMake/docs.sh
 else
-  echo "Packages, the release build and its tests come: at most 15 minutes on two idle cores."
+  echo "Packages, the release build and its tests come: about 20 minutes on two idle cores."
   stage packages CMake/packages.sh build python test || exit 1
 fi
 build release

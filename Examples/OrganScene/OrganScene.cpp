@@ -153,7 +153,6 @@ int main(int count, char** arguments) {
        .description = "Organs breathe, slide along each other and overlap.",
        .frames = 120,
        .frameMilliseconds = 1000.0 / 60,
-       .collisionMilliseconds = 4,
        .keys = "n",
        .isUnitFree = true,
        .table = {"frame ms", "collision ms", "contacts", "candidate pairs", "triangles"},
