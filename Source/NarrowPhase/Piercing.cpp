@@ -1,5 +1,6 @@
 #include "NarrowPhase/Piercing.h"
 
+#include "NarrowPhase/FeatureStar.h"
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
@@ -82,16 +83,31 @@ class CrossingEdges {
   Buffer<EdgeCrossing>& m_out;
 };
 
-/// How often more an edge leaves the surface than it enters it, on the way from its first vertex.
-/// crossings: of one edge, sorted.
-int timesOfLeaving(std::span<const EdgeCrossing> crossings) {
+/// Whether an edge leaves the surface in one of its features, on the way from p to q: 1. If it
+/// enters: -1. crossings: of the edge, all in this feature.
+int leavesIn(const TriangleMesh& surface, bool atStart, std::span<const EdgeCrossing> crossings,
+             const Eigen::Vector3d& p, const Eigen::Vector3d& q, SignCounts& counts) {
+  const EdgeCrossing& first = crossings.front();
+  const int sense = first.lowerIsBehind ? 1 : -1;
+  if (first.through.kind == MeshFeature::Kind::Face) return sense;
+  const FeatureStar star(surface, atStart, first.through, counts);
+  if (star.isClosed()) return star.hasInside(p) - star.hasInside(q);
+  const bool agree = std::all_of(crossings.begin(), crossings.end(), [&](const EdgeCrossing& c) {
+    return c.lowerIsBehind == first.lowerIsBehind;
+  });
+  return agree && !star.holds(p) && !star.holds(q) ? sense : 0;
+}
+
+/// How often more an edge leaves the surface than it enters it, on the way from p to q.
+/// crossings: of the edge, sorted.
+int timesOfLeaving(const TriangleMesh& surface, bool atStart,
+                   std::span<const EdgeCrossing> crossings, const Eigen::Vector3d& p,
+                   const Eigen::Vector3d& q, SignCounts& counts) {
   int sum = 0;
   for (auto first = crossings.begin(); first != crossings.end();) {
     const auto end = std::find_if(
         first, crossings.end(), [&](const EdgeCrossing& c) { return c.through != first->through; });
-    const bool leaves = first->lowerIsBehind;
-    if (std::all_of(first, end, [&](const EdgeCrossing& c) { return c.lowerIsBehind == leaves; }))
-      sum += leaves ? 1 : -1;
+    sum += leavesIn(surface, atStart, {first, end}, p, q, counts);
     first = end;
   }
   return sum;
@@ -207,7 +223,7 @@ void PiercingContacts::collect(std::span<ContactBuffers* const> found,
 void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
                             ContactBuffers& out) {
   collect(found, &ContactBuffers::crossings, out.deadline);
-  findBehind(pair, out.deadline);
+  findBehind(pair, false, out);
   addDepths(pair, false, out);
   TimeCheck check(out.deadline, 32);
   for (const ContactBuffers* buffers : found)
@@ -220,7 +236,7 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
 void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
                                    ContactBuffers& out) {
   collect(found, &ContactBuffers::crossingsAtStart, out.deadline);
-  findBehind(pair, out.deadline);
+  findBehind(pair, true, out);
   addDepths(pair, true, out);
 }
 
@@ -244,22 +260,26 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
   }
 }
 
-void PiercingContacts::findBehind(const MeshPair& pair, const Deadline* deadline) {
-  TimeCheck check(deadline, 64);
+void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuffers& out) {
+  TimeCheck check(out.deadline, 64);
+  SignCounts counts;
   m_behind.clear();
   for (auto first = m_crossings.begin(); first != m_crossings.end();) {
     check();
     const auto end = std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
       return c.ofB != first->ofB || c.edge != first->edge;
     });
-    PALPATE_ASSERT(first->edge < (first->ofB ? pair.b : pair.a).topology.edges.size());
-    const int leaves = timesOfLeaving({first, end});
-    const Segment& ends = (first->ofB ? pair.b : pair.a).topology.edges[first->edge];
+    const PlacedMesh mesh(first->ofB ? pair.b : pair.a, atStart);
+    PALPATE_ASSERT(first->edge < mesh.topology.edges.size());
+    const Segment& ends = mesh.topology.edges[first->edge];
+    const int leaves = timesOfLeaving(first->ofB ? pair.a : pair.b, atStart, {first, end},
+                                      mesh.at[ends[0]], mesh.at[ends[1]], counts);
     for (; first != end; ++first)
       if (leaves != 0 && first->lowerIsBehind == (leaves > 0))
         m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle});
   }
-  sortUntil(deadline, m_behind.begin(), m_behind.end(), std::less<>());
+  out.exactDecisions += counts.undecided;
+  sortUntil(out.deadline, m_behind.begin(), m_behind.end(), std::less<>());
   m_behind.erase(std::unique(m_behind.begin(), m_behind.end()), m_behind.end());
 }
 

@@ -21,11 +21,13 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///
 /// Crossing an edge crosses a triangle if its ends are strictly on different sides of the
 ///          triangle's plane and it meets the triangle, borders included. Crossings of one edge
-///          through one face, edge or vertex count once; where its triangles are crossed in both
-///          senses they count nothing.
-/// Behind   an edge leaves the surface at the crossings that lead from behind to the front. The end
-///          from which it leaves more often than it enters is behind the surface. Of a closed
-///          surface that does not cross itself, this end is inside and the other outside.
+///          through one face, edge or vertex count once.
+/// Leaving  through a face, an edge leaves the surface from behind to the front. Through an edge or
+///          a vertex around which the surface is closed, it leaves if it is strictly inside before
+///          and not behind (FeatureStar): along the surface it is not inside. Through a border, it
+///          leaves if it leaves all triangles that it crosses there, and runs along none.
+/// Behind   the end from which an edge leaves more often than it enters is behind the surface. Of a
+///          closed surface that does not cross itself, this end is inside and the other is not.
 /// Depth    a vertex behind a surface has one contact, with the nearest of the triangles that such
 ///          edges cross, or with a nearer one. The search goes on from the feature with the
 ///          closest point to all triangles that hold it, as long as one of them is nearer. It
@@ -52,7 +54,7 @@ class PiercingContacts {
   };
   void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list,
                const Deadline*);
-  void findBehind(const MeshPair&, const Deadline*);
+  void findBehind(const MeshPair&, bool atStart, ContactBuffers& out);
   void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;

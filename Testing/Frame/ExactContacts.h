@@ -2,6 +2,7 @@
 
 #include <palpate/FeaturePairs.h>
 
+#include "Common/StarTruth.h"
 #include "Frame/Placement.h"
 #include "Unit/Math/ImpactOracle.h"
 #include "Unit/Math/RationalOracle.h"
@@ -225,6 +226,18 @@ class ExactContacts {
     return result;
   }
 
+  /// 1 if the segment from p to q leaves the surface in a feature, -1 if it enters it. sides: those
+  /// of the crossed triangles on which p is.
+  static int leavesIn(const Moving& others, const std::set<std::uint32_t>& feature,
+                      const std::set<int>& sides, const Vector3d& p, const Vector3d& q) {
+    const int sense = sides.size() == 1 ? -*sides.begin() : 0;
+    if (feature.size() == 3) return sense;
+    const oracle::StarTruth star(others.triangles(), {feature.begin(), feature.end()},
+                                 [&](std::uint32_t v) { return others[v]; });
+    if (star.isClosed()) return star.hasInside(p) - star.hasInside(q);
+    return star.holds(p) || star.holds(q) ? 0 : sense;
+  }
+
   Depths depths(const Moving& vertices, const Moving& others) const {
     const auto count = static_cast<std::uint32_t>(others.triangles().size());
     std::set<Segment> edges;
@@ -247,7 +260,7 @@ class ExactContacts {
       }
       int sum = 0;
       for (const auto& [feature, signs] : sides)
-        if (signs.size() == 1) sum -= *signs.begin();
+        sum += leavesIn(others, feature, signs, vertices[edge[0]], vertices[edge[1]]);
       if (sum == 0) continue;
       starts[edge[sum < 0]].merge(triangles[sum > 0 ? -1 : 1]);
     }
