@@ -56,7 +56,7 @@ function(palpate_export_own_symbols target)
 endfunction()
 
 # palpate_precompile_headers(TARGET HEADER...): TARGET is compiled with these headers precompiled, if the build asks for it.
-# The scalar build does not ask: it shows that every file includes what it uses.
+# That every file includes what it uses, Frame.UnoptimizedBuild shows under `ctest -L long`.
 function(palpate_precompile_headers target)
   if(PALPATE_PRECOMPILED_HEADERS)
     target_precompile_headers(${target} PRIVATE ${ARGN})

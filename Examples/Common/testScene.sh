@@ -35,7 +35,9 @@ run
 grep -q "${hash##* }" "$folder/run/report.html" || fail "report.html has not the hash"
 grep -qE '(src|href)="?http' "$folder/run/report.html" && fail "report.html needs a network"
 [[ $(stat -c %s "$folder/run/report.html") -le 8000000 ]] || fail "report.html is larger than 8 MB"
-python3 "$(dirname "$0")/../../Testing/Common/report.py" "$folder/run/report.html" || fail "report.html in a browser"
+if [[ $length == long || $program == */OrganScene ]]; then  # all reports have the same page
+  python3 "$(dirname "$0")/../../Testing/Common/report.py" "$folder/run/report.html" || fail "report.html in a browser"
+fi
 grep -q "no picture" "$folder/text" || fail "nothing said about the picture"
 "$program" $options --frames 2 --paraview --out "$folder/series" >"$folder/text" || fail "the series"
 [[ $(grep -c '<DataSet' "$folder"/series/paraview/*.pvd) -eq 6 ]] || fail "the .pvd has not three parts of two frames"
