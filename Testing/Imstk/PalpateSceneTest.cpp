@@ -23,8 +23,8 @@ TEST(PalpateScene, OneNodeDetectsBeforeAllInteractions) {
     }
   ASSERT_NE(node, nullptr);
   for (const auto& interaction : {a, b})
-    EXPECT_EQ(graph->getInvAdjList()[interaction->getCollisionDetectionNode()].count(node), 1u);
-  EXPECT_EQ(graph->getInvAdjList()[node].size(), 2u);  // both updates of geometries
+    EXPECT_EQ(graph->getInvAdjList().at(interaction->getCollisionDetectionNode()).count(node), 1u);
+  EXPECT_EQ(graph->getInvAdjList().at(node).size(), 2u);  // both updates of geometries
   test.step(3);
   EXPECT_TRUE(test.palpateScene.trusted());
   EXPECT_TRUE(imstk::logged().empty());

@@ -18,6 +18,7 @@ class RowConstraint : public imstk::PbdConstraint {
       : PbdConstraint(row.terms.size()), m_row(row), m_gap(gap) {
     for (std::size_t i = 0; i < row.terms.size(); ++i) m_particles[i] = row.terms[i].particle;
   }
+  const std::string getTypeName() const override { return "PalpateRowConstraint"; }
 
   bool computeValueAndGradient(imstk::PbdState& bodies, double& c,
                                std::vector<imstk::Vec3d>& dcdx) override {

@@ -26,8 +26,11 @@ void addDetectionTo(imstk::TaskGraph& graph, const std::shared_ptr<SceneStep>& s
       detections.push_back(interaction->getCollisionDetectionNode());
   if (detections.empty()) return;
   std::vector<std::shared_ptr<imstk::TaskNode>> conditions;
-  for (const auto& detection : detections)
-    for (const auto& condition : graph.getInvAdjList()[detection]) conditions.push_back(condition);
+  for (const auto& detection : detections) {
+    const auto before = graph.getInvAdjList().find(detection);
+    if (before == graph.getInvAdjList().end()) continue;
+    conditions.insert(conditions.end(), before->second.begin(), before->second.end());
+  }
   graph.addNode(node);
   for (const auto& condition : conditions) graph.addEdge(condition, node);
   for (const auto& detection : detections) graph.addEdge(node, detection);

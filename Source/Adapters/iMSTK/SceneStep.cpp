@@ -155,7 +155,9 @@ SceneStep::~SceneStep() = default;
 
 void SceneStep::warn(const std::string& message) {
   m_error = message;
-  if (message != m_lastWarning) LOG(WARNING) << "Palpate: " << message;
+  if (message != m_lastWarning) {  // LOG() is an if of its own
+    LOG(WARNING) << "Palpate: " << message;
+  }
   m_lastWarning = message;
 }
 
@@ -381,8 +383,7 @@ void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a
   attempt([&] {
     std::vector<StepElement> sides[2];
     m_step->appendElements(m_pairs[static_cast<std::size_t>(pair)].id, sides[0], sides[1]);
-    const imstk::CellTypeId types[] = {imstk::IMSTK_VERTEX, imstk::IMSTK_EDGE,
-                                       imstk::IMSTK_TRIANGLE};
+    const imstk::CellTypeId types[] = {IMSTK_VERTEX, IMSTK_EDGE, IMSTK_TRIANGLE};
     const auto convert = [&](const StepElement& from, bool otherIsPoint) {
       if (from.idCount == 0) {
         imstk::PointDirectionElement element;

@@ -35,7 +35,7 @@ using TaskNodeAdjList = std::unordered_map<std::shared_ptr<TaskNode>, TaskNodeSe
 class TaskGraph {
  public:
   TaskNodeVector& getNodes() { return m_nodes; }
-  TaskNodeAdjList& getInvAdjList() { return m_invAdjList; }
+  const TaskNodeAdjList& getInvAdjList() const { return m_invAdjList; }
   bool containsNode(std::shared_ptr<TaskNode> node) const {
     return std::find(m_nodes.begin(), m_nodes.end(), node) != m_nodes.end();
   }
@@ -166,6 +166,7 @@ class PbdConstraint {
  public:
   enum class SolverType { xPBD = 0, PBD };
   virtual ~PbdConstraint() = default;
+  virtual const std::string getTypeName() const = 0;
   virtual bool computeValueAndGradient(PbdState& bodies, double& c, std::vector<Vec3d>& dcdx) = 0;
   std::vector<PbdParticleId>& getParticles() { return m_particles; }
   double getFriction() const { return m_friction; }
