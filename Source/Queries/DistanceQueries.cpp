@@ -7,6 +7,9 @@
 #include "Queries/QuerySource.h"
 #include "Queries/ShapePenetration.h"
 #include "Queries/SurfaceNormal.h"
+#include "NarrowPhase/Meeting.h"
+
+#include <string>
 
 namespace palpate {
 
@@ -72,6 +75,27 @@ Penetration SpatialQueries::penetration(GeometryId idA, GeometryId idB) const {
   return withNormals(shapePenetration(a, b, source->engine(), source->octreeSettings(),
                                       scratch->penetration, scratch->shapeContacts.shapePair),
                      a, b);
+}
+
+bool SpatialQueries::pierce(GeometryId idA, std::uint32_t elementOfA, GeometryId idB,
+                            std::uint32_t elementOfB) const {
+  const Source::Call source(*this);
+  const auto meshOf = [&](GeometryId id, std::uint32_t element) -> const TriangleMesh& {
+    const Body& body = source->at(id);
+    checkHasElements(body);
+    const MeshTopology& topology = body.mesh.topology;
+    if (topology.type == GeometryType::Points)
+      throw Error(ErrorCode::UnsupportedMethod, nameOf(body) + " has points, which pierce nothing",
+                  id);
+    if (element >= topology.elements.size() || topology.isRemoved(element))
+      throw Error(ErrorCode::IndexOutOfRange,
+                  nameOf(body) + " has no element " + std::to_string(element), id, element);
+    return body.mesh;
+  };
+  const TriangleMesh &a = meshOf(idA, elementOfA), &b = meshOf(idB, elementOfB);
+  ContactBuffers counts;
+  return meetingOf(MeshPair{a, b, {}}, false, ElementPair{elementOfA, elementOfB}, counts) ==
+         Meeting::Piercing;
 }
 
 }  // namespace palpate

@@ -14,7 +14,7 @@ import pytest
 import palpate
 import sequences
 from palpate import _replay, check
-from palpate._exact import orientations, pierce
+from palpate._exact import orientations
 from palpate._findings import Checker
 from palpate._replay import DIGITS, digits_of
 from palpate._sequence import find_sequence
@@ -359,6 +359,15 @@ def test_exact_signs():
     assert signs.tolist() == np.sign(tiny[:, 2] - 0.3).tolist() and signs[0] == 0
 
 
+def pierce(a, b):
+    """Whether triangles (n, 3, 3) pierce each other, each by itself."""
+    collisions = palpate.OctreeBasedCD()
+    corners = np.arange(3 * len(a)).reshape(-1, 3)
+    first, second = (collisions.add_triangle_mesh(x.reshape(-1, 3), corners) for x in (a, b))
+    rows = np.arange(len(a))
+    return collisions.queries().pierce(first, second, np.stack([rows, rows], axis=1))
+
+
 def test_piercing_is_more_than_touching():
     random = np.random.default_rng(8)
     a, b = random.integers(-2, 3, size=(2, 1000, 3, 3)).astype(float)
@@ -373,6 +382,31 @@ def test_piercing_is_more_than_touching():
     a, b = random.normal(size=(2, 4000, 3, 3))
     intersecting = palpate.triangles_intersect(*a.transpose(1, 0, 2), *b.transpose(1, 0, 2))
     assert (pierce(a, b) == intersecting).all() and intersecting.sum() > 300
+    queries = palpate.OctreeBasedCD().queries()
+    with pytest.raises(palpate.Error, match="never added"):
+        queries.pierce(0, 1, [[0, 0]])
+
+
+def box(low, high):
+    corners = [[(low, high)[v >> axis & 1][axis] for axis in range(3)] for v in range(8)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    triangles = [half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]
+    return np.array(corners, dtype=float), np.array(triangles)
+
+
+def test_a_box_that_slides_over_the_edge_of_its_table_only_touches(tmp_path):
+    table, triangles = box((-2, -2, -2), (2, 2, 0))
+    resting, _ = box((-1, -1, 0), (1, 1, 1))
+    ways = np.arange(0, 2.5, 0.25)[:, None, None] * [1, 0.5, 0]
+    for depth in (0, 0.25):
+        folder = tmp_path / str(depth)
+        folder.mkdir()
+        np.savez(folder / "table.npz", positions=table, triangles=triangles)
+        moving = resting + ways - [0, 0, depth]
+        np.savez(folder / "box.npz", positions=moving, triangles=triangles)
+        code, rows = run(folder, tmp_path / "out")
+        kinds = {row["kind"] for row in rows} - {"touch"}
+        assert (code, kinds) == ((1, {"penetration"}) if depth else (0, set()))
 
 
 def test_the_command_explains_itself():

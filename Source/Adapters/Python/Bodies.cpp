@@ -57,6 +57,19 @@ py::object penetration(const Queries& self, Object first, Object second) {
   return recordOf(self.askLong([&](const SpatialQueries& q) { return q.penetration(a, b); }));
 }
 
+py::array pierce(const Queries& self, Object first, Object second, Object pairs) {
+  const GeometryId a = geometryId(first), b = geometryId(second);
+  const IndexArray elements(pairs, 2, "pairs");
+  const std::span<const std::uint32_t> ids = elements.all();
+  py::array_t<bool> answers = newArray<bool>(ids.size() / 2);
+  bool* const out = answers.mutable_data();
+  self.askLong([&](const SpatialQueries& q) {
+    for (std::size_t i = 0; i < ids.size() / 2; ++i)
+      out[i] = q.pierce(a, ids[2 * i], b, ids[2 * i + 1]);
+  });
+  return answers;
+}
+
 py::array findInsideVertices(const Queries& self, Object vertices, Object body, Object settings,
                              const py::kwargs& keywords) {
   const GeometryId of = geometryId(vertices), in = geometryId(body);
@@ -114,6 +127,11 @@ The least distance of two geometries (L) and their closest points a and b.)")
 
 How moving a by depth * direction separates two closed bodies: intersecting, direction (3,), depth
 (L), the points a and b that meet last, and minimal.)")
+      .def("pierce", &pierce, py::arg("a"), py::arg("b"), py::arg("pairs"),
+           R"(pierce(a, b, pairs) -> numpy.ndarray
+
+Whether two surfaces pierce each other in two of their elements, (n,) bool; else they only touch
+there, or are apart. pairs: (n, 2), an element of a and one of b. a and b may be one mesh.)")
       .def("find_inside_vertices", &findInsideVertices, py::arg("vertices"), py::arg("body"),
            py::arg("settings") = py::none(),
            R"(find_inside_vertices(vertices, body, settings=None, **keywords) -> numpy.ndarray

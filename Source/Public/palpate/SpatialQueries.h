@@ -207,6 +207,11 @@ class PALPATE_EXPORT SpatialQueries {
   ///          planes.
   /// Cost     some hundred rays and ten searches of intersections: some ms for 3,000 triangles.
   Penetration penetration(GeometryId a, GeometryId b) const;
+  /// Whether two surfaces pierce each other in two of their elements; else they only touch there,
+  /// or are apart. It is the decision by which Auto and Validity tell resting contact from
+  /// intersection, and exact. a and b may be one mesh. Lines pierce surfaces.
+  /// Errors   IndexOutOfRange; UnsupportedMethod for shapes and points.
+  bool pierce(GeometryId a, std::uint32_t elementOfA, GeometryId b, std::uint32_t elementOfB) const;
   /// Follows a ball, of radius 0 a point, along a polyline. It is in a body from its first touch
   /// until it neither touches nor is inside by contains(). A point that only touches is not in it.
   /// Order    inside: by `enter`, then as `bodies`. outside: bodies without interval, as `bodies`.

@@ -50,38 +50,3 @@ def _sign(*corners: npt.NDArray[Any]) -> int:
         u[i] * v[j] * w[k] for i, j, k in _ODD
     )
     return (volume > 0) - (volume < 0)
-
-
-def pierce(a: FloatArray, b: FloatArray) -> npt.NDArray[np.bool_]:
-    """(n,) whether triangles a (n, 3, 3) and b pierce each other, and do not only touch.
-
-    Each has corners on both sides of the other's plane, and an edge that passes from one side to the
-    other meets the other triangle. A body that rests on a face has no triangle with such corners.
-    """
-    sides_a = [orientations(b[:, 0], b[:, 1], b[:, 2], a[:, i]) for i in range(3)]
-    sides_b = [orientations(a[:, 0], a[:, 1], a[:, 2], b[:, i]) for i in range(3)]
-    both_sided = _on_both_sides(sides_a) & _on_both_sides(sides_b)
-    result = np.zeros(len(a), dtype=bool)
-    edges = ((0, 1), (1, 2), (2, 0))
-    volumes = {
-        (e, f): orientations(a[:, e[0]], a[:, e[1]], b[:, f[0]], b[:, f[1]])
-        for e in edges
-        for f in edges
-    }
-    for e in edges:
-        through = np.stack([volumes[e, f] for f in edges])
-        result |= (sides_a[e[0]] * sides_a[e[1]] < 0) & _one_sided(through)
-        through = np.stack([volumes[f, e] for f in edges])
-        result |= (sides_b[e[0]] * sides_b[e[1]] < 0) & _one_sided(through)
-    result &= both_sided
-    return result
-
-
-def _on_both_sides(sides: list[Signs]) -> npt.NDArray[np.bool_]:
-    result: npt.NDArray[np.bool_] = (np.min(sides, axis=0) < 0) & (np.max(sides, axis=0) > 0)
-    return result
-
-
-def _one_sided(signs: Signs) -> npt.NDArray[np.bool_]:
-    result: npt.NDArray[np.bool_] = (signs >= 0).all(axis=0) | (signs <= 0).all(axis=0)
-    return result

@@ -8,7 +8,7 @@ import numpy as np
 from palpate._bodies import Features, PlacedBody
 from palpate._enums import Method
 from palpate._errors import BadInput, Error
-from palpate._exact import Signs, orientations, pierce
+from palpate._exact import Signs, orientations
 from palpate._frames import Mesh, Reader
 from palpate._palpate import CollisionData, OctreeBasedCD
 from palpate._sequence import Body, Sequence
@@ -184,7 +184,7 @@ class Checker:
                 _find_inside(self._collisions, a, b, number, found)
                 _find_inside(self._collisions, b, a, number, found)
         for (a, b), data in zip(piercing, answers, strict=False):
-            _find_piercing(a, b, data, number, found)
+            _find_piercing(self._collisions, a, b, data, number, found)
         for (a, b), data in zip(overlapping, answers[len(piercing) :], strict=True):
             _find_overlaps(a, b, data, number, found)
 
@@ -255,12 +255,18 @@ def _find_inside(
 
 
 def _find_piercing(
-    a: PlacedBody, b: PlacedBody, data: CollisionData, number: int, found: list[Finding]
+    collisions: OctreeBasedCD,
+    a: PlacedBody,
+    b: PlacedBody,
+    data: CollisionData,
+    number: int,
+    found: list[Finding],
 ) -> None:
     """Triangles that intersect, with the depth of their deepest corner."""
     triangles = data.intersecting_triangles
     corners_a, corners_b = a.triangles[triangles["a"]], b.triangles[triangles["b"]]
-    piercing = pierce(a.mesh.positions[corners_a], b.mesh.positions[corners_b])
+    pairs = np.stack([triangles["a"], triangles["b"]], axis=1)
+    piercing = collisions.queries().pierce(a.surface, b.surface, pairs)
     depths = [np.zeros(len(body.mesh.positions)) for body in (a, b)]
     for of, contacts in zip(depths, (data.vertex_triangle, data.triangle_vertex), strict=True):
         np.maximum.at(of, contacts["vertex"], -contacts["distance"])
