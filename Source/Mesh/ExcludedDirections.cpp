@@ -18,11 +18,12 @@ struct Wing {
   double error;      ///< of its components
 };
 
-/// Whether two triangles at an edge lie on opposite sides of it, and do not bend away from a
-/// direction so much that a body of this length sinks by more than `most`. A bend lets it sink by
-/// at most a quarter of its length times the bend's sine.
-bool isNoRidge(const Wing& a, const Wing& b, const Vector3d& along, const Vector3d& direction,
-               double length, double most) {
+/// Whether two triangles at an edge lie on opposite sides of it, and the second does not bend away
+/// from a direction so much that a body of this length sinks by more than `most`. A bend lets it
+/// sink by at most a quarter of its length times the bend's sine. Of a wall below a floor, only the
+/// floor says so: which side of the wall a direction across the floor is on is rounding.
+bool bendsLittle(const Wing& a, const Wing& b, const Vector3d& along, const Vector3d& direction,
+                 double length, double most) {
   if (!(a.inwards.dot(b.inwards) < 0.0)) return false;
   const Vector3d across = along.cross(a.inwards);
   const double sine = across.dot(direction) < 0.0 ? across.dot(b.inwards) : -across.dot(b.inwards);
@@ -58,7 +59,9 @@ bool hasRidge(const TriangleMesh& mesh, const Segment& feature, const Vector3d& 
   };
   return !forEachWing([&](const Wing& a) {
     return forEachWing([&](const Wing& b) {
-      return isNoRidge(a, b, along, direction, length, kRidgeShare * thickness);
+      const double most = kRidgeShare * thickness;
+      return bendsLittle(a, b, along, direction, length, most) &&
+             bendsLittle(b, a, along, direction, length, most);
     });
   });
 }

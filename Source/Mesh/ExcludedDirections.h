@@ -34,8 +34,8 @@ inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
 
 /// Whether a mesh's edge, or an edge at its vertex {v, v}, is a ridge or a border at the step's
 /// end, as seen from a unit direction. Of an edge that is neither, two triangles lie on opposite
-/// sides, and neither bends away from the direction. length: of a straight body on that side.
-/// thickness: of the pair.
+/// sides, and neither bends away from the direction, as seen from the other. length: of a straight
+/// body on that side. thickness: of the pair.
 ///
 /// Law      let a straight body cross edges that are no ridges, and stay a gap of at most the
 ///          thickness in front of the surface before the first and behind the last of them. The

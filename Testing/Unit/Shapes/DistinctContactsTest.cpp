@@ -228,6 +228,53 @@ TEST(DistinctContacts, MatchTheDefinition) {
   EXPECT_GT(dropped, leastOf(1000));
 }
 
+/// An upright prism over a regular polygon, with its lower rim first, at z = 0.
+Mesh prism(std::uint32_t n) {
+  Mesh mesh;
+  for (const double height : {0.0, 20.0})
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const double angle = 2 * M_PI * i / n;
+      mesh.positions.push_back({10 * std::cos(angle), 10 * std::sin(angle), height});
+    }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    mesh.triangles.push_back({i, j, n + j});
+    mesh.triangles.push_back({i, n + j, n + i});
+    if (i == 0 || j == 0) continue;
+    mesh.triangles.push_back({0, j, i});
+    mesh.triangles.push_back({n, n + i, n + j});
+  }
+  return mesh;
+}
+
+/// A wall at the rim, seen along the floor, is on one side or on the other by rounding.
+TEST(DistinctContacts, OfARimOnAFlatSideStayWhateverTheTilt) {
+  Random random(9);
+  ConvexHull hull;
+  for (int i = 0; i < 8; ++i)
+    hull.points.push_back({i & 1 ? 100. : -100., i & 2 ? 100. : -100., i & 4 ? 0. : -20.});
+  const std::vector<AnalyticalGeometry> tables{Box{{0, 0, -10}, {100, 100, 10}},
+                                               Cylinder{{0, 0, -20}, {0, 0, 0}, 100}, hull};
+  const PairSettings settings{Method::Proximity, 0.5};
+  for (const std::uint32_t n : {4u, 6u, 8u, 32u}) {
+    const Mesh body = prism(n);
+    for (const AnalyticalGeometry& table : tables)
+      for (const double tilt : {0.0, 1e-9, 1e-6, 1e-4})
+        for (int run = 0; run < casesOf(40); ++run) {
+          const double angle = uniform(random, -tilt, tilt), x = uniform(random, -1, 1);
+          const Vector3d axis = Vector3d(x, uniform(random, -1, 1), 0).normalized();
+          const Matrix3d turn = (Eigen::AngleAxisd(angle, axis) *
+                                 Eigen::AngleAxisd(uniform(random, -3, 3), Vector3d::UnitZ()))
+                                    .toRotationMatrix();
+          const Vector3d at(0.3, 0.1, -0.05);
+          std::set<std::uint32_t> corners;
+          for (const ShapeContact& c : contactsOf(body, table, settings, turn, at, at))
+            if (c.element == ShapeElement::Vertex) corners.insert(c.id);
+          EXPECT_EQ(corners.size(), n) << "table " << table.index() << ", tilt " << angle;
+        }
+  }
+}
+
 /// A projected Gauss-Seidel solver moves a body by translation over a floor without friction.
 struct Sliding {
   double speed;   ///< at the end, relative to the start
