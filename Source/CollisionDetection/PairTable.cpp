@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 namespace palpate {
@@ -149,12 +150,16 @@ void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
            geometry, "triangle " + std::to_string(id));
       return topology.elements[id];
     };
-    const auto edge = [&](const Geometry& geometry, std::uint32_t p, std::uint32_t q) {
-      need(geometry.body.mesh.topology.edgeOf({p, q}) != kNoEdge, geometry,
-           "edge " + std::to_string(p) + " " + std::to_string(q));
-    };
     Crossing passage = crossing;
     passage.time = 0.0;
+    // Puts the lower vertex first.
+    const auto edge = [&](const Geometry& geometry, std::uint32_t& p, std::uint32_t& q) {
+      const Segment sorted{std::min(p, q), std::max(p, q)};
+      need(geometry.body.mesh.topology.edgeOf(sorted) != kNoEdge, geometry,
+           "edge " + std::to_string(p) + " " + std::to_string(q));
+      if (p > q) passage.forward = !passage.forward;
+      std::tie(p, q) = std::tie(sorted[0], sorted[1]);
+    };
     Triangle corners{};
     if (crossing.kind == ContactKind::VertexTriangle) {
       vertex(*a, ids[0]);
@@ -163,8 +168,11 @@ void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
       corners = triangle(*a, ids[0]);
       vertex(*b, ids[1]);
     } else if (crossing.kind == ContactKind::EdgeEdge) {
-      edge(*a, ids[0], ids[1]);
-      edge(*b, ids[2], ids[3]);
+      auto& [p, q, r, s] = passage.ids;
+      edge(*a, p, q);
+      edge(*b, r, s);
+      // Of a mesh with itself, the lower edge is first. The passage has the same sense from both.
+      if (a == b && std::tie(r, s) < std::tie(p, q)) std::swap(p, r), std::swap(q, s);
     } else {
       throw Error(ErrorCode::IndexOutOfRange,
                   pairName + ": remembered side " + std::to_string(number) + " is of the kind " +

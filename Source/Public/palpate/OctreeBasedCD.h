@@ -262,7 +262,7 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// Errors   NotAvailable if the detection has no such contact, or does not track contacts.
   void setUserData(GeometryId a, GeometryId b, const ContactKey&, std::uint64_t);
   /// Replaces CollisionData::rememberedSides() of the present step; none forgets all sides. Times
-  /// do not count. (a, b) is in the order of the addition.
+  /// do not count. (a, b) is in the order of the addition; vertices of edges are in any order.
   /// Errors   NotAvailable without PairSettings::rememberSides; IndexOutOfRange for a feature that
   ///          does not exist.
   void setRememberedSides(GeometryId a, GeometryId b, std::span<const Crossing>);

@@ -576,6 +576,41 @@ TEST_F(OnePoint, CapturesHoldTheMemory) {
   }
 }
 
+/// Two lines that have passed through each other, and one line with itself.
+TEST(SideMemory, TakesEdgesInAnyOrder) {
+  const Positions before{{0, 0, 0}, {1, 0, 0}, {0.5, -1, 0.1}, {0.5, 1, 0.1}};
+  Positions now = before;
+  now[2].z() = now[3].z() = -0.1;
+  for (const bool self : {false, true}) {
+    OctreeBasedCD collisions;
+    const auto part = [&](const Positions& of, std::size_t first) {
+      return self ? of : Positions(of.begin() + first, of.begin() + first + 2);
+    };
+    using Segments = std::vector<Segment>;
+    const GeometryId a =
+        collisions.addLineMesh(part(before, 0), self ? Segments{{0, 1}, {2, 3}} : Segments{{0, 1}});
+    const GeometryId b = self ? a : collisions.addLineMesh(part(before, 2), Segments{{0, 1}});
+    collisions.addCollisionPair(a, b, remembering(0.0));
+    collisions.setPositions(b, part(before, 2), part(now, 2));
+    collisions.detectCollision();
+    collisions.advance();
+    const auto remembered = [&] { return collisions.problem().pairs.at(0).sides; };
+    const std::vector<Crossing> sides = remembered();
+    ASSERT_EQ(sides.size(), 1u);
+    for (int order = 0; order < (self ? 8 : 4); ++order) {
+      Crossing side = sides[0];
+      auto& [p, q, r, s] = side.ids;
+      if (order & 1) std::swap(p, q), side.forward = !side.forward;
+      if (order & 2) std::swap(r, s), side.forward = !side.forward;
+      if (order & 4) std::swap(p, r), std::swap(q, s);
+      collisions.setRememberedSides(a, b, {});
+      EXPECT_TRUE(remembered().empty());
+      collisions.setRememberedSides(a, b, std::vector{side});
+      EXPECT_EQ(remembered(), sides) << order;
+    }
+  }
+}
+
 TEST_F(OnePoint, RefusesSidesOfNoFeatures) {
   constexpr std::uint32_t kNone = kNoElement;
   const auto refuse = [&](ContactKind kind, const std::array<std::uint32_t, 4>& ids,
