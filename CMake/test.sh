@@ -13,6 +13,7 @@ case $*:$# in
   *) sed -n '2,3s/^# //p' "${BASH_SOURCE[0]}" >&2; exit 2 ;;
 esac
 jobs=$(nproc)
+tests=$((jobs + 1))  # some wait for a display or a browser
 report=()
 failed=0
 
@@ -57,7 +58,7 @@ configuration() {
   local preset=$1 start=()
   [[ $preset == *san* ]] && start=("${fixedAddresses[@]}")
   if build "$@"; then
-    stage "$preset: test" "${start[@]}" ctest --preset "$preset" --parallel "$jobs"
+    stage "$preset: test" "${start[@]}" ctest --preset "$preset" --parallel "$tests"
   else
     notRun "$preset: test"
   fi
@@ -91,7 +92,7 @@ fi
 table() { printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"; printf '%s\n' "${report[@]}"; }
 table
 echo "--- release: test, after $SECONDS s"
-ctest --preset release --parallel "$jobs" || failed=1
+ctest --preset release --parallel "$tests" || failed=1
 ((failed)) || exit 0
 
 # What failed, last, as logs are read from their end.
