@@ -74,7 +74,7 @@ if ((all)); then
   stage packages CMake/packages.sh build python test matrix || exit 1
   stage documentation CMake/docs.sh
 else
-  echo "Packages, the release build and its tests come: about 20 minutes on two idle cores."
+  echo "Packages, the release build and its tests come: about half an hour on two idle cores."
   stage packages CMake/packages.sh build python test || exit 1
 fi
 build release
