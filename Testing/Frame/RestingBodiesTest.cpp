@@ -140,7 +140,7 @@ TEST(RestingBodies, HaveADepthWhereTheyAreLower) {
       EXPECT_EQ(answer.least < 0, answer.intersecting) << run << ' ' << int(method);
     }
   }
-  EXPECT_GT(overlapping, casesOf(100));
+  EXPECT_GT(overlapping, static_cast<int>(leastOf(100)));
 }
 
 }  // namespace
