@@ -168,7 +168,9 @@ TEST_P(MemoryLimit, ABurstIsGivenBackAfterAWhile) {
   FailingAllocation::arm(0);
   for (std::size_t frame = 0; frame < 300; ++frame) set(bursting, away[frame % away.size()]);
   FailingAllocation::disarm();
+#ifndef PALPATE_VALIDATE  // the check of an octree allocates
   EXPECT_EQ(FailingAllocation::count(), 0u);
+#endif
   set(bursting, b.positions);
   set(calm, b.positions);
   EXPECT_EQ(bursting.data().hash(), calm.data().hash());
