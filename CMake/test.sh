@@ -70,7 +70,7 @@ fixedAddresses=()
 setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-no-randomize)
 
 if ((all)); then
-  echo "Everything that CI runs comes: about an hour on two cores. Each stage says when it begins and how long it took."
+  echo "Everything that CI runs comes: one hour to one and a half on two cores. Each stage says when it begins and how long it took."
   stage packages CMake/packages.sh build python test matrix || exit 1
   stage documentation CMake/docs.sh
 else
