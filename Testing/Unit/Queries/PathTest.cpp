@@ -31,16 +31,16 @@ Answer follow(const SpatialQueries& queries, const Positions& path, double radiu
   return answer;
 }
 
-bool isSame(const PathInterval& a, const PathInterval& b) {
+bool areEqual(const PathInterval& a, const PathInterval& b) {
   return a.body == b.body && a.enter == b.enter && a.leave == b.leave &&
          a.entryElement == b.entryElement && a.exitElement == b.exitElement;
 }
-bool isSame(const PathClearance& a, const PathClearance& b) {
+bool areEqual(const PathClearance& a, const PathClearance& b) {
   return a.body == b.body && a.distance == b.distance && a.at == b.at &&
          testing::isSame(a.nearest, b.nearest);
 }
-bool isSame(const Answer& a, const Answer& b) {
-  const auto same = [](const auto& l, const auto& r) { return isSame(l, r); };
+bool areEqual(const Answer& a, const Answer& b) {
+  const auto same = [](const auto& l, const auto& r) { return areEqual(l, r); };
   return std::ranges::equal(a.inside, b.inside, same) &&
          std::ranges::equal(a.outside, b.outside, same);
 }
@@ -91,7 +91,7 @@ Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const
   const SpatialQueries queries = scene.octree.queries(), truth = scene.bruteForce.queries();
   const Answer found = follow(queries, path, radius, {body}),
                expected = follow(truth, path, radius, {body});
-  EXPECT_TRUE(isSame(found, expected));
+  EXPECT_TRUE(areEqual(found, expected));
   EXPECT_NE(found.inside.empty(), found.outside.empty());
 
   const Line line(path);
@@ -531,7 +531,7 @@ TEST(Path, LongPathsAgreeWithBruteForce) {
     const Answer found = follow(scene.octree.queries(), path, radius, scene.bodies),
                  truth = follow(scene.bruteForce.queries(), path, radius, scene.bodies);
     EXPECT_GT(found.inside.size(), 5u);
-    EXPECT_TRUE(isSame(found, truth));
+    EXPECT_TRUE(areEqual(found, truth));
   }
 }
 
@@ -550,7 +550,7 @@ TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {
                            std::vector<GeometryId> bodies) {
     expectRefused(code, words,
                   [&] { queries.path(along, radius, bodies, answer.inside, answer.outside); });
-    EXPECT_TRUE(isSame(answer, before));
+    EXPECT_TRUE(areEqual(answer, before));
   };
   using enum ErrorCode;
   refused(InvalidSettings, "radius is -1", path, -1.0, {body});

@@ -19,8 +19,8 @@ using Eigen::Vector3d;
 bool sameContacts(const CollisionData& a, const CollisionData& b) { return a.hash() == b.hash(); }
 
 /// A ball, a sheet with its winding, the surface of a placed body, lines and points.
-struct Scene {
-  explicit Scene(Engine engine = Engine::Octree)
+struct ToolScene {
+  explicit ToolScene(Engine engine = Engine::Octree)
       : collisions({.engine = engine, .threads = 1}), tool(toolMesh.positions, toolMesh.triangles) {
     const Mesh ball = sphere(10, 12, {0.5, 0.5, 0.5}, 0.3), plain = sheet(10, 0.5, 0);
     bodies.push_back(collisions.addTriangleMesh(ball.positions, ball.triangles));
@@ -44,7 +44,7 @@ struct Scene {
 TEST(RigidMesh, HasTheContactsOfAPair) {
   constexpr double kThickness = 0.03;
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-    Scene scene(engine);
+    ToolScene scene(engine);
     OctreeBasedCD& collisions = scene.collisions;
     collisions.setDisabledElements(scene.bodies[1], std::vector<std::uint32_t>{3, 4, 90, 91, 92});
     const GeometryId tool =
@@ -79,7 +79,7 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
 }
 
 TEST(RigidMesh, HeedsSidedness) {
-  Scene scene;
+  ToolScene scene;
   const GeometryId body = scene.bodies[0], tool = scene.collisions.addTriangleMesh(
                                                scene.toolMesh.positions, scene.toolMesh.triangles);
   scene.collisions.setCollisionFilter(body, {.sidedness = Sidedness::Outer});
@@ -101,7 +101,7 @@ TEST(RigidMesh, HeedsSidedness) {
 }
 
 TEST(RigidMesh, RefusesInvalidInput) {
-  Scene scene;
+  ToolScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   CollisionData out;
   const auto contacts = [&](GeometryId id, const Matrix3d& rotation, double thickness) {
@@ -130,7 +130,7 @@ TEST(RigidMesh, RefusesInvalidInput) {
 }
 
 TEST(RigidMesh, WithoutTrianglesOrFarAwayHasNoContacts) {
-  Scene scene;
+  ToolScene scene;
   const SpatialQueries queries = scene.collisions.queries();
   RigidMesh empty({}, {});
   CollisionData out;
