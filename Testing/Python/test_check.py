@@ -387,6 +387,22 @@ def test_piercing_is_more_than_touching():
         queries.pierce(0, 1, [[0, 0]])
 
 
+def test_piercing_refuses_what_has_no_such_triangles():
+    collisions = palpate.OctreeBasedCD()
+    corners = np.eye(3)
+    mesh = collisions.add_triangle_mesh(corners, [[0, 1, 2]])
+    points = collisions.add_point_set(corners)
+    shape = collisions.add_analytical_geometry(palpate.Sphere())
+    queries = collisions.queries()
+    with pytest.raises(palpate.Error, match="geometry 0 has no element 1"):
+        queries.pierce(mesh, mesh, [[0, 0], [0, 1]])
+    with pytest.raises(palpate.Error, match="geometry 1 has points"):
+        queries.pierce(mesh, points, [[0, 0]])
+    with pytest.raises(palpate.Error, match="geometry 2 is a shape"):
+        queries.pierce(shape, mesh, [[0, 0]])
+    assert queries.pierce(mesh, mesh, np.empty((0, 2), dtype=int)).shape == (0,)
+
+
 def box(low, high):
     corners = [[(low, high)[v >> axis & 1][axis] for axis in range(3)] for v in range(8)]
     faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
