@@ -3,6 +3,8 @@
 #include <palpate/MeshFiles.h>
 #include <palpate/vtk/DataSets.h>
 
+#include "Common/TemporaryFolder.h"
+
 #include <gtest/gtest.h>
 #include <vtkCellArray.h>
 #include <vtkDoubleArray.h>
@@ -34,9 +36,7 @@ namespace {
 /// A mesh of all kinds of elements, which fill more than one compressed block.
 class MeshFilesByVtk : public ::testing::Test {
  protected:
-  MeshFilesByVtk()
-      : path(std::filesystem::path(::testing::TempDir()) /
-             ::testing::UnitTest::GetInstance()->current_test_info()->name()) {
+  MeshFilesByVtk() {
     std::mt19937 random(1);
     std::uniform_int_distribution<int> coordinate(-4096, 4096);
     for (std::uint32_t v = 0; v < kVertices; ++v) {  // of few digits: text and floats keep no more
@@ -51,7 +51,6 @@ class MeshFilesByVtk : public ::testing::Test {
     for (std::uint32_t v = 0; v < kVertices; v += 4)
       solid.tetrahedra.push_back({v, v + 1, v + 2, v + 3});
   }
-  ~MeshFilesByVtk() override { std::filesystem::remove(path); }
 
   static void expectEqual(const MeshArrays& read, const MeshArrays& written) {
     EXPECT_TRUE(read.positions == written.positions);
@@ -123,7 +122,8 @@ class MeshFilesByVtk : public ::testing::Test {
   }
 
   static constexpr std::uint32_t kVertices = 1500;
-  std::filesystem::path path;
+  TemporaryFolder folder;
+  std::filesystem::path path = folder.path / "mesh";
   MeshArrays surface, lines, solid;
 };
 

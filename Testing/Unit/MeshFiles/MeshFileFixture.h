@@ -48,7 +48,8 @@ struct ReadOutcome {
 };
 
 inline ReadOutcome outcomeOf(const std::string& name, const std::string& content) {
-  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / name;
+  const TemporaryFolder folder;  // tests of this file run at the same time, in processes
+  const std::filesystem::path path = folder.path / name;
   std::ofstream(path, std::ios::binary) << content;
   ReadOutcome outcome;
   FailingAllocation::arm(0);
@@ -60,7 +61,6 @@ inline ReadOutcome outcomeOf(const std::string& name, const std::string& content
   }
   FailingAllocation::disarm();
   outcome.peak = FailingAllocation::peakBytes();
-  std::filesystem::remove(path);
   return outcome;
 }
 
