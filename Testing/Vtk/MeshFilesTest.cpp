@@ -122,7 +122,7 @@ class MeshFilesByVtk : public ::testing::Test {
   }
 
   static constexpr std::uint32_t kVertices = 1500;
-  TemporaryFolder folder;
+  testing::TemporaryFolder folder;
   std::filesystem::path path = folder.path / "mesh";
   MeshArrays surface, lines, solid;
 };
