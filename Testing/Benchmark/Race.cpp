@@ -7,19 +7,14 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
-#include <map>
+#include <utility>
 
 using namespace palpate;
 using namespace palpate::benchmark;
 
 namespace {
-
-struct Options {
-  std::vector<std::string> tables;
-  std::string csv, commit = "unknown";
-  RowOptions rows;
-};
 
 using Engines = std::vector<std::unique_ptr<BroadPhase>>;
 
@@ -89,10 +84,10 @@ void comparisons(Report& report, const Workload& workload, const Outcome& outcom
                againstBaselines(outcome, rebuilt->timing, false), 1);
 }
 
-void race(Report& report, const Options& options, Workload& workload, int threads) {
+void race(Report& report, const RowOptions& options, Workload& workload, int threads) {
   workload.task.threads = threads;
-  const Engines engines = makeEngines(options.rows.engines);
-  const Outcome outcome = measure(workload, engines, options.rows.measure);
+  const Engines engines = makeEngines(options.engines);
+  const Outcome outcome = measure(workload, engines, options.measure);
   char heading[200];
   std::snprintf(heading, sizeof heading,
                 "%s: %zu triangles, %.0f pairs (most %.0f), %zu frames, %d thread%s, hash %016lx",
@@ -125,67 +120,78 @@ void race(Report& report, const Options& options, Workload& workload, int thread
   comparisons(report, workload, outcome);
 }
 
-void raceRows(Report& report, const Options& options) {
-  const std::vector<std::string> all = workloadNames(options.rows.sharedData);
-  for (const std::string& scene : options.rows.scenes.empty() ? all : options.rows.scenes) {
-    Workload workload = makeWorkload(scene, options.rows.frames, options.rows.sharedData);
-    for (const int threads : options.rows.threads) race(report, options, workload, threads);
+void raceRows(Report& report, const RowOptions& options) {
+  const std::vector<std::string> all = workloadNames(options.sharedData);
+  for (const std::string& scene : options.scenes.empty() ? all : options.scenes) {
+    Workload workload = makeWorkload(scene, options.frames, options.sharedData);
+    for (const int threads : options.threads) race(report, options, workload, threads);
   }
 }
+
+/// In the order in which they run.
+const std::vector<std::pair<std::string, void (*)(Report&, const RowOptions&)>> kTables = {
+    {"race", raceRows},
+    {"stages", stageRows},
+    {"frame", wholeFrameRows},
+    {"far", farTriangleRows},
+    {"rest", atRestRows},
+    {"tool", smallToolRows},
+    {"scale", scaleRows},
+    {"steady", steadyRows},
+    {"features", featureRows},
+    {"lines", lineRows},
+    {"shapes", shapeRows},
+    {"inside", insideRows},
+    {"rigid", rigidRows},
+    {"fieldframe", fieldFrameRows},
+    {"proxy", proxyRows},
+    {"coarse", coarseRows},
+    {"bounds", boundsRows},
+    {"continuous", continuousRows},
+    {"validity", validityRows},
+    {"resting", restingRows},
+    {"freemotion", freeMotionRows},
+    {"kept", keptRows},
+    {"options", optionRows},
+    {"queries", spatialRows},
+    {"fields", fieldRows},
+    {"simd", simdRows}};
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  Options options;
-  options.rows.sharedData = PALPATE_SHARED_DATA;
-  options.tables = {"race",       "stages", "frame",      "far",        "rest",
-                    "tool",       "scale",  "steady",     "features",   "lines",
-                    "shapes",     "inside", "rigid",      "fieldframe", "proxy",
-                    "coarse",     "bounds", "continuous", "validity",   "resting",
-                    "freemotion", "kept",   "queries",    "fields",     "simd"};
-  MeasureOptions& measure = options.rows.measure;
+  RowOptions options;
+  options.sharedData = PALPATE_SHARED_DATA;
+  std::vector<std::string> all;
+  for (const auto& [name, rows] : kTables) all.push_back(name);
+  std::vector<std::string> tables = all;
+  std::string csv, commit = "unknown";
   CLI::App app{"Times Palpate and the baselines (Embree, Bullet, FCL, CGAL) on the same frames"};
-  app.add_option("--tables", options.tables,
-                 "some of race, stages, frame, far, rest, tool, scale, "
-                 "steady, features, lines, shapes, inside, rigid, fieldframe, proxy, coarse, "
-                 "bounds, continuous, validity, resting, freemotion, kept, queries, fields, simd")
+  app.add_option("--tables", tables, "default: all, in this order")
       ->delimiter(',')
-      ->check(CLI::IsMember(options.tables));
+      ->check(CLI::IsMember(all));
   app.add_option(
-         "--scenes", options.rows.scenes,
+         "--scenes", options.scenes,
          "scenes of the table race, parts of scenes of the tables bounds, queries and fields; "
          "default: all, but of fields without the bone of a million triangles")
       ->delimiter(',');
-  app.add_option("--engines", options.rows.engines, "parts of engines' names; default: all")
+  app.add_option("--engines", options.engines, "parts of engines' names; default: all")
       ->delimiter(',');
-  app.add_option("--threads", options.rows.threads, "thread counts")->delimiter(',');
-  app.add_option("--frames", options.rows.frames, "frames of each scene; 0: by its size");
-  app.add_option("--repetitions", measure.repetitions, "repetitions of every engine, in turns");
-  app.add_option("--seconds", measure.secondsPerEngine,
+  app.add_option("--threads", options.threads, "thread counts")->delimiter(',');
+  app.add_option("--frames", options.frames, "frames of each scene; 0: by its size");
+  app.add_option("--repetitions", options.measure.repetitions,
+                 "repetitions of every engine, in turns");
+  app.add_option("--seconds", options.measure.secondsPerEngine,
                  "time of one engine after which it gets no more repetitions");
-  app.add_flag("--quick", options.rows.quick, "at most a million triangles, fewer steady frames");
+  app.add_flag("--quick", options.quick, "at most a million triangles, fewer steady frames");
   app.add_flag_callback("--cpu-clock", useCpuClock,
                         "CPU time instead of wall time; for 1 thread on a busy machine");
-  app.add_option("--csv", options.csv, "file to write");
-  app.add_option("--commit", options.commit, "commit named in the report");
-  app.add_option("--shared-data", options.rows.sharedData,
-                 "folder of the published meshes and frames");
+  app.add_option("--csv", csv, "file to write");
+  app.add_option("--commit", commit, "commit named in the report");
+  app.add_option("--shared-data", options.sharedData, "folder of the published meshes and frames");
   CLI11_PARSE(app, count, arguments);
 
-  Report report(options.csv, options.commit, simdPath());
-  const std::map<std::string, void (*)(Report&, const RowOptions&)> tables = {
-      {"stages", stageRows},          {"frame", wholeFrameRows},      {"far", farTriangleRows},
-      {"rest", atRestRows},           {"tool", smallToolRows},        {"scale", scaleRows},
-      {"steady", steadyRows},         {"features", featureRows},      {"lines", lineRows},
-      {"shapes", shapeRows},          {"inside", insideRows},         {"rigid", rigidRows},
-      {"fieldframe", fieldFrameRows}, {"proxy", proxyRows},           {"coarse", coarseRows},
-      {"bounds", boundsRows},         {"continuous", continuousRows}, {"validity", validityRows},
-      {"resting", restingRows},       {"freemotion", freeMotionRows}, {"kept", keptRows},
-      {"queries", spatialRows},       {"fields", fieldRows},          {"simd", simdRows}};
-  for (const std::string& table : options.tables) {
-    if (table == "race")
-      raceRows(report, options);
-    else
-      tables.at(table)(report, options.rows);
-  }
+  Report report(csv, commit, simdPath());
+  for (const auto& [name, rows] : kTables)
+    if (std::find(tables.begin(), tables.end(), name) != tables.end()) rows(report, options);
 }

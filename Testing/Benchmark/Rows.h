@@ -44,9 +44,10 @@ void validityRows(Report&, const RowOptions&);    ///< the share of validity() i
 void restingRows(Report&, const RowOptions&);     ///< a sheet on another, partly fast, or aligned
 void freeMotionRows(Report&, const RowOptions&);  ///< free motion beside Continuous, and its share
 void keptRows(Report&, const RowOptions&);        ///< slow frames with kept candidates
-void spatialRows(Report&, const RowOptions&);     ///< spatial queries beside other libraries
-void fieldRows(Report&, const RowOptions&);       ///< distance fields beside OpenVDB
-void simdRows(Report&, const RowOptions&);        ///< every path that this processor runs
+void optionRows(Report&, const RowOptions&);   ///< options of a pair, cuts, budgets, saved states
+void spatialRows(Report&, const RowOptions&);  ///< spatial queries beside other libraries
+void fieldRows(Report&, const RowOptions&);    ///< distance fields beside OpenVDB
+void simdRows(Report&, const RowOptions&);     ///< every path that this processor runs
 
 /// The number of feature candidates in the step from a workload's first frame to its second.
 std::size_t featureCandidates(const Workload&);
