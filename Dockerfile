@@ -2,6 +2,6 @@
 # `docker run --rm -it -v "$PWD":/palpate palpate CMake/test.sh`.
 FROM debian:12
 COPY CMake/packages.sh /tmp/packages.sh
-RUN bash /tmp/packages.sh build python test && rm -rf /tmp/packages.sh /var/lib/apt/lists/*
+RUN bash /tmp/packages.sh build python test matrix && rm -rf /tmp/packages.sh /var/lib/apt/lists/*
 WORKDIR /palpate
 CMD ["bash"]

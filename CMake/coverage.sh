@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 jobs=$(nproc)
 out=build/coverage
-CMake/packages.sh build test coverage
+CMake/packages.sh build test matrix coverage
 cmake --preset coverage >/dev/null
 cmake --build --preset coverage --parallel "$jobs"
 find $out -name '*.gcda' -delete

@@ -1,6 +1,7 @@
 #!/bin/bash
-# CMake/test.sh: from nothing to tested on Debian 12: packages, the release build, its tests. ctest's summary comes last.
-# CMake/test.sh --all: what CI runs: also the documentation site, the scalar core, sanitizers, ThreadSanitizer, 64-bit ARM.
+# CMake/test.sh: from nothing to tested on Debian 12: packages, the release library with its tests, the Python package, a
+# separate project. ctest's summary comes last.
+# CMake/test.sh --all: what CI runs: also examples, documentation, conventions, scalar code, sanitizers, 64-bit ARM.
 # Every stage runs, also after another one failed. The script fails if any stage failed or did not run. The release tests
 # run last, so that ctest's summary of them is the last thing printed; after a failure, what failed follows it.
 set -uo pipefail
@@ -10,7 +11,7 @@ all=0
 case $*:$# in
   :0) ;;
   --all:1) all=1 ;;
-  *) sed -n '2,3s/^# //p' "${BASH_SOURCE[0]}" >&2; exit 2 ;;
+  *) sed -n '2,4s/^# //p' "${BASH_SOURCE[0]}" >&2; exit 2 ;;
 esac
 jobs=$(nproc)
 tests=$((jobs + 1))  # some wait for a display or a browser
@@ -71,13 +72,15 @@ setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-n
 
 if ((all)); then
   echo "Everything that CI runs comes: one hour to one and a half on two cores. Each stage says when it begins and how long it took."
-  stage packages CMake/packages.sh build python test matrix || exit 1
-  stage documentation CMake/docs.sh
+  stage packages CMake/packages.sh build python test matrix docs || exit 1
 else
-  echo "Packages, the release build and its tests come: about half an hour on two idle cores."
+  echo "Packages, the release library with its tests, and their run come: a quarter of an hour on two idle cores."
   stage packages CMake/packages.sh build python test || exit 1
 fi
-build release
+# Without --all: the tests of modules and packages. `cmake --preset release` alone makes this build complete again.
+modules=(-DPALPATE_BUILD_EXAMPLES=OFF "-DPALPATE_TEST_FOLDERS=C;Consumer;Exact;Fcl;Frame;Golden;Python;Regression;Unit;Vtk")
+((all)) && modules=()
+build release "${modules[@]}"
 if ((all)); then
   # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
   configuration scalar -DBUILD_SHARED_LIBS=OFF

@@ -1,6 +1,7 @@
 #include "NarrowPhase/FeatureStar.h"
 
 #include "Common/FieldMeshes.h"
+#include "Common/Sanitized.h"
 #include "Common/Solids.h"
 #include "Common/StarTruth.h"
 
@@ -111,7 +112,7 @@ TEST(FeatureStar, SaysWhatTheCellsAroundAFeatureSay) {
 TEST(FeatureStar, SaysWhatRaysSayOfConesOfAnyShape) {
   testing::Random random(5);
   int closed = 0;
-  for (int round = 0; round < 20; ++round) {
+  for (int round = 0; round < testing::casesOf(20, 7); ++round) {
     const testing::Mesh mesh = testing::starMesh(random);
     StarAnswers answers(mesh);
     const auto check = [&](const MeshFeature& feature) {
@@ -125,7 +126,7 @@ TEST(FeatureStar, SaysWhatRaysSayOfConesOfAnyShape) {
     for (std::uint32_t e = 0; e < answers.topology().edges.size(); ++e)
       check({MeshFeature::Kind::Edge, e});
   }
-  EXPECT_GT(closed, 1000);
+  EXPECT_GT(closed, static_cast<int>(testing::leastOf(1000, 300)));
 }
 
 }  // namespace
