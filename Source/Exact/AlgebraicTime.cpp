@@ -92,12 +92,6 @@ int signBeforeEnd(const Form<3>& form) {
   return sgn(form[i]);
 }
 
-int signAfterStart(const Form<3>& form) {
-  int i = 0;
-  while (i < 3 && form[i] == 0) ++i;
-  return sgn(form[i]);
-}
-
 void removeRootsAtStart(Form<3>& form) {
   PALPATE_ASSERT(!isZero(form));
   while (form[0] == 0) form = {form[1], form[2], form[3], 0};

@@ -65,6 +65,9 @@ class CubicTime {
   CubicTime(const Form<3>& cubic, int cell, int rising, double lower, double upper);
 
   int sign(const Form<2>&) const;
+  /// Of forms of a higher degree.
+  template <std::size_t N>
+  int sign(const std::array<Integer, N>& form) const;
   double timeLowerBound(double tolerance) const;
 
  private:
@@ -118,6 +121,26 @@ int QuadraticTime::sign(const std::array<Integer, N>& form) const {
   return larger > 0 ? signA : larger < 0 ? signB : 0;
 }
 
+/// The remainder of a division by the cubic has a lower degree, and the form's sign at the root.
+template <std::size_t N>
+int CubicTime::sign(const std::array<Integer, N>& form) const {
+  static_assert(N > 3);
+  std::array<Integer, N - 1> rest;
+  const Integer& leading = form[N - 1];
+  std::size_t degree = 3;
+  if (leading != 0)
+    while (m_cubic[degree] == 0) --degree;
+  PALPATE_ASSERT(degree > 0);
+  const std::size_t shift = N - 1 - degree;
+  for (std::size_t i = 0; i + 1 < N; ++i) {
+    rest[i] = form[i];
+    if (leading == 0) continue;
+    rest[i] *= m_cubic[degree];
+    if (i >= shift) rest[i] -= leading * m_cubic[i - shift];
+  }
+  return leading == 0 ? sign(rest) : sgn(m_cubic[degree]) * sign(rest);
+}
+
 /// The critical points of a cubic strictly inside the step, and the number of critical points
 /// before the step.
 struct CriticalPoints {
@@ -128,8 +151,6 @@ CriticalPoints criticalPoints(const Form<3>&);
 /// The sign of the highest coefficient that is not zero, which is the form's sign just before t =
 /// 1.
 int signBeforeEnd(const Form<3>&);
-/// The sign of the lowest coefficient that is not zero, which is the form's sign just after t = 0.
-int signAfterStart(const Form<3>&);
 /// Divides by t until the form is not zero at 0.
 void removeRootsAtStart(Form<3>&);
 

@@ -233,22 +233,23 @@ ImpactResult find(const ImpactQuery& query, double tolerance, double upTo) {
 }
 
 template <Kind kind>
-Passages findPassagesOf(const ImpactQuery& query, double tolerance) {
+Passages findPassagesOf(const ImpactQuery& query, double tolerance, const Surroundings* around) {
   const RelativeMotion<kind> motion(query);
   if (motion.boxesSeparate()) return {};
   if (const auto found = ImpactSearch<kind>(motion, tolerance).passages()) return *found;
   // Only features that touch can pass.
   const ImpactResult touch = find<kind>(query, tolerance, 1.0);
-  if (touch.impact) return findPassagesExactly(query, tolerance);
+  if (touch.impact) return findPassagesExactly(query, tolerance, around);
   return {{}, 0, touch.exact};
 }
 
 }  // namespace
 
-Passages findPassages(const ImpactQuery& query, double tolerance) {
+Passages findPassages(const ImpactQuery& query, double tolerance, const Surroundings* around) {
   PALPATE_ASSERT(tolerance >= kSmallestTimeTolerance && tolerance <= 1.0);
-  return query.kind == Kind::VertexTriangle ? findPassagesOf<Kind::VertexTriangle>(query, tolerance)
-                                            : findPassagesOf<Kind::EdgeEdge>(query, tolerance);
+  return query.kind == Kind::VertexTriangle
+             ? findPassagesOf<Kind::VertexTriangle>(query, tolerance, around)
+             : findPassagesOf<Kind::EdgeEdge>(query, tolerance, around);
 }
 
 ImpactResult findTouch(const ImpactQuery& query, double tolerance, double upTo) {

@@ -1,13 +1,11 @@
 // Part of Math/ImpactQuery.h: findTouchExactly(), findPassagesExactly().
+#include "Math/ExactMotion.h"
 #include "Math/ImpactQuery.h"
+#include "Math/MovingStar.h"
 #include "Exact/AlgebraicTime.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <cstdint>
-#include <limits>
 #include <optional>
 #include <type_traits>
 
@@ -15,49 +13,11 @@ namespace palpate {
 
 namespace {
 
-using Linear = std::array<Form<1>, 3>;  ///< a vector that moves linearly: its values at 0 and 1
-using Quadratic = std::array<Form<2>, 3>;
-
-/// The number odd · 2^exponent.
-struct Dyadic {
-  double odd = 0;
-  int exponent = 0;
-};
-
-Dyadic dyadic(double value) {
-  if (value == 0.0) return {0, std::numeric_limits<int>::max()};
-  int exponent;
-  const double mantissa = std::ldexp(std::frexp(value, &exponent), 53);
-  const int zeros = std::countr_zero(static_cast<std::uint64_t>(std::abs(mantissa)));
-  return {std::ldexp(mantissa, -zeros), exponent - 53 + zeros};
-}
-
-Linear operator-(const Linear& l, const Linear& r) {
-  Linear difference;
-  for (int k = 0; k < 3; ++k)
-    for (int end = 0; end < 2; ++end) difference[k][end] = l[k][end] - r[k][end];
-  return difference;
-}
-
-void addProduct(Form<2>& sum, const Form<1>& l, const Form<1>& r) {
-  sum[0] += l[0] * r[0];
-  sum[1] += l[0] * r[1];
-  sum[1] += l[1] * r[0];
-  sum[2] += l[1] * r[1];
-}
-
-Form<2> crossComponent(const Linear& l, const Linear& r, int k) {
-  const int i = (k + 1) % 3, j = (k + 2) % 3;
-  Form<2> component{l[i][0] * r[j][0] - l[j][0] * r[i][0], l[i][0] * r[j][1] - l[j][0] * r[i][1],
-                    l[i][1] * r[j][1] - l[j][1] * r[i][1]};
-  component[1] += l[i][1] * r[j][0];
-  component[1] -= l[j][1] * r[i][0];
-  return component;
-}
-
-Form<2> operator-(Form<2> l, const Form<2>& r) {
-  for (int i = 0; i < 3; ++i) l[i] -= r[i];
-  return l;
+template <class Moment>
+bool vanishesAt(const Moment& moment, const Linear& vector) {
+  for (const Form<1>& x : vector)
+    if (moment.sign(multiplied(x)) != 0) return false;
+  return true;
 }
 
 /// A moving point, and the moving end of a segment from the origin. They touch where point = z
@@ -71,7 +31,7 @@ struct PointAndSegment {
       if (moment.sign(crossComponent(point, segment, k)) != 0) return false;
     // With point = z segment this is z (1 - z) |segment|², or -|point|² if the segment is a point.
     Form<2> inside;
-    const Linear rest = segment - point;
+    const Linear rest = difference(segment, point);
     for (int k = 0; k < 3; ++k) addProduct(inside, point[k], rest[k]);
     return moment.sign(inside) >= 0;
   }
@@ -107,7 +67,7 @@ std::optional<double> PointAndSegment::firstTouchAfterStart() const {
   }
   // They are always on one line: the point enters the segment over an end.
   const std::optional<double> first = firstZeroAfterStart(point),
-                              second = firstZeroAfterStart(point - segment);
+                              second = firstZeroAfterStart(difference(point, segment));
   return first && second ? std::min(*first, *second) : first ? first : second;
 }
 
@@ -116,57 +76,43 @@ class ExactQuery {
  public:
   explicit ExactQuery(const ImpactQuery& query);
   std::optional<double> firstTouch(double tolerance) const;
-  Passages passages(double tolerance) const;
+  Passages passages(double tolerance, const Surroundings*) const;
 
  private:
-  Form<3> coplanarity() const;
+  Form<3> coplanarity() const { return dot(m_normal, m_c); }
   template <class Moment>
   bool touchAt(const Moment& moment) const;
   std::vector<PointAndSegment> border() const;
+  template <class Moment>
+  std::optional<int> borderAt(const Moment&) const;
+  template <class Moment>
+  std::array<int, 2> endsAt(const Moment&) const;
+  template <class Moment>
+  std::optional<bool> passageAt(const Moment&, const Form<3>& volume, const Surroundings*) const;
 
-  ImpactQuery::Kind m_kind;
+  const ImpactQuery& m_query;
   Linear m_a, m_b, m_c;
   Quadratic m_normal;  ///< A x B
 };
 
-ExactQuery::ExactQuery(const ImpactQuery& query) : m_kind(query.kind) {
-  Dyadic values[4][2][3];
-  int least = std::numeric_limits<int>::max();
-  for (int vertex = 0; vertex < 4; ++vertex)
-    for (int end = 0; end < 2; ++end)
-      for (int k = 0; k < 3; ++k) {
-        values[vertex][end][k] = dyadic(query.vertices[vertex].at(end)[k]);
-        least = std::min(least, values[vertex][end][k].exponent);
-      }
-  Linear vertices[4];
-  for (int vertex = 0; vertex < 4; ++vertex)
-    for (int end = 0; end < 2; ++end)
-      for (int k = 0; k < 3; ++k) {
-        const auto [odd, exponent] = values[vertex][end][k];
-        vertices[vertex][k][end] = odd;
-        if (odd != 0) vertices[vertex][k][end] <<= exponent - least;
-      }
-  const auto axes = ImpactQuery::axes(m_kind);
-  m_a = vertices[axes[0][0]] - vertices[axes[0][1]];
-  m_b = vertices[axes[1][0]] - vertices[axes[1][1]];
-  m_c = vertices[axes[2][0]] - vertices[axes[2][1]];
-  for (int k = 0; k < 3; ++k) m_normal[k] = crossComponent(m_a, m_b, k);
-}
-
-Form<3> ExactQuery::coplanarity() const {
-  Form<3> sum;
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < 3; ++i) {
-      sum[i] += m_normal[k][i] * m_c[k][0];
-      sum[i + 1] += m_normal[k][i] * m_c[k][1];
-    }
-  return sum;
+ExactQuery::ExactQuery(const ImpactQuery& query) : m_query(query) {
+  std::array<Linear, 4> vertices;
+  toIntegers(query.vertices, vertices);
+  const auto axis = [&](const ImpactQuery::Difference& ids) {
+    return difference(vertices[static_cast<std::size_t>(ids[0])],
+                      vertices[static_cast<std::size_t>(ids[1])]);
+  };
+  const auto axes = ImpactQuery::axes(query.kind);
+  m_a = axis(axes[0]);
+  m_b = axis(axes[1]);
+  m_c = axis(axes[2]);
+  m_normal = cross(m_a, m_b);
 }
 
 std::vector<PointAndSegment> ExactQuery::border() const {
-  if (m_kind == ImpactQuery::Kind::VertexTriangle)
-    return {{m_c, m_a}, {m_c, m_b}, {m_c - m_a, m_b - m_a}};
-  return {{m_c, m_a}, {m_c, m_b}, {m_c - m_b, m_a}, {m_c - m_a, m_b}};
+  if (m_query.kind == ImpactQuery::Kind::VertexTriangle)
+    return {{m_c, m_a}, {m_c, m_b}, {difference(m_c, m_a), difference(m_b, m_a)}};
+  return {{m_c, m_a}, {m_c, m_b}, {difference(m_c, m_b), m_a}, {difference(m_c, m_a), m_b}};
 }
 
 /// Whether C = x A + y B for an (x, y) in the domain, at a moment at which A, B and C are in one
@@ -179,9 +125,10 @@ bool ExactQuery::touchAt(const Moment& moment) const {
     if (side == 0) continue;
     const Form<2> x = crossComponent(m_c, m_b, k), y = crossComponent(m_a, m_c, k);
     if (side * moment.sign(x) < 0 || side * moment.sign(y) < 0) return false;
-    const Form<2> restX = m_normal[k] - x;
-    if (m_kind == ImpactQuery::Kind::VertexTriangle) return side * moment.sign(restX - y) >= 0;
-    return side * moment.sign(restX) >= 0 && side * moment.sign(m_normal[k] - y) >= 0;
+    const Form<2> restX = difference(m_normal[k], x);
+    if (m_query.kind == ImpactQuery::Kind::VertexTriangle)
+      return side * moment.sign(difference(restX, y)) >= 0;
+    return side * moment.sign(restX) >= 0 && side * moment.sign(difference(m_normal[k], y)) >= 0;
   }
   for (const PointAndSegment& side : border())
     if (side.touchAt(moment)) return true;
@@ -213,46 +160,94 @@ std::optional<double> ExactQuery::firstTouch(double tolerance) const {
   return first;
 }
 
-/// The volume A x B · C is positive or negative between its roots. Simple roots change its sign. It
-/// has one multiple root at most, and its signs at both ends tell whether that changes it.
-Passages ExactQuery::passages(double tolerance) const {
+/// The border of the triangle on which the vertex is, at a moment at which it is on the triangle
+/// (Surroundings). None if it is in the interior.
+template <class Moment>
+std::optional<int> ExactQuery::borderAt(const Moment& moment) const {
+  if (vanishesAt(moment, m_c)) return 0;
+  if (vanishesAt(moment, difference(m_c, m_a))) return 1;
+  if (vanishesAt(moment, difference(m_c, m_b))) return 2;
+  constexpr std::array kEdges{3, 5, 4};
+  const std::vector<PointAndSegment> sides = border();
+  for (std::size_t i = 0; i < 3; ++i)
+    if (sides[i].touchAt(moment)) return kEdges[i];
+  return {};
+}
+
+/// The ends of the edges at which they touch, at a moment at which they do (Surroundings).
+template <class Moment>
+std::array<int, 2> ExactQuery::endsAt(const Moment& moment) const {
+  const std::vector<PointAndSegment> sides = border();
+  const auto endAt = [&](std::size_t first, std::size_t second) {
+    if (sides[first].touchAt(moment)) return 0;
+    return sides[second].touchAt(moment) ? 1 : 2;
+  };
+  const std::array<int, 2> ends{endAt(1, 3), endAt(0, 2)};
+  if (ends[0] == 2 || ends[1] == 2) return ends;
+  Linear between = m_c;
+  if (ends[0] == 1) between = difference(between, m_a);
+  if (ends[1] == 1) between = difference(between, m_b);
+  return vanishesAt(moment, between) ? ends : std::array{2, 2};  // along each other
+}
+
+/// A passage at a moment at which the features touch. None if they only touch.
+template <class Moment>
+std::optional<bool> ExactQuery::passageAt(const Moment& moment, const Form<3>& volume,
+                                          const Surroundings* around) const {
+  if (around) {
+    TouchSurroundings near;
+    if (m_query.kind == ImpactQuery::Kind::VertexTriangle) {
+      if (const std::optional<int> border = borderAt(moment)) {
+        around->find({0, *border}, near);
+        return StarTouch(near, around->swapped).passageAt(moment);
+      }
+    } else {
+      const std::array<int, 2> ends = endsAt(moment);
+      around->find(ends, near);
+      if (!near.isAlone) return EdgeTouch(m_query, ends, near, around->swapped).passageAt(moment);
+    }
+  }
+  // A volume of 0 at an end of the step counts as positive.
+  const auto isBehind = [&](int direction) {
+    return hasTime(moment, direction) && signNear(moment, volume, direction) < 0;
+  };
+  const bool before = isBehind(-1), after = isBehind(1);
+  if (before == after) return {};
+  return before;
+}
+
+/// The volume A x B · C is positive or negative between its roots.
+Passages ExactQuery::passages(double tolerance, const Surroundings* around) const {
   Passages found;
   const Form<3> volume = coplanarity();
   if (isZero(volume)) return found;
-  const auto add = [&](double time, bool forward) {
+  const auto take = [&](const auto& moment, auto&& time) {
+    if (!touchAt(moment)) return;
+    const std::optional<bool> forward = passageAt(moment, volume, around);
+    if (!forward) return;
     PALPATE_ASSERT(found.count < 3);
-    found.all[static_cast<std::size_t>(found.count++)] = {time, forward};
+    found.all[static_cast<std::size_t>(found.count++)] = {time(), *forward};
   };
-  int sign = signAfterStart(volume);
-  const int last = signBeforeEnd(volume);
-  if (volume[0] == 0 && sign < 0 && touchAt(StartOfStep{})) add(0.0, false);
-  int simple = 0;
-  anyRootInside(volume, [&]<class Root>(const Root&) {
-    simple += std::is_same_v<Root, CubicTime>;
+  if (volume[0] == 0) take(StartOfStep{}, [] { return 0.0; });
+  anyRootInside(volume, [&](const auto& root) {
+    take(root, [&] {
+      if constexpr (requires { root.timeLowerBound(tolerance); })
+        return root.timeLowerBound(tolerance);
+      else
+        return root.timeLowerBound();
+    });
     return false;
   });
-  const bool multipleChanges = (sign != last) != (simple % 2 == 1);
-  anyRootInside(volume, [&]<class Root>(const Root& root) {
-    constexpr bool kIsSimple = std::is_same_v<Root, CubicTime>;
-    if (!kIsSimple && !multipleChanges) return false;
-    sign = -sign;
-    if (!touchAt(root)) return false;
-    if constexpr (kIsSimple)
-      add(root.timeLowerBound(tolerance), sign > 0);
-    else
-      add(root.timeLowerBound(), sign > 0);
-    return false;
-  });
-  PALPATE_ASSERT(sign == last);
-  if (volume[3] == 0 && sign < 0 && touchAt(EndOfStep{})) add(1.0, true);
+  if (volume[3] == 0) take(EndOfStep{}, [] { return 1.0; });
   return found;
 }
 
 }  // namespace
 
-Passages findPassagesExactly(const ImpactQuery& query, double tolerance) {
+Passages findPassagesExactly(const ImpactQuery& query, double tolerance,
+                             const Surroundings* around) {
   PALPATE_ASSERT(tolerance > 0.0);
-  Passages found = ExactQuery(query).passages(tolerance);
+  Passages found = ExactQuery(query).passages(tolerance, around);
   found.exact = true;
   return found;
 }

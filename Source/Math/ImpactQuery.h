@@ -72,9 +72,13 @@ struct Passages {
   int count = 0;
   bool exact = false;  ///< floating point could not decide
 };
-Passages findPassages(const ImpactQuery&, double tolerance);
-/// The same by exact arithmetic alone.
-Passages findPassagesExactly(const ImpactQuery&, double tolerance);
+struct Surroundings;  // Math/MovingStar.h
+/// around: decides touches at borders for all features that meet there; null: a feature's border
+/// belongs to it.
+Passages findPassages(const ImpactQuery&, double tolerance, const Surroundings* around = nullptr);
+/// findPassages() by exact arithmetic alone.
+Passages findPassagesExactly(const ImpactQuery&, double tolerance,
+                             const Surroundings* around = nullptr);
 
 /// The side of the contact plane on which the first feature last was before the time. 1: the side
 /// of A x B, towards which C points; this is the triangle's winding normal, or (p1 - p0) x (q0 -

@@ -2,8 +2,10 @@
 
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Filters.h"
+#include "NarrowPhase/Surroundings.h"
 #include "Math/PassageFilter.h"
 
+#include <functional>
 #include <utility>
 
 namespace palpate {
@@ -66,12 +68,17 @@ void PassageFinder::find() {
   for (std::size_t lane = 0; lane < count; ++lane) {
     const WaitingPair& features = waiting.pairs[lane];
     Passages passages;
-    if (!(known.isKnown >> lane & 1))
-      passages = findPassages(
-          featuresOf<kind>(m_pair, features.swapped).query(features.firstId, features.secondId),
-          m_tolerance);
-    else if (known.passes >> lane & 1)
+    if (!(known.isKnown >> lane & 1)) {
+      const Features<kind> both = featuresOf<kind>(m_pair, features.swapped);
+      const auto findAround = [&](std::array<int, 2> touch, TouchSurroundings& around) {
+        findSurroundings(both, features.firstId, features.secondId, touch, around);
+      };
+      const Surroundings around{std::ref(findAround), features.swapped};
+      passages =
+          findPassages(both.query(features.firstId, features.secondId), m_tolerance, &around);
+    } else if (known.passes >> lane & 1) {
       passages.all[passages.count++] = {known.times[lane], (known.forward >> lane & 1) != 0};
+    }
     append<kind>(features, passages);
   }
 }

@@ -10,13 +10,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
+#include <iterator>
+#include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 // PairSettings::reportCrossings: exactly the passages that rational arithmetic finds for every two
-// features.
+// features. What touches at borders is decided for all features around them.
 
 namespace palpate {
 namespace {
@@ -160,6 +164,273 @@ TEST(Crossings, AreThoseOfRationalArithmeticOnAGrid) {
     passages += expectCrossings({a, a, grid(a.positions.size()), {}}, 0.0);
   }
   EXPECT_GE(passages, leastOf(1000, 200));
+}
+
+/// Unit cubes of a grid, and the surface of their union.
+struct CubeSolid {
+  static constexpr int kSize = 5;
+  std::array<bool, kSize * kSize * kSize> filled{};
+  Mesh surface;
+
+  bool contains(const std::array<int, 3>& cube) const {
+    std::size_t place = 0;
+    for (const int x : cube) {
+      if (x < 0 || x >= kSize) return false;
+      place = place * kSize + static_cast<std::size_t>(x);
+    }
+    return filled[place];
+  }
+  /// Strictly: what is on the surface is outside.
+  bool isInside(const Vector3d& p) const {
+    for (int lower = 0; lower < 8; ++lower) {
+      std::array<int, 3> cube;
+      for (int k = 0; k < 3; ++k) {
+        const double whole = std::floor(p[k]);
+        cube[static_cast<std::size_t>(k)] =
+            static_cast<int>(whole) - (whole == p[k] && (lower >> k & 1) != 0);
+      }
+      if (!contains(cube)) return false;
+    }
+    return true;
+  }
+  /// Whether each edge has two triangles; else the solid is no closed surface.
+  bool isClosed() const {
+    std::set<std::array<std::uint32_t, 2>> edges;
+    for (const Triangle& t : surface.triangles)
+      for (std::size_t i = 0; i < 3; ++i)
+        if (!edges.insert({t[i], t[(i + 1) % 3]}).second) return false;
+    return true;
+  }
+};
+
+/// A random path of cubes: stairs, saddles, L shapes and holes, in random diagonals and order.
+CubeSolid cubeSolid(Random& random) {
+  CubeSolid solid;
+  std::array<int, 3> at{2, 2, 2};
+  for (std::size_t cubes = 2 + random() % 10; cubes > 0; --cubes) {
+    solid.filled[static_cast<std::size_t>((at[0] * CubeSolid::kSize + at[1]) * CubeSolid::kSize +
+                                          at[2])] = true;
+    int& x = at[random() % 3];
+    x = std::clamp(x + (random() % 2 != 0 ? 1 : -1), 0, CubeSolid::kSize - 1);
+  }
+  std::map<std::array<int, 3>, std::uint32_t> ids;
+  auto& [positions, triangles] = solid.surface;
+  const auto idOf = [&](const std::array<int, 3>& p) {
+    const auto [place, isNew] = ids.try_emplace(p, static_cast<std::uint32_t>(positions.size()));
+    if (isNew) positions.push_back(Vector3d(p[0], p[1], p[2]));
+    return place->second;
+  };
+  for (int cell = 0; cell < CubeSolid::kSize * CubeSolid::kSize * CubeSolid::kSize; ++cell)
+    for (std::size_t side = 0; side < 6; ++side) {
+      const std::array<int, 3> cube{cell / 25, cell / 5 % 5, cell % 5};
+      const std::size_t k = side / 2;
+      std::array<int, 3> next = cube, corner = cube;
+      next[k] += side % 2 != 0 ? 1 : -1;
+      corner[k] += side % 2 != 0 ? 1 : 0;
+      if (!solid.contains(cube) || solid.contains(next)) continue;
+      std::array<std::uint32_t, 4> quad;
+      for (std::size_t i = 0; i < 4; ++i) {
+        std::array<int, 3> p = corner;
+        p[(k + 1) % 3] += i == 1 || i == 2;
+        p[(k + 2) % 3] += i > 1;
+        quad[side % 2 != 0 ? i : 3 - i] = idOf(p);
+      }
+      const std::size_t first = random() % 2;
+      triangles.push_back({quad[first], quad[first + 1], quad[first + 2]});
+      triangles.push_back({quad[first], quad[first + 2], quad[(first + 3) % 4]});
+    }
+  std::shuffle(triangles.begin(), triangles.end(), random);
+  return solid;
+}
+
+/// When the straight way from p to q enters and leaves the solid. Sliding along it is outside.
+std::vector<std::pair<double, bool>> changesOf(const CubeSolid& solid, const Vector3d& p,
+                                               const Vector3d& q) {
+  std::set<double> times{0.0, 1.0};
+  for (int k = 0; k < 3; ++k)
+    for (int plane = 0; plane <= CubeSolid::kSize; ++plane)
+      if (const double time = (plane - p[k]) / (q[k] - p[k]); time > 0.0 && time < 1.0)
+        times.insert(time);
+  std::vector<std::pair<double, bool>> changes;
+  bool isInside = solid.isInside(p);
+  const auto take = [&](double time, bool isInsideNow) {
+    if (isInsideNow != isInside) changes.push_back({time, isInsideNow});
+    isInside = isInsideNow;
+  };
+  for (auto next = std::next(times.begin()); next != times.end(); ++next) {
+    const double time = *std::prev(next);
+    // Equal times may differ by rounding.
+    if (*next - time > 1e-9) take(time, solid.isInside(p + 0.5 * (time + *next) * (q - p)));
+  }
+  take(1.0, solid.isInside(q));
+  return changes;
+}
+
+/// Points and a closed surface on a grid. The solid is sheared, moved and deformed.
+TEST(Crossings, OfAPointAreTheChangesOfInsideAndOutside) {
+  Random random(4);
+  const auto whole = [&](int most) {
+    return Vector3d(Vector3d::NullaryExpr(
+        [&] { return static_cast<double>(random() % (2u * most + 1)) - most; }));
+  };
+  std::size_t changeCount = 0, touchCount = 0;
+  for (int run = 0; run < casesOf(100, 30);) {
+    const CubeSolid solid = cubeSolid(random);
+    if (!solid.isClosed()) continue;
+    const bool deforms = run++ % 4 == 3;
+    Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();
+    if (run % 3 == 1) shape << 2, 1, 0, -1, 2, 1, 0, 1, 3;
+    if (deforms) shape = 4 * Eigen::Matrix3d::Identity();
+    Positions places(80);
+    for (Vector3d& p : places)
+      p = 0.5 * whole(6) + Vector3d::Constant(2.5 + 0.5 * static_cast<double>(random() % 2));
+    Vector3d origin = Vector3d::Zero();
+    const auto placed = [&](const Positions& positions) {
+      Positions all;
+      for (const Vector3d& p : positions) all.push_back(shape * p + origin);
+      return all;
+    };
+    OctreeBasedCD collisions;
+    const GeometryId body = collisions.addTriangleMesh(placed(solid.surface.positions),
+                                                       solid.surface.triangles),
+                     points = collisions.addPointSet(placed(places));
+    collisions.addCollisionPair(points, body,
+                                {.method = Method::Continuous, .reportCrossings = true});
+    collisions.advance();
+    for (int step = 0; step < 5; ++step) {
+      Positions next = places;
+      for (Vector3d& p : next)
+        p = (p + (step == 0 ? 1.0 : 0.5) * whole(step == 0 ? 4 : 1)).cwiseMax(-1.0).cwiseMin(6.0);
+      origin += whole(2);
+      if (deforms)
+        for (int k = 0; k < 3; ++k) shape.col(k) = 4 * Vector3d::Unit(k) + whole(1);
+      collisions.setPositions(body, placed(solid.surface.positions));
+      collisions.setPositions(points, placed(next));
+      collisions.detectCollision();
+      std::vector<std::vector<Crossing>> found(places.size());
+      for (const Crossing& crossing : collisions.collisionData(points, body).crossings())
+        found[crossing.ids[0]].push_back(crossing);
+      for (std::size_t i = 0; i < places.size(); ++i) {
+        std::stable_sort(found[i].begin(), found[i].end(),
+                         [](const Crossing& l, const Crossing& r) { return l.time < r.time; });
+        int sum = 0;
+        for (const Crossing& crossing : found[i]) sum += crossing.forward ? -1 : 1;
+        ASSERT_EQ(sum, solid.isInside(next[i]) - solid.isInside(places[i]))
+            << places[i].transpose() << " to " << next[i].transpose();
+        if (deforms) continue;
+        const auto changes = changesOf(solid, places[i], next[i]);
+        ASSERT_EQ(found[i].size(), changes.size())
+            << places[i].transpose() << " to " << next[i].transpose();
+        for (std::size_t k = 0; k < changes.size(); ++k) {
+          EXPECT_NEAR(found[i][k].time, changes[k].first, 1e-5);
+          EXPECT_EQ(found[i][k].forward, !changes[k].second);
+          touchCount += changes[k].first == 0.0 || changes[k].first == 1.0;
+        }
+        changeCount += changes.size();
+      }
+      places = next;
+      collisions.advance();
+    }
+  }
+  EXPECT_GT(changeCount, leastOf(600, 150));
+  EXPECT_GT(touchCount, leastOf(100, 25));
+}
+
+/// The surface of a cube of a grid, each side of which has so many squares in a row.
+Mesh gridCube(Random& random, double size, int squares) {
+  std::map<std::array<int, 3>, std::uint32_t> ids;
+  Mesh mesh;
+  const auto idOf = [&](std::size_t k, int at, int i, int j) {
+    std::array<int, 3> p;
+    p[k] = at, p[(k + 1) % 3] = i, p[(k + 2) % 3] = j;
+    const auto [place, isNew] =
+        ids.try_emplace(p, static_cast<std::uint32_t>(mesh.positions.size()));
+    if (isNew) mesh.positions.push_back(size / squares * Vector3d(p[0], p[1], p[2]));
+    return place->second;
+  };
+  for (std::size_t k = 0; k < 3; ++k)
+    for (const int at : {0, squares})
+      for (int i = 0; i < squares; ++i)
+        for (int j = 0; j < squares; ++j) {
+          std::array quad{idOf(k, at, i, j), idOf(k, at, i + 1, j), idOf(k, at, i + 1, j + 1),
+                          idOf(k, at, i, j + 1)};
+          if (at == 0) std::swap(quad[1], quad[3]);
+          const std::size_t first = random() % 2;
+          mesh.triangles.push_back({quad[first], quad[first + 1], quad[first + 2]});
+          mesh.triangles.push_back({quad[first], quad[first + 2], quad[(first + 3) % 4]});
+        }
+  return mesh;
+}
+
+/// Whether cubes at a distance, of this size and of size 4 at the origin, overlap on a straight
+/// way.
+bool overlapOnTheWay(double size, const Vector3d& p, const Vector3d& q) {
+  double first = 0.0, last = 1.0;
+  for (int k = 0; k < 3; ++k)
+    for (const double side : {1.0, -1.0}) {
+      // Where start + slope t < 0 the cubes overlap along the axis, on this side.
+      const double start = side > 0 ? p[k] - 4.0 : -p[k] - size, slope = side * (q[k] - p[k]);
+      if (slope == 0.0 && start >= 0.0) return false;
+      if (slope > 0.0) last = std::min(last, -start / slope);
+      if (slope < 0.0) first = std::max(first, -start / slope);
+    }
+  return first < last - 1e-12;
+}
+
+/// A cube, or a thread in it, slides over the sides, edges and corners of another cube.
+TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
+  Random random(6);
+  const auto whole = [&](int least, int most) {
+    return least + static_cast<int>(random() % static_cast<unsigned>(most - least + 1));
+  };
+  std::size_t touching = 0;
+  for (int run = 0; run < casesOf(90, 18); ++run) {
+    const double size = 2.0 * whole(1, 3);
+    TestGeometry table = testGeometry(gridCube(random, 4.0, whole(1, 2))),
+                 body = testGeometry(gridCube(random, size, whole(1, 2)));
+    if (run % 3 == 2) {
+      body = {GeometryType::Lines, {}, {}, {}, {0.0}};
+      for (std::uint32_t i = 0; i < 4; ++i) {
+        body.positions.push_back(size * Vector3d(whole(0, 1), whole(0, 1), whole(0, 1)));
+        if (i > 0) body.segments.push_back({i - 1, i});
+      }
+    }
+    Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();
+    if (run % 3 == 1) shape << 1, 2, 0, 0, 1, -1, 1, 0, 1;
+    if (shape.determinant() < 0) shape = -shape;
+    const Positions positions = body.positions;
+    const auto place = [&](const Vector3d& at) {
+      for (std::size_t i = 0; i < positions.size(); ++i)
+        body.positions[i] = shape * (positions[i] + at);
+    };
+    for (Vector3d& p : table.positions) p = shape * p;
+    Vector3d at(whole(-4, 4), whole(-4, 4), 4);
+    place(at);
+    OctreeBasedCD collisions;
+    GeometryId a = body.addTo(collisions), b = table.addTo(collisions);
+    const GeometryId moving = a;
+    if (run % 2 != 0) std::swap(a, b);
+    collisions.addCollisionPair(a, b, {.method = Method::Continuous, .reportCrossings = true});
+    collisions.advance();
+    for (int step = 0; step < 40; ++step) {
+      Vector3d next = at + Vector3d(whole(-3, 3), whole(-3, 3), whole(-3, 3));
+      if (random() % 3 != 0) {  // along a side
+        const int axis = whole(0, 2);
+        next[axis] = at[axis];
+      }
+      next = next.cwiseMax(-size - 1.0).cwiseMin(5.0);
+      if (overlapOnTheWay(size, at, next)) continue;
+      at = next;
+      place(at);
+      collisions.setPositions(moving, body.positions);
+      collisions.detectCollision();
+      const CollisionData& data = collisions.collisionData(a, b);
+      touching += !data.vertexTriangle().empty() || !data.edgeEdge().empty();
+      ASSERT_TRUE(data.crossings().empty()) << "run " << run << ", at " << at.transpose();
+      collisions.advance();
+    }
+  }
+  EXPECT_GT(touching, leastOf(300, 40));
 }
 
 TEST(Crossings, NeedContinuousWithContacts) {
