@@ -11,6 +11,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -45,6 +47,22 @@ using Contents = CollisionData::Contents;
 /// On which side each of a contact's four vertices is: 0, the pair's first geometry, or 1.
 using Sides = std::array<std::size_t, 4>;
 constexpr Sides kVertexOfFirst{0, 1, 1, 1}, kVertexOfSecond{1, 0, 0, 0}, kEdges{0, 0, 1, 1};
+
+/// What each row of a contact with vertices on both sides says at the step's end at least, in the
+/// order of the rows.
+class EndGaps {
+ public:
+  explicit EndGaps(const Contents* contents)
+      : m_gaps(contents ? std::span<const double>(contents->step.endGaps)
+                        : std::span<const double>()) {}
+  double next() {
+    return m_next < m_gaps.size() ? m_gaps[m_next++] : -std::numeric_limits<double>::infinity();
+  }
+
+ private:
+  const std::span<const double> m_gaps;
+  std::size_t m_next = 0;
+};
 
 /// Appends the rows of all lists. first: the solver's numbers of vertex 0 of both sides.
 /// of(contact, normal, stencil, sides): the offset of a contact with vertices on both sides.
@@ -86,7 +104,7 @@ void addRows(const CollisionData& contacts, const std::array<std::uint32_t, 2>& 
   }
 }
 
-/// The weighted sum of a contact's positions at its time. at(side, vertex): those before and now.
+/// The weighted sum of positions at a time. at(side, vertex): those before and now.
 template <class At>
 Vector3d sumOf(const Stencil& stencil, const Sides& sides, double time, At&& at) {
   Vector3d sum = Vector3d::Zero();
@@ -121,17 +139,21 @@ bool isInStep(const PairRecord& record) {
 /// The offsets of rows with the positions of a pair's step. isInStep().
 class StepOffsets {
  public:
-  StepOffsets(const PairRecord& record, bool elementsOfSecond)
-      : m_sides{record.a, record.b}, m_body(motionOf(*m_sides[elementsOfSecond ? 0 : 1])) {}
+  StepOffsets(const PairRecord& record, const Contents& contents)
+      : m_sides{record.a, record.b},
+        m_body(motionOf(*m_sides[contents.step.elementsOfSecond ? 0 : 1])),
+        m_endGaps(&contents) {}
 
   double operator()(const auto& contact, const Vector3d& normal, const Stencil& stencil,
-                    const Sides& sides) const {
+                    const Sides& sides) {
     const auto at = [&](std::size_t side, std::uint32_t vertex) {
       const Geometry& geometry = *m_sides[side];
       return std::pair<Vector3d, Vector3d>(geometry.body.mesh.before[vertex],
                                            geometry.step.detected()[vertex]);
     };
-    return normal.dot(sumOf(stencil, sides, contact.timeOfImpact, at)) - contact.distance;
+    const double offset =
+        normal.dot(sumOf(stencil, sides, contact.timeOfImpact, at)) - contact.distance;
+    return std::min(offset, normal.dot(sumOf(stencil, sides, 1.0, at)) - m_endGaps.next());
   }
   double operator()(const ShapeContact& contact, const Vector3d& normal) const {
     return offsetOf(contact, normal, m_body);
@@ -144,6 +166,7 @@ class StepOffsets {
 
   std::array<const Geometry*, 2> m_sides;
   RigidMotion m_body;
+  EndGaps m_endGaps;
 };
 
 /// Throws unless the offset of a row is a sum of radii, which is the law of contacts.
@@ -168,7 +191,7 @@ void keepOffsets(Contents& contents) {
   const PairRecord* const record = std::exchange(contents.step.record, nullptr);
   if (!record || !isInStep(*record)) return;
   const StandardFloatingPoint standard;
-  const StepOffsets offsets(*record, contents.step.elementsOfSecond);
+  StepOffsets offsets(*record, contents);
   CountedVector<double>& kept = contents.step.offsets;
   kept.clear();
   kept.reserve(sizeOf(contents));
@@ -211,8 +234,11 @@ void CollisionData::appendRows(std::vector<ConstraintRow>& rows, std::uint32_t f
                     " is over: call it, or copy the CollisionData, after the detection and before "
                     "advance()",
                 step.record->pair.a);
-  const StepOffsets offsets(*step.record, step.elementsOfSecond);
-  addRows(*this, first, sideOfElements, rows, offsets, offsets);
+  StepOffsets offsets(*step.record, read());
+  const auto ofShape = [&](const ShapeContact& contact, const Vector3d& normal) {
+    return offsets(contact, normal);
+  };
+  addRows(*this, first, sideOfElements, rows, offsets, ofShape);
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
@@ -230,6 +256,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                 {}, vertex);
   };
   const Contents* const contents = Contents::in(contacts);
+  EndGaps endGaps(contents);
   const auto of = [&](const auto& contact, const Vector3d& normal, const Stencil& s,
                       const Sides& sides) {
     double largest = 0.0, moved = 0.0;
@@ -246,7 +273,8 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
     }
     checkOffset(contents->step, contents->errorBound, contact.normal.dot(sum) - contact.distance,
                 largest, moved, s.vertices[0]);
-    return normal.dot(sum) - contact.distance;
+    return std::min(normal.dot(sum) - contact.distance,
+                    normal.dot(sumOf(s, sides, 1.0, at)) - endGaps.next());
   };
   const auto isEmpty = [](const SolverVertices& side) {
     return side.before.empty() && side.now.empty();

@@ -42,6 +42,8 @@ void PairResults::sortFacts(const PairRecord& record) {
   const TriangleMesh &a = record.a->body.mesh, &b = record.b->body.mesh;
   sortUnique(m_facts.verticesA, a.now.size(), m_flags);
   sortUnique(m_facts.verticesB, b.now.size(), m_flags);
+  sortUnique(m_facts.metA, a.now.size(), m_flags);
+  sortUnique(m_facts.metB, b.now.size(), m_flags);
   sortUnique(m_facts.degenerateA, a.topology.elements.size(), m_flags);
   sortUnique(m_facts.degenerateB, b.topology.elements.size(), m_flags);
 }
@@ -66,8 +68,9 @@ void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& stati
 
 void PairResults::keepFirstImpacts(PairRecord& record, double end) {
   const MeshPair pair = record.meshes();
-  if (pair.reportsDistinct())
-    m_firstImpacts.keep(pair, end, m_orderScratch, CollisionData::Contents::of(record.next));
+  if (!pair.reportsDistinct()) return;
+  const MetVertices met{m_facts.metA, pair.self() ? m_facts.metA : m_facts.metB};
+  m_firstImpacts.keep(pair, end, met, m_orderScratch, CollisionData::Contents::of(record.next));
 }
 
 void keepDistinct(const PairRecord& record, DistinctContacts& distinct,
@@ -97,6 +100,7 @@ void describeExact(CollisionData::Contents& contents) {
   validity.nearThreshold.clear();
   validity.unreliableSign.clear();
   validity.proxyDepth = contents.errorBound = 0.0;
+  contents.step.endGaps.clear();
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {

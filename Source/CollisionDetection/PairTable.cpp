@@ -191,6 +191,7 @@ void PairRecord::followSides() {
   if (!sides) return;
   sides->follow(meshes(), contents.crossings);
   sides->apply(meshes(), contents);
+  if (sides->changesContacts()) contents.step.endGaps.clear();
   countContacts(sizeOf(contents), contents);
   if (!pair.settings.reportCrossings) contents.crossings.clear();
 }

@@ -21,7 +21,7 @@ namespace {
 using namespace description;
 
 constexpr std::string_view kStateTitle = "palpate-state";
-constexpr std::uint32_t kStateVersion = 2;
+constexpr std::uint32_t kStateVersion = 3;
 
 using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;
@@ -200,6 +200,10 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
   all(ContactKind::EdgeEdge, c.edgeEdge, c.tracked.edgeEdge);
   all(ContactKind::Shape, c.shape, c.tracked.shape);
   all(ContactKind::ShapeShape, c.shapeShape, c.tracked.shapeShape);
+  file.need(c.step.endGaps.empty() || c.step.endGaps.size() == c.vertexTriangle.size() +
+                                                                   c.triangleVertex.size() +
+                                                                   c.edgeEdge.size(),
+            "a list of gaps is too short or too long");
   beside(c.smooth.vertexTriangle, c.vertexTriangle);
   beside(c.smooth.triangleVertex, c.triangleVertex);
   beside(c.smooth.edgeEdge, c.edgeEdge);
@@ -228,6 +232,7 @@ void describeContents(File& file, Contents& c) {
   lists(29, c.crossings, c.rememberedSides);
   fieldOf(file, t.elementsOfSecond);
   fieldOf(file, c.step.elementsOfSecond);
+  itemsOf(file, c.step.endGaps, sizeof(double), [&](double& gap) { file.real(gap); });
   for (auto& list : c.tags)
     itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
   auto& s = c.smooth;

@@ -6,10 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <tuple>
 #include <type_traits>
+#include <vector>
 
 namespace palpate {
 
@@ -20,78 +23,118 @@ bool keepsDistinctImpacts(const MeshPair& meshes) {
          (meshes.settings.method == Method::Continuous || meshes.step.reportsImpacts);
 }
 
-/// Contacts::Distinct for impacts of lines and points: drops excluded impacts for which others
-/// stand. Computes all impacts of their vertices and edges.
+/// Contacts with this time or a later one are those of the step's end.
+double endOfImpacts(const MeshPair& meshes) {
+  return meshes.settings.method == Method::Continuous ? std::numeric_limits<double>::infinity()
+                                                      : 1.0;
+}
+
+/// Contacts::Distinct for impacts: drops excluded impacts for which others stand. Computes all
+/// impacts of the elements that may be held.
 class ExcludedByBruteForce {
  public:
   explicit ExcludedByBruteForce(const MeshPair& meshes) : m_meshes(meshes), m_rule(meshes) {}
 
-  bool isDropped(const VertexTriangleContact& c, bool swapped) {
-    if (!m_rule.isExcluded(c, swapped)) return false;
-    m_ofVertices.clear();
-    addImpactsOf(c.vertex, swapped);
-    return m_rule.isReplaced(c, swapped, [&](auto&& f) { return anyOfVertices(swapped, f); });
-  }
-  bool isDropped(const EdgeEdgeContact& c) {
-    if (!m_rule.isExcluded(c)) return false;
-    const bool swapped = m_rule.linesAreSecond();
-    const Segment& edge = m_rule.lineEdge(c);
-    m_ofVertices.clear();
-    for (const std::uint32_t end : edge) addImpactsOf(end, swapped);
-    findImpactsOf(edge);
-    return m_rule.isReplaced(c, [&](auto&& f) {
-      return std::any_of(
-                 m_ofEdge.edgeEdge.begin(), m_ofEdge.edgeEdge.end(),
-                 [&](const auto& s) { return !m_rule.isExcluded(s) && f(s, m_rule.planeOf(s)); }) ||
-             anyOfVertices(swapped, f);
+  bool isDropped(const SidedImpact& c) {
+    return m_rule.isExcluded(c) && m_rule.anyHeldSide(c, [&](std::size_t side) {
+      const std::vector<Holder> holders = holdersOf(c.elements[side], side);
+      const auto planeOf = [&](const Holder& holder) {
+        return m_rule.planeOf(holder.impact, holder.side);
+      };
+      const auto lowestGap = [&](const TangentPlane& plane) {
+        double gap = plane.gap;
+        for (const Holder& holder : holders)
+          if (plane.isSameAs(planeOf(holder))) gap = std::min(gap, planeOf(holder).gap);
+        return gap;
+      };
+      ExcludedImpacts::Held held(m_rule, c, side);
+      return std::any_of(holders.begin(), holders.end(), [&](const Holder& s) {
+        return held.isBeside(planeOf(s)) &&
+               held.isReplacedBy(s.impact, s.side, planeOf(s), lowestGap);
+      });
     });
   }
 
  private:
-  template <class F>
-  bool anyOfVertices(bool swapped, F&& f) const {
-    const auto& impacts = swapped ? m_ofVertices.triangleVertex : m_ofVertices.vertexTriangle;
-    return std::any_of(impacts.begin(), impacts.end(), [&](const auto& s) {
-      return !m_rule.isExcluded(s, swapped) && f(s, m_rule.planeOf(s, swapped));
-    });
+  struct Holder {
+    SidedImpact impact;
+    std::size_t side;
+  };
+
+  /// All impacts that are not excluded and hold the element or a part of it.
+  std::vector<Holder> holdersOf(const ImpactElement& held, std::size_t side) {
+    m_found.clear();
+    const MeshTopology& topology = (side == 0 ? m_meshes.a : m_meshes.b).topology;
+    for (const std::uint32_t vertex : held.vertices()) addOfVertex(vertex, side);
+    for (std::size_t i = 0; i < held.size; ++i)
+      for (std::size_t j = 0; j < held.size; ++j)
+        if (held.ids[i] < held.ids[j])
+          if (const auto e = topology.edgeOf({held.ids[i], held.ids[j]}); e != kNoEdge)
+            addOfEdge(e, side);
+    if (held.size == 3)
+      for (const std::uint32_t t : topology.vertexTriangles[held.ids[0]])
+        if (ImpactElement(topology.elements[t]).isIn(held)) addOfTriangle(t, side);
+    std::vector<Holder> holders;
+    const auto add = [&](const SidedImpact& impact) {
+      if (m_rule.isExcluded(impact)) return;
+      m_rule.anyHeldSide(impact, [&](std::size_t own) {
+        if ((own == side || m_meshes.self()) && impact.elements[own].isIn(held))
+          holders.push_back({impact, own});
+        return false;
+      });
+    };
+    for (const auto& c : m_found.vertexTriangle) add(SidedImpact(c, false));
+    for (const auto& c : m_found.triangleVertex) add(SidedImpact(c, true));
+    for (const auto& c : m_found.edgeEdge) add(SidedImpact(c));
+    return holders;
   }
-  void addImpactsOf(std::uint32_t vertex, bool swapped) {
-    const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? m_meshes.b : m_meshes.a,
-                                                               swapped ? m_meshes.a : m_meshes.b};
-    const MeshTopology& others = (swapped ? m_meshes.a : m_meshes.b).topology;
+  void addOfVertex(std::uint32_t vertex, std::size_t side) {
+    const MeshTopology& others = (side == 0 ? m_meshes.b : m_meshes.a).topology;
     for (std::uint32_t t = 0; t < others.elements.size(); ++t)
-      if (others.isEnabled(t) && !m_meshes.excludesVertex(vertex, t))
-        addImpact(m_meshes, features, vertex, t, swapped, m_ofVertices);
+      if (others.isEnabled(t)) add(vertex, t, side == 1 && !m_meshes.self());
   }
-  /// Of an edge of a line near a triangle mesh.
-  void findImpactsOf(const Segment& edge) {
-    const bool second = m_rule.linesAreSecond();
+  void addOfTriangle(std::uint32_t triangle, std::size_t side) {
+    const MeshTopology& others = (side == 0 ? m_meshes.b : m_meshes.a).topology;
+    for (std::uint32_t v = 0; v < others.vertexCount; ++v)
+      if (!others.vertexTriangles[v].empty()) add(v, triangle, side == 0 && !m_meshes.self());
+  }
+  void addOfEdge(std::uint32_t edge, std::size_t side) {
     const Features<ImpactQuery::Kind::EdgeEdge> features{m_meshes.a, m_meshes.b};
-    const std::uint32_t line = (second ? m_meshes.b : m_meshes.a).topology.edgeOf(edge);
-    const MeshTopology& others = (second ? m_meshes.a : m_meshes.b).topology;
-    m_ofEdge.clear();
-    for (std::uint32_t other = 0; other < others.edges.size(); ++other)
-      if (!others.edgeTriangles[other].empty())
-        addImpact(m_meshes, features, second ? other : line, second ? line : other, false,
-                  m_ofEdge);
+    const MeshTopology& others = (side == 0 ? m_meshes.b : m_meshes.a).topology;
+    for (std::uint32_t other = 0; other < others.edges.size(); ++other) {
+      if (others.edgeTriangles[other].empty() || m_meshes.excludesEdges(edge, other)) continue;
+      const bool swap = m_meshes.self() ? others.precedes(other, edge) : side == 1;
+      addImpact(m_meshes, features, swap ? other : edge, swap ? edge : other, false, m_found);
+    }
+  }
+  /// swapped: the vertex is of MeshPair::b.
+  void add(std::uint32_t vertex, std::uint32_t triangle, bool swapped) {
+    const TriangleMesh &own = swapped ? m_meshes.b : m_meshes.a,
+                       &others = swapped ? m_meshes.a : m_meshes.b;
+    if (!areTested(own.topology, others.topology, !swapped) ||
+        m_meshes.excludesVertex(vertex, triangle))
+      return;
+    addImpact(m_meshes, Features<ImpactQuery::Kind::VertexTriangle>{own, others}, vertex, triangle,
+              swapped, m_found);
   }
 
   const MeshPair& m_meshes;
   const ExcludedImpacts m_rule;
-  ContactBuffers m_ofVertices, m_ofEdge;
+  ContactBuffers m_found;
 };
+
+SidedImpact sided(const VertexTriangleContact& c, int list) { return {c, list == 1}; }
+SidedImpact sided(const EdgeEdgeContact& c, int) { return SidedImpact(c); }
 
 }  // namespace
 
 void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expected) {
-  if (!keepsDistinctImpacts(meshes) || !ExcludedImpacts(meshes).mayExclude()) return;
+  if (!keepsDistinctImpacts(meshes)) return;
+  const double end = endOfImpacts(meshes);
   ExcludedByBruteForce excluded(meshes);
   forEachImpactList(expected, [&](auto& contacts, int list) {
     std::erase_if(contacts, [&](const auto& contact) {
-      if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
-        return excluded.isDropped(contact);
-      else
-        return excluded.isDropped(contact, list == 1);
+      return contact.timeOfImpact < end && excluded.isDropped(sided(contact, list));
     });
   });
 }
@@ -99,8 +142,7 @@ void dropExcludedImpacts(const MeshPair& meshes, CollisionData::Contents& expect
 void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
                          CollisionData::Contents& expected) {
   if (!keepsDistinctImpacts(meshes)) return;
-  const double end =
-      meshes.settings.method == Method::Continuous ? std::numeric_limits<double>::infinity() : 1.0;
+  const double end = endOfImpacts(meshes);
   using Rank = std::tuple<double, int, std::array<std::uint32_t, 4>>;
   const auto rankOf = [](const auto& contact, int list) -> Rank {
     if constexpr (std::is_same_v<decltype(contact), const EdgeEdgeContact&>)
@@ -139,6 +181,7 @@ void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
   };
   // Brute force may find a contact at the step's end that Auto reports by its impact. Auto may then
   // drop this impact.
+  ExcludedByBruteForce excluded(meshes);
   const auto isDroppedImpact = [&](const auto& contact, int list) {
     if (contact.timeOfImpact < end) return false;
     ContactBuffers impact;
@@ -154,7 +197,9 @@ void dropRepeatedImpacts(const MeshPair& meshes, const CollisionData& answer,
     }
     bool dropped = false;
     forEachImpactList(impact, [&](const auto& contacts, int of) {
-      for (const auto& found : contacts) dropped |= isDropped(found, of);
+      for (const auto& found : contacts)
+        dropped |= isDropped(found, of) ||
+                   (found.timeOfImpact < end && excluded.isDropped(sided(found, of)));
     });
     return dropped;
   };

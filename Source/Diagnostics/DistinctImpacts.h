@@ -9,7 +9,7 @@ namespace palpate {
 // Contacts::Distinct for impacts, as an audit expects it of ExcludedImpacts and FirstImpacts.
 // Without effect on pairs that report no impacts.
 
-/// Drops excluded impacts of lines and points for which others stand.
+/// Drops excluded impacts for which others stand.
 void dropExcludedImpacts(const MeshPair&, CollisionData::Contents& expected);
 /// Drops contacts for which an earlier contact is kept. The earlier contact is either expected,
 /// too, or in the answer if the sample does not cover it.

@@ -37,10 +37,15 @@ bool hasRidge(const TriangleMesh& mesh, const Segment& feature, const Vector3d& 
   const std::uint32_t p = feature[0], q = feature[1];
   const auto around = mesh.topology.vertexTriangles[p];
   if (p == q)
-    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+    return std::any_of(around.begin(), around.end(), [&](const std::uint32_t& triangle) {
       const Triangle& corners = mesh.topology.elements[triangle];
       return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
-        return corner != p && hasRidge(mesh, {p, corner}, direction, length, thickness);
+        // Each edge once.
+        const bool isKnown = std::any_of(around.data(), &triangle, [&](std::uint32_t earlier) {
+          const Triangle& its = mesh.topology.elements[earlier];
+          return std::find(its.begin(), its.end(), corner) != its.end();
+        });
+        return corner != p && !isKnown && hasRidge(mesh, {p, corner}, direction, length, thickness);
       });
     });
   const Vector3d along = (mesh.now[q] - mesh.now[p]).stableNormalized();

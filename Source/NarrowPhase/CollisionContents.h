@@ -49,6 +49,9 @@ struct CollisionData::Contents : CountedObject {
     /// Of a copy: the offset of each row, if the step was not over.
     bool hasOffsets = false;
     CountedVector<double> offsets{};
+    /// L: per contact of vertexTriangle, triangleVertex and edgeEdge, what its row says at the
+    /// step's end at least (FirstImpacts). Empty: nothing.
+    CountedVector<double> endGaps{};
   } step{};
 
   /// Null if `data` has none.

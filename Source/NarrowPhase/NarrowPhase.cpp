@@ -15,7 +15,8 @@ void StepFacts::clear() {
   gapAtStart = std::numeric_limits<double>::infinity();
   atStart = Meeting::Apart;
   sideUnknown = false;
-  for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB}) list->clear();
+  for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB, &metA, &metB})
+    list->clear();
 }
 
 void StepFacts::add(const StepFacts& other) {
@@ -24,7 +25,7 @@ void StepFacts::add(const StepFacts& other) {
   atStart = std::max(atStart, other.atStart);
   sideUnknown |= other.sideUnknown;
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
-                    &StepFacts::degenerateB})
+                    &StepFacts::degenerateB, &StepFacts::metA, &StepFacts::metB})
     (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
 }
 

@@ -2,6 +2,7 @@
 
 #include "Math/ClosestPoint.h"
 #include "Math/MotionBound.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
@@ -28,35 +29,82 @@ bool StepCheck::addImpactIfTouched(const Features<kind>& features, std::uint32_t
   if (m_pair.step.reportsImpacts)
     return addImpact(m_pair, features, firstId, secondId, swapped, m_out);
   m_out.facts.clearance = 0.0;
-  recordVertices(features, firstId, secondId);
+  recordVertices(features, firstId, secondId, m_out.facts.verticesA, m_out.facts.verticesB);
   return false;
 }
 
 template <Kind kind>
 void StepCheck::recordVertices(const Features<kind>& features, std::uint32_t firstId,
-                               std::uint32_t secondId) {
+                               std::uint32_t secondId, Buffer<std::uint32_t>& listA,
+                               Buffer<std::uint32_t>& listB) {
   const auto vertices = features.vertices(firstId, secondId);
   for (int i = 0; i < 4; ++i) {
     const bool ofB = !m_pair.self() && &features.meshOf(i) == &m_pair.b;
-    (ofB ? m_out.facts.verticesB : m_out.facts.verticesA).push_back(vertices[i]);
+    (ofB ? listB : listA).push_back(vertices[i]);
   }
+}
+
+/// Whether a plane with this normal separates the features by the distance at a time of the step.
+/// The normal leads from the second feature to the first.
+template <Kind kind>
+static bool isSeparating(const ImpactQuery& query, double time, const Vector3d& normal,
+                         double distance) {
+  constexpr int kFirst = kind == Kind::VertexTriangle ? 1 : 2;
+  for (int i = 0; i < kFirst; ++i)
+    for (int j = kFirst; j < 4; ++j) {
+      const auto &p = query.vertices[i], &q = query.vertices[j];
+      const Vector3d between = (1.0 - time) * (p.before - q.before) + time * (p.now - q.now);
+      const double error = kMotionError * (between.lpNorm<1>() + (p.now - q.now).lpNorm<1>() +
+                                           (p.before - q.before).lpNorm<1>());
+      if (!(normal.dot(between) > (distance + error) * normal.norm())) return false;
+    }
+  return true;
+}
+
+/// Whether features may come within their radii after a time of the step. They do not if one plane
+/// separates them at that time and at the step's end: the vertices move in straight lines.
+template <Kind kind>
+static bool mayMeet(const ImpactQuery& query, double time, const Vector3d& difference, double radii,
+                    double timeTolerance) {
+  const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].now; };
+  Vector3d atEnd;
+  if constexpr (kind == Kind::VertexTriangle)
+    atEnd = finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).difference;
+  else
+    atEnd = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).difference;
+  const Vector3d u = stableUnit(difference), v = stableUnit(atEnd);
+  for (const Vector3d& normal : {Vector3d(u + v), v, u})
+    if (isSeparating<kind>(query, time, normal, radii) &&
+        isSeparating<kind>(query, 1.0, normal, radii))
+      return false;
+  TimeOfImpactSettings settings;
+  settings.minimumDistance = radii;
+  settings.timeTolerance = timeTolerance;
+  return findImpact(query, settings).impact;
 }
 
 template <Kind kind>
 void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t firstId,
-                             std::uint32_t secondId, double time, double distance) {
+                             std::uint32_t secondId, double time, double distance,
+                             const Vector3d& difference) {
   const StepPlan& step = m_pair.step;
   PALPATE_ASSERT(time >= 0.0 && time <= 1.0 && distance >= 0.0);
   const double rounding = step.motionWithRounding - step.motion;
   double &clearance = m_out.facts.clearance, &gap = m_out.facts.gapAtStart;
   if (time == 0.0)
     gap = std::min(gap, distance - (m_pair.a.largestRadius + m_pair.b.largestRadius) - rounding);
-  if (clearance == 0.0 && !step.reportsImpacts) return;
+  const double radii = m_pair.a.largestRadius + m_pair.b.largestRadius;
   double left = (1.0 - time) * step.motion + rounding;
+  if (m_pair.reportsDistinct() && distance <= left + radii &&
+      mayMeet<kind>(features.query(firstId, secondId), time, difference, radii,
+                    m_pair.settings.continuous.timeTolerance))
+    recordVertices(features, firstId, secondId, m_out.facts.metA, m_out.facts.metB);
+  if (clearance == 0.0 && !step.reportsImpacts) return;
   if (distance <= left)
     left = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
   clearance = std::min(clearance, std::max(0.0, distance - left));
-  if (step.reportsImpacts && distance <= left) recordVertices(features, firstId, secondId);
+  if (step.reportsImpacts && distance <= left)
+    recordVertices(features, firstId, secondId, m_out.facts.verticesA, m_out.facts.verticesB);
 }
 
 void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
@@ -129,9 +177,9 @@ void StepCheck::recordEdges(const Segment& p, const Segment& q) {
 }
 
 template void StepCheck::recordImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
-                                      std::uint32_t, double, double);
+                                      std::uint32_t, double, double, const Vector3d&);
 template void StepCheck::recordImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
-                                      double, double);
+                                      double, double, const Vector3d&);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                             std::uint32_t, bool, double);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::EdgeEdge>&, std::uint32_t,

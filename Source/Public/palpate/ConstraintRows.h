@@ -19,9 +19,11 @@ namespace palpate {
 /// Normal   the smooth one of a pair with PairSettings::smoothNormals, else the contact's.
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
 ///          plus the element's radius; p is the shape's touched point, where it is at the step's
-///          end.
-/// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
-///          on by d until the step's end.
+///          end. With Contacts::Distinct, two geometries with vertices and a timeOfImpact before
+///          the end it may be less: the gap at `now` is then the least distance at `now` of the
+///          features for which the contact stands. Their vertices meet nothing in the step.
+/// Laws     (1) at timeOfImpact the gap is the contact's distance, or more where the offset is less;
+///          less normal . d if a shape moves on by d until the step's end.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. It is also the distance's,
 ///          unless radii differ along an element, the centres coincide, or normals are smooth.
 ///          (3) a step along this row alone, by inverse masses, to a gap g > 0 gives the signed
