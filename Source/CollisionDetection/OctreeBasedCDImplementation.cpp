@@ -308,7 +308,9 @@ void OctreeBasedCD::Implementation::followSides() {
     own.pair.settings.thickness = own.pair.settings.freeMotionReach = 0.0;
     own.pair.settings.reportCrossings = true;
     own.pair.settings.rememberSides = own.pair.settings.smoothNormals = false;
-    own.support = record->support;
+    own.pair.settings.method = Method::Continuous;  // not Auto, which looks for more than passages
+    own.support = supportOf(Method::Continuous, own.a->body.mesh.topology.type,
+                            own.b->body.mesh.topology.type, own.a == own.b);
     own.settingsRevision = record->settingsRevision;
     own.dataVersion.invalidate();
   }

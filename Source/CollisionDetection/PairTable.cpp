@@ -190,9 +190,14 @@ void PairRecord::followSides() {
   contents.rememberedSides.clear();
   if (!sides) return;
   sides->follow(meshes(), contents.crossings);
+  const bool anyAtEnd = contents.validity.atEnd > 0;
   sides->apply(meshes(), contents);
   if (sides->changesContacts()) contents.step.endGaps.clear();
-  countContacts(sizeOf(contents), contents);
+  std::size_t atImpact = 0;
+  forEachTimed(contents, [&](const auto& contacts) {
+    for (const auto& contact : contacts) atImpact += !anyAtEnd || contact.timeOfImpact < 1.0;
+  });
+  countContacts(atImpact, contents);
   if (!pair.settings.reportCrossings) contents.crossings.clear();
 }
 

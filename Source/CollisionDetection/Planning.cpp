@@ -18,8 +18,8 @@ bool mayUseProxy(const PairRecord& record) {
   const Geometry &a = *record.a, &b = *record.b;
   const double reach = settings.thickness + a.body.mesh.largestRadius;
   return settings.method == Method::Auto && kPoints.has(a.body.mesh.topology.type) && b.proxy &&
-         b.proxySettings.errorBound <= settings.allowedError && !record.predicate && reach > 0.0 &&
-         reach <= b.proxySettings.reach;
+         b.proxySettings.errorBound <= settings.allowedError && !record.predicate &&
+         !record.meshes().findsPassages() && reach > 0.0 && reach <= b.proxySettings.reach;
 }
 
 void planStep(PairRecord& record, bool detecting) {

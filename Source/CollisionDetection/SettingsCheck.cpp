@@ -117,10 +117,12 @@ class PairCheck {
          "earliestTimeOnly is for Method::Continuous only");
     support(!tracks || !earliestTimeOnly,
             "trackContacts needs contacts, and earliestTimeOnly reports none");
-    const bool hasPassages =
-        method == Method::Continuous && !earliestTimeOnly && !m_a.body.shape && !m_b.body.shape;
+    const SupportedPairs* const overStep = supportOf(
+        Method::Continuous, m_a.body.mesh.topology.type, m_b.body.mesh.topology.type, &m_a == &m_b);
+    const bool hasPassages = (method == Method::Auto || method == Method::Continuous) &&
+                             !earliestTimeOnly && overStep && overStep->kind == PairKind::Meshes;
     constexpr const char* kPassages =
-        " is for Method::Continuous of meshes, lines and points, without earliestTimeOnly";
+        " is for Method::Auto and Continuous of meshes, lines and points, without earliestTimeOnly";
     support(!crossings || hasPassages, std::string("reportCrossings") + kPassages);
     support(!remembers || hasPassages, std::string("rememberSides") + kPassages);
     const bool hasFaces = m_a.body.mesh.topology.hasFaces() || m_b.body.mesh.topology.hasFaces();
@@ -190,6 +192,9 @@ class PairCheck {
     const auto answered = [&](Method method) {
       return answers(method, m_settings.thickness, m_a.inStep(), m_b.inStep());
     };
+    if (m_method == Method::Auto && (m_settings.reportCrossings || m_settings.rememberSides))
+      return support(answered(Method::Continuous),
+                     "reportCrossings and rememberSides need one radius for all vertices");
     if (m_method == Method::Auto)
       return need(
           answered(Method::Proximity) || answered(Method::Continuous),

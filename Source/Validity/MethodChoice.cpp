@@ -25,6 +25,11 @@ bool answers(Method method, double thickness, const GeometryInStep& a, const Geo
           thickness + (a.mesh.largestRadius + b.mesh.largestRadius) > 0.0);
 }
 
+/// Whether the pair asks for passages, which Continuous alone finds. At rest there are none.
+static bool asksForPassages(const PairSettings& settings) {
+  return settings.reportCrossings || settings.rememberSides;
+}
+
 /// Auto with lines, points or shapes. At rest it chooses Proximity, which costs least. In a step
 /// that moves features it chooses Continuous, which alone misses no impact, if the pair supports
 /// it.
@@ -91,6 +96,9 @@ PairPlan planOf(const SupportedPairs& support, const PairSettings& settings,
     if (plan.motion == 0.0) {
       plan.method = thickness > 0.0 ? Method::Proximity : Method::Intersection;
       plan.reason = MethodReason::Still;
+    } else if (asksForPassages(settings)) {
+      plan.method = Method::Continuous;
+      plan.reason = MethodReason::NoAlternative;
     } else if (thickness == 0.0 || settings.contacts == Contacts::All) {
       plan.method = Method::Continuous;
       plan.reason = MethodReason::Cheapest;
@@ -126,7 +134,8 @@ std::optional<PairPlan> planByField(const PairSettings& settings, const Geometry
   PALPATE_ASSERT(exact.motion >= 0.0);
   const GeometryInStep& body = answersByFieldOfSecond(a.type(), b.field) ? b : a;
   const GeometryInStep& other = &body == &b ? a : b;
-  if (settings.method != Method::Auto || exact.kind != PairKind::Meshes || !body.field ||
+  if (settings.method != Method::Auto || asksForPassages(settings) ||
+      exact.kind != PairKind::Meshes || !body.field ||
       !supportOf(Method::DistanceField, a.type(), b.type(), &a.mesh == &b.mesh) ||
       !(settings.allowedError > 0.0 && body.field->errorBound() <= settings.allowedError))
     return {};

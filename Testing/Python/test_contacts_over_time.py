@@ -79,7 +79,7 @@ def test_user_data_that_are_refused_change_nothing():
 
 
 def test_crossings_are_records():
-    collisions, tips, sheet = scene(method="continuous", report_crossings=True)
+    collisions, tips, sheet = scene(report_crossings=True)
     collisions.advance()
     collisions.set_positions(tips, np.array([[3, 3, -0.1], [2, 3, 0.1]]))
     collisions.detect_collision()
@@ -89,7 +89,9 @@ def test_crossings_are_records():
     assert 0.5 - 1e-6 <= crossing.time <= 0.5
     assert not crossing.forward
     with pytest.raises(palpate.Error, match="reportCrossings"):
-        collisions.set_pair_settings(tips, sheet, report_crossings=True)
+        collisions.set_pair_settings(
+            tips, sheet, method="proximity", thickness=0.2, report_crossings=True
+        )
 
 
 def test_smooth_normals_are_those_of_rows():
@@ -114,7 +116,7 @@ def test_smooth_normals_are_those_of_rows():
 
 
 def test_sides_are_remembered_and_set():
-    collisions, tips, sheet = scene(method="continuous", remember_sides=True)
+    collisions, tips, sheet = scene(remember_sides=True)
     for z in (0.1, -0.1):
         collisions.set_positions(tips, np.array([[3, 3, z], [2, 3, 0.1]]))
         collisions.detect_collision()
@@ -135,7 +137,9 @@ def test_sides_are_remembered_and_set():
     again = collisions.collision_data(tips, sheet)
     assert again.hash() == data.hash()
     with pytest.raises(palpate.Error, match="rememberSides"):
-        collisions.set_pair_settings(tips, sheet, remember_sides=True)
+        collisions.set_pair_settings(
+            tips, sheet, method="proximity", thickness=0.2, remember_sides=True
+        )
 
 
 def test_advance_calls_a_predicate_of_python():

@@ -144,13 +144,14 @@ struct PairSettings {
   double freeMotionReach = 0.0;
   /// Contacts have an identity from step to step: CollisionData::trackedVertexTriangle() and so on.
   bool trackContacts = false;
-  /// Of Continuous for meshes, lines and points: CollisionData::crossings().
+  /// Of meshes, lines and points by Auto or Continuous: CollisionData::crossings(). Auto then
+  /// chooses Continuous for every step that moves the pair.
   bool reportCrossings = false;
   /// With a triangle or tetrahedral mesh: CollisionData::smoothVertexTriangle() and so on.
   bool smoothNormals = false;
-  /// Of Continuous for meshes, lines and points: features that passed through each other in an
-  /// earlier step have contacts that lead back, until they have returned. advance() then detects
-  /// crossings up to positions that were set after the last detection.
+  /// By the same methods: features that passed through each other in an earlier step have contacts
+  /// that lead back, until they have returned. advance() then detects crossings up to positions
+  /// that were set after the last detection.
   bool rememberSides = false;
   ContinuousSettings continuous{};
   AutoSettings automatic{};

@@ -22,6 +22,7 @@ enum class MethodReason {
   Cheapest,
   /// Lines, points or shapes: Continuous if features move or Proximity lacks a thickness or radius,
   /// else Proximity. One radius per vertex: Proximity, may miss impacts. A field: DistanceField.
+  /// Meshes that move, with reportCrossings or rememberSides: Continuous.
   NoAlternative,
   /// An attached DistanceField or proxy within allowedError proves that nothing touched.
   AllowedError,

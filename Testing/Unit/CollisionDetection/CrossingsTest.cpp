@@ -433,7 +433,7 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
   EXPECT_GT(touching, leastOf(300, 40));
 }
 
-TEST(Crossings, NeedContinuousWithContacts) {
+TEST(Crossings, NeedContactsOverTheStep) {
   OctreeBasedCD collisions;
   const Mesh cube = testing::cube(0, 1);
   const GeometryId a = addMesh(collisions, cube), b = addMesh(collisions, cube),
@@ -443,9 +443,10 @@ TEST(Crossings, NeedContinuousWithContacts) {
         ErrorCode::UnsupportedMethod, "pair (0, ",
         [&] { collisions.addCollisionPair(a, second, settings); }, a);
   };
-  for (const Method method : {Method::Auto, Method::Proximity, Method::Intersection})
+  for (const Method method : {Method::Proximity, Method::Intersection})
     refuse(b, {.method = method, .thickness = 0.1, .reportCrossings = true});
-  refuse(ball, {.method = Method::Continuous, .reportCrossings = true});
+  for (const Method method : {Method::Auto, Method::Continuous})
+    refuse(ball, {.method = method, .thickness = 0.1, .reportCrossings = true});
   refuse(b, {.method = Method::Continuous,
              .reportCrossings = true,
              .continuous = {.earliestTimeOnly = true}});

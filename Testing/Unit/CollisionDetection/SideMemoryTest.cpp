@@ -642,17 +642,17 @@ TEST_F(OnePoint, RefusesOtherMethods) {
   const auto refuse = [&](GeometryId b, PairSettings settings) {
     settings.rememberSides = true;
     expectRefused(
-        ErrorCode::UnsupportedMethod, "rememberSides is for Method::Continuous",
+        ErrorCode::UnsupportedMethod, "rememberSides is for Method::Auto and Continuous",
         [&] {
           b == ball ? m_collisions.addCollisionPair(m_sheet, b, settings)
                     : m_collisions.setPairSettings(m_tip, b, settings);
         },
         b == ball ? m_sheet : m_tip);
   };
-  refuse(m_sheet, {.thickness = 0.1});
   refuse(m_sheet, {.method = Method::Proximity, .thickness = 0.1});
   refuse(m_sheet, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
-  refuse(ball, {.method = Method::Continuous, .thickness = 0.1});
+  for (const Method method : {Method::Auto, Method::Continuous})
+    refuse(ball, {.method = method, .thickness = 0.1});
 }
 
 /// A body that passed as a whole: every contact leads it back, also of edges that passed none.

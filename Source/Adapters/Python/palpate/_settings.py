@@ -111,9 +111,10 @@ class PairSettings:
     allowed_error       L: what an answer by a proxy or a field may be off by
     free_motion_reach   L: positive: detect_collision() also finds free_motion(), up to half of this
     track_contacts      contacts have an identity: CollisionData.tracked_vertex_triangle and so on
-    report_crossings    Continuous only: CollisionData.crossings
+    report_crossings    Auto and Continuous: CollisionData.crossings
     smooth_normals      CollisionData.smooth_vertex_triangle and so on, which rows use
-    remember_sides      Continuous only: contacts of what passed lead back until it has returned
+    remember_sides      Auto and Continuous: contacts of what passed lead back until it has
+                        returned
     widest_normal_cone  rad, in (0, 1.5], Proxy only
     priority            detect_collision() with a budget begins with pairs of the highest priority
     """
