@@ -146,6 +146,12 @@ constexpr int kTaperPieces = 16;
 /// them move further along a surface.
 constexpr int kMostClearances = 32;
 
+// ---- Vertices behind a surface (NarrowPhase/Piercing.cpp) ----
+
+/// Ways out whose lengths differ by a smaller share are equal, so that rounding does not choose.
+/// Far above the rounding of a crossing's place, and far below any difference that matters.
+constexpr double kWaySlack = 0x1p-20;
+
 // ---- Shapes (Shapes, Queries/ElementsNearShape.cpp) ----
 
 /// Weight on an edge: the width to which its point nearest to a shape is bracketed. A point this

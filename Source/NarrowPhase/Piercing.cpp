@@ -7,12 +7,16 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
+#include <numeric>
 #include <tuple>
+#include <utility>
 
 namespace palpate {
 
@@ -113,14 +117,19 @@ int timesOfLeaving(const TriangleMesh& surface, bool atStart,
   return sum;
 }
 
+/// Of the first way: how far triangles are from the vertex that connect features with those that
+/// its edges cross. Around a right angle they are up to the root of 2; any larger value will do.
+constexpr double kWayReach = 1.5;
+
 /// Searches the feature of a surface that is nearest to a vertex behind it.
 class NearestInFront {
  public:
   NearestInFront(const MeshPair& pair, bool ofB, bool atStart, std::uint32_t vertex)
       : m_pair(pair),
+        m_own(ofB ? pair.b : pair.a, atStart),
         m_mesh(ofB ? pair.a : pair.b, atStart),
         m_vertex(vertex),
-        m_position(PlacedMesh(ofB ? pair.b : pair.a, atStart).at[vertex]) {}
+        m_position(m_own.at[vertex]) {}
 
   /// Begins at a triangle behind which the vertex is, or goes on to it if it is nearer.
   bool enter(std::uint32_t triangle) {
@@ -149,6 +158,61 @@ class NearestInFront {
     }
   }
 
+  /// L: how far the vertex, and the places where its edges cross the surface, must move along the
+  /// contact's normal to be in front of the plane through the closest point.
+  double wayOut(std::span<const PiercingContacts::Behind> crossings) const {
+    const VertexTriangleContact at = contact();
+    double furthest = 0.0;
+    for (const auto& [ofB, vertex, triangle, edge] : crossings) {
+      const Segment& ends = m_own.topology.edges[edge];
+      const Eigen::Vector3d along = m_own.at[ends[ends[0] == vertex]] - m_position;
+      const auto [a, b, c] = m_mesh.corners(triangle);
+      const Eigen::Vector3d normal = windingNormal(a, b, c);
+      const double below = normal.dot(a - m_position), change = normal.dot(along);
+      // 0 or NaN where rounding hides the crossing: the vertex alone counts.
+      const double weight = below / change;
+      if (weight >= 0.0 && weight <= 1.0)
+        furthest = std::max(furthest, -weight * at.normal.dot(along));
+    }
+    return furthest - at.distance;
+  }
+
+  /// Goes on to the feature with the shortest way out.
+  /// scratch.near: holds all triangles in box(way) of the present one's way.
+  void shorten(double way, std::span<const PiercingContacts::Behind> crossings,
+               PiercingContacts::Scratch& scratch) {
+    scratch.nearer.clear();
+    scratch.reached.clear();
+    const double reach = kWayReach * way;
+    way *= 1.0 - kWaySlack;
+    std::erase_if(scratch.near, [&](std::uint32_t t) {
+      if (!m_mesh.topology.isEnabled(t) || m_pair.excludesVertex(m_vertex, t)) return true;
+      const double distance = measure(t).distance;
+      if (distance < way && isAllowed(t)) scratch.nearer.push_back({distance, t});
+      return !(distance <= reach);
+    });
+    auto best = std::pair(m_triangle, m_nearest);
+    auto& nearer = scratch.nearer;
+    std::make_heap(nearer.begin(), nearer.end(), std::greater<>());
+    // No way is shorter than the distance.
+    for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < way; --end) {
+      std::pop_heap(nearer.begin(), end, std::greater<>());
+      m_triangle = std::prev(end)->triangle;
+      m_nearest = measure(m_triangle);
+      if (goesOn()) continue;
+      const double other = wayOut(crossings);
+      if (!(other < way) || !isReached(m_triangle, crossings, scratch)) continue;
+      way = (1.0 - kWaySlack) * other;
+      best = {m_triangle, m_nearest};
+    }
+    std::tie(m_triangle, m_nearest) = best;
+    walk();
+  }
+
+  Eigen::AlignedBox3d box(double way) const {
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(kWayReach * way);
+    return {m_position - reach, m_position + reach};
+  }
   std::uint32_t triangle() const { return m_triangle; }
   Corners corners() const { return m_mesh.corners(m_triangle); }
   bool exact() const { return m_nearest.exact; }
@@ -171,6 +235,37 @@ class NearestInFront {
     }
     return {};
   }
+  /// Whether triangles of scratch.near lead to this one from those that the edges cross.
+  bool isReached(std::uint32_t triangle, std::span<const PiercingContacts::Behind> crossings,
+                 PiercingContacts::Scratch& scratch) const {
+    auto& [near, nearer, reached, next] = scratch;
+    const auto reach = [&](std::uint32_t t) {
+      const auto place = std::lower_bound(near.begin(), near.end(), t);
+      if (place == near.end() || *place != t) return;
+      std::uint8_t& isKnown = reached[static_cast<std::size_t>(place - near.begin())];
+      if (!std::exchange(isKnown, 1)) next.push_back(t);
+    };
+    if (reached.empty()) {
+      std::sort(near.begin(), near.end());
+      reached.assign(near.size(), 0);
+      next.clear();
+      for (const auto& crossing : crossings) reach(crossing.triangle);
+      while (!next.empty()) {
+        const Triangle& corners = m_mesh.topology.elements[next.back()];
+        next.pop_back();
+        for (const std::uint32_t corner : corners)
+          for (const std::uint32_t t : m_mesh.topology.vertexTriangles[corner]) reach(t);
+      }
+    }
+    const auto place = std::lower_bound(near.begin(), near.end(), triangle);
+    return reached[static_cast<std::size_t>(place - near.begin())] != 0;
+  }
+  bool goesOn() const {
+    const auto around = holders(feature());
+    return std::any_of(around.begin(), around.end(), [&](std::uint32_t t) {
+      return measure(t).distance < m_nearest.distance && isAllowed(t);
+    });
+  }
   bool isAllowed(std::uint32_t triangle) const {
     return !m_pair.excludesVertex(m_vertex, triangle) &&
            sideOf(m_mesh.corners(triangle), m_position) < 0;
@@ -181,7 +276,7 @@ class NearestInFront {
   }
 
   const MeshPair& m_pair;
-  PlacedMesh m_mesh;
+  PlacedMesh m_own, m_mesh;
   std::uint32_t m_vertex, m_triangle = 0;
   Eigen::Vector3d m_position;
   VertexTriangleDistance m_nearest{};
@@ -220,11 +315,11 @@ void PiercingContacts::collect(std::span<ContactBuffers* const> found,
   m_crossings.erase(std::unique(m_crossings.begin(), m_crossings.end()), m_crossings.end());
 }
 
-void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
-                            ContactBuffers& out) {
+void PiercingContacts::find(const MeshPair& pair, const TrianglesInBox& near,
+                            std::span<ContactBuffers* const> found, ContactBuffers& out) {
   collect(found, &ContactBuffers::crossings, out.deadline);
   findBehind(pair, false, out);
-  addDepths(pair, false, out);
+  addDepths(pair, near, false, out);
   TimeCheck check(out.deadline, 32);
   for (const ContactBuffers* buffers : found)
     for (const PiercedPair& pierced : buffers->pierced) {
@@ -233,23 +328,35 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
     }
 }
 
-void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
-                                   ContactBuffers& out) {
+void PiercingContacts::findAtStart(const MeshPair& pair, const TrianglesInBox& near,
+                                   std::span<ContactBuffers* const> found, ContactBuffers& out) {
   collect(found, &ContactBuffers::crossingsAtStart, out.deadline);
   findBehind(pair, true, out);
-  addDepths(pair, true, out);
+  addDepths(pair, near, true, out);
 }
 
-void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
+void PiercingContacts::addDepths(const MeshPair& pair, const TrianglesInBox& near, bool atStart,
+                                 ContactBuffers& out) {
   StepCheck check(pair, out);
   for (auto first = m_behind.begin(); first != m_behind.end();) {
     const bool ofB = first->ofB;
     const std::uint32_t vertex = first->vertex;
     checkTime(out.deadline);
     NearestInFront nearest(pair, ofB, atStart, vertex);
+    const auto begin = first;
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
       nearest.enter(first->triangle);
     nearest.walk();
+    const double way = nearest.wayOut({begin, first});
+    Buffer<std::uint32_t>& triangles = m_scratch.near;
+    triangles.clear();
+    if (near) {
+      near(!ofB, atStart, nearest.box(way), triangles);
+    } else {
+      triangles.resize((ofB ? pair.a : pair.b).topology.elements.size());
+      std::iota(triangles.begin(), triangles.end(), 0u);
+    }
+    nearest.shorten(way, {begin, first}, m_scratch);
     out.exactDecisions += nearest.exact();
     if (!atStart) {
       if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;
@@ -276,7 +383,7 @@ void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuf
                                       mesh.at[ends[0]], mesh.at[ends[1]], counts);
     for (; first != end; ++first)
       if (leaves != 0 && first->lowerIsBehind == (leaves > 0))
-        m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle});
+        m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle, first->edge});
   }
   out.exactDecisions += counts.undecided;
   sortUntil(out.deadline, m_behind.begin(), m_behind.end(), std::less<>());
@@ -284,7 +391,7 @@ void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuf
 }
 
 bool PiercingContacts::isBehind(bool ofB, std::uint32_t vertex) const {
-  const auto place = std::lower_bound(m_behind.begin(), m_behind.end(), Behind{ofB, vertex, 0});
+  const auto place = std::lower_bound(m_behind.begin(), m_behind.end(), Behind{ofB, vertex, 0, 0});
   return place != m_behind.end() && place->ofB == ofB && place->vertex == vertex;
 }
 
@@ -305,7 +412,8 @@ void KnownSides::add(const ContactBuffers& found, Buffer<Side>& sides) {
   for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
     for (const VertexTriangleContact& c : *list)
       if (c.distance < 0.0)
-        sides.push_back({list == &found.triangleVertex, c.vertex, c.triangle, c.normal, false});
+        sides.push_back(
+            {list == &found.triangleVertex, c.vertex, c.triangle, c.normal, false, false});
 }
 
 void KnownSides::sort(Buffer<Side>& sides) {
@@ -327,6 +435,40 @@ std::span<KnownSides::Side> KnownSides::sidesOf(Buffer<Side>& sides, bool ofB,
   return {first, std::find_if(first, sides.end(), [&](const Side& side) {
             return side.ofB != ofB || side.vertex != vertex;
           })};
+}
+
+void KnownSides::findBeside(const MeshPair& pair, bool atStart,
+                            std::span<ContactBuffers* const> others, Buffer<Side>& known,
+                            Buffer<Side>& beside) {
+  beside.clear();
+  m_reached.clear();
+  if (known.empty()) return;
+  for (const ContactBuffers* found : others)
+    for (const auto* list : {&found->vertexTriangle, &found->triangleVertex}) {
+      const bool ofB = list == &found->triangleVertex;
+      const TriangleMesh& surface = ofB || pair.self() ? pair.a : pair.b;
+      for (const VertexTriangleContact& c : *list)
+        if ((c.timeOfImpact < 1.0) == atStart && sidesOf(known, ofB, c.vertex).empty() &&
+            liesBelow(surface, featureOf(surface.topology, c.triangle, c.feature), c.normal,
+                      c.timeOfImpact))
+          beside.push_back({ofB, c.vertex, c.triangle, -c.normal, false, false});
+    }
+  if (beside.empty()) return;
+  sort(beside);
+  for (const Side& side : known) m_reached.push_back({side.ofB, side.vertex});
+  while (!m_reached.empty()) {
+    const auto [ofB, vertex] = m_reached.back();
+    m_reached.pop_back();
+    const MeshTopology& topology = (ofB ? pair.b : pair.a).topology;
+    for (const std::uint32_t t : topology.vertexTriangles[vertex])
+      for (const std::uint32_t next : topology.elements[t]) {
+        const std::span<Side> sides = sidesOf(beside, ofB, next);
+        if (sides.empty() || sides.front().isReached) continue;
+        for (Side& side : sides) side.isReached = true;
+        m_reached.push_back({ofB, next});
+      }
+  }
+  std::erase_if(beside, [](const Side& side) { return !side.isReached; });
 }
 
 KnownSides::Opinion KnownSides::ask(Buffer<Side>& sides, const Stencil& stencil,
@@ -352,6 +494,8 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   if (m_atEnd.empty() && m_atStart.empty()) return;
   sort(m_atEnd);
   sort(m_atStart);
+  findBeside(pair, false, others, m_atEnd, m_besideAtEnd);
+  findBeside(pair, true, others, m_atStart, m_besideAtStart);
   const bool drops = pair.reportsDistinct(), b = !pair.self();
   TimeCheck check(atStart.deadline, 32);
   // ofB: the mesh of each vertex.
@@ -373,10 +517,13 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
     const Stencil vertices = stencil(contact);
     Opinion opinion = ask(m_atEnd, vertices, ofB, contact.normal);
     if (drops && opinion.isKnown) return true;
-    if (!opinion.isKnown && contact.timeOfImpact < 1.0) {
+    const bool isImpact = contact.timeOfImpact < 1.0;
+    if (!opinion.isKnown && isImpact) {
       opinion = ask(m_atStart, vertices, ofB, contact.normal);
       if (drops && opinion.isRepresented && !represents(contact, ofB)) return true;
     }
+    if (!opinion.isKnown)
+      opinion = ask(isImpact ? m_besideAtStart : m_besideAtEnd, vertices, ofB, contact.normal);
     if (opinion.agreement < 0.0) {
       contact.normal = -contact.normal;
       contact.distance = -contact.distance;

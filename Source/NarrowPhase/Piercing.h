@@ -4,10 +4,14 @@
 #include "Math/TriangleIntersection.h"
 #include "Core/Buffer.h"
 
+#include <Eigen/Geometry>
+
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <functional>
 #include <span>
+#include <utility>
 
 namespace palpate {
 
@@ -15,6 +19,11 @@ namespace palpate {
 /// PiercingContacts.
 void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const TriangleIntersection&,
                      Buffer<EdgeCrossing>& out);
+
+/// Appends the triangles of a mesh of the pair that a box meets at the step's start or end, and
+/// maybe others. Empty: all triangles are meant.
+using TrianglesInBox = std::function<void(bool ofB, bool atStart, const Eigen::AlignedBox3d&,
+                                          Buffer<std::uint32_t>& out)>;
 
 /// The contacts of triangles that pierce each other, without touching features. They depend on all
 /// crossings of a pair of meshes, and are therefore found after the last batch.
@@ -34,33 +43,58 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          enters only triangles behind which the vertex is. The contact names the lowest of these
 ///          that hold the closest feature. If the feature is an edge or a vertex, the normal leads
 ///          from the vertex to the closest point.
+/// Way      of a feature: how far the vertex and the places where such edges cross the surface must
+///          move along the normal to be in front of the plane through the closest point. The wall
+///          of a blunt tool may be the nearest feature, but the way out leads through its end. Of
+///          this feature and all others from which the search goes no further, the one with the
+///          shortest way has the contact; of those that differ by rounding, the first one, and then
+///          the nearest. Triangles at most 1.5 times the first way from the vertex must connect the
+///          feature with one that such an edge crosses: another sheet is no way out of this one.
 /// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
 ///          one of the crossing edges is behind: that end's contact then stands for the pair.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
-/// Cost     n log n in the crossings; a vertex behind measures the triangles on its way.
+/// Cost     n log n in the crossings; a vertex behind measures the triangles in a box around it
+///          that is 1.5 times as large as its first way.
 class PiercingContacts {
  public:
   /// Appends all contacts at the step's end.
-  void find(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
+  void find(const MeshPair&, const TrianglesInBox&, std::span<ContactBuffers* const> found,
+            ContactBuffers& out);
   /// Appends the contacts of vertices that are behind a surface at the step's start, unfiltered.
-  void findAtStart(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
+  void findAtStart(const MeshPair&, const TrianglesInBox&, std::span<ContactBuffers* const> found,
+                   ContactBuffers& out);
 
- private:
   /// A vertex behind a triangle that one of its edges crosses. ofB: of MeshPair::b.
   struct Behind {
     bool ofB;
-    std::uint32_t vertex, triangle;
+    std::uint32_t vertex, triangle, edge;
     auto operator<=>(const Behind&) const = default;
   };
+  /// A triangle near a vertex.
+  struct Near {
+    double distance;  ///< L
+    std::uint32_t triangle;
+    auto operator<=>(const Near&) const = default;
+  };
+  /// Of one vertex.
+  struct Scratch {
+    Buffer<std::uint32_t> near;
+    Buffer<Near> nearer;
+    Buffer<std::uint8_t> reached;  ///< as `near`, which is sorted then; empty: not known
+    Buffer<std::uint32_t> next;
+  };
+
+ private:
   void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list,
                const Deadline*);
   void findBehind(const MeshPair&, bool atStart, ContactBuffers& out);
-  void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
+  void addDepths(const MeshPair&, const TrianglesInBox&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
 
   Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;
+  Scratch m_scratch;
 };
 
 /// Auto, in a step that begins in intersection: what Intersection's contacts tell about the sides
@@ -77,6 +111,9 @@ class PiercingContacts {
 ///          an impact on the wrong side is turned. Contacts::Distinct drops impacts of a vertex
 ///          for which another one stands: one in which the vertex meets a triangle, and other
 ///          vertices that leave do not disagree.
+///          (3) Of vertices whose edges cross nothing: each that is next to one of (1) or (2), or
+///          to another one of these, and whose own contact is below the surface, is behind as
+///          well. Contacts at the end, or impacts, that are on the wrong side are turned.
 class KnownSides {
  public:
   /// atEnd, atStart: Intersection's contacts. Ends at the deadline of atStart.
@@ -89,6 +126,7 @@ class KnownSides {
     std::uint32_t vertex, triangle;
     Eigen::Vector3d outward;
     bool isRepresented;  ///< an impact stands for the vertex
+    bool isReached;      ///< by edges from a vertex behind
   };
   /// What the sides of a contact's vertices say about it.
   struct Opinion {
@@ -97,11 +135,15 @@ class KnownSides {
   };
   static void add(const ContactBuffers&, Buffer<Side>&);
   static void sort(Buffer<Side>&);
+  void findBeside(const MeshPair&, bool atStart, std::span<ContactBuffers* const> others,
+                  Buffer<Side>& known, Buffer<Side>& beside);
   static std::span<Side> sidesOf(Buffer<Side>& sorted, bool ofB, std::uint32_t vertex);
   static Opinion ask(Buffer<Side>& sorted, const Stencil&, const std::array<bool, 4>& ofB,
                      const Eigen::Vector3d& normal);
 
   Buffer<Side> m_atEnd, m_atStart;
+  Buffer<Side> m_besideAtEnd, m_besideAtStart;
+  Buffer<std::pair<bool, std::uint32_t>> m_reached;  ///< scratch: vertices, and whether of b
 };
 
 }  // namespace palpate

@@ -6,11 +6,13 @@
 #include "Frame/Placement.h"
 #include "Unit/Math/ImpactOracle.h"
 #include "Unit/Math/RationalOracle.h"
+#include "Math/Tolerances.h"
 
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -244,7 +246,11 @@ class ExactContacts {
     for (const Triangle& t : vertices.triangles())
       for (int i = 0; i < 3; ++i)
         edges.insert({std::min(t[i], t[(i + 1) % 3]), std::max(t[i], t[(i + 1) % 3])});
-    std::map<std::uint32_t, std::set<std::uint32_t>> starts;
+    struct Start {
+      std::set<std::uint32_t> triangles;
+      std::vector<oracle::Vector> crossings;  // from the vertex
+    };
+    std::map<std::uint32_t, Start> starts;
     for (const Segment& edge : edges) {
       std::map<std::set<std::uint32_t>, std::set<int>> sides;  // of the first end, by feature
       std::map<int, std::set<std::uint32_t>> triangles;        // by that side
@@ -262,12 +268,101 @@ class ExactContacts {
       for (const auto& [feature, signs] : sides)
         sum += leavesIn(others, feature, signs, vertices[edge[0]], vertices[edge[1]]);
       if (sum == 0) continue;
-      starts[edge[sum < 0]].merge(triangles[sum > 0 ? -1 : 1]);
+      Start& start = starts[edge[sum < 0]];
+      for (const std::uint32_t t : triangles[sum > 0 ? -1 : 1]) {
+        start.triangles.insert(t);
+        start.crossings.push_back(
+            crossing(vertices[edge[sum < 0]], vertices[edge[sum > 0]], others, t));
+      }
     }
     Depths depths;
-    for (const auto& [vertex, first] : starts)
-      depths[vertex] = nearest(vertices[vertex], vertex, others, first);
+    for (const auto& [vertex, start] : starts)
+      depths[vertex] = shortest(vertices[vertex], vertex, others,
+                                nearest(vertices[vertex], vertex, others, start.triangles),
+                                start.triangles, start.crossings);
     return depths;
+  }
+
+  /// From p to where the segment from p to q crosses the plane of a triangle.
+  static oracle::Vector crossing(const Vector3d& p, const Vector3d& q, const Moving& others,
+                                 std::uint32_t t) {
+    using namespace oracle;
+    const auto& [a, b, c] = others.triangles()[t];
+    const auto origin = toRational(others[a]);
+    const auto normal = cross(toRational(others[b]) - origin, toRational(others[c]) - origin);
+    const auto from = toRational(p), along = toRational(q) - from;
+    return Rational(dot(normal, origin - from) / dot(normal, along)) * along;
+  }
+
+  /// How far the vertex and these crossings must move towards the closest point, until all are in
+  /// front of it. difference: from there to the vertex.
+  static mpf_class wayOut(const oracle::Vector& difference,
+                          const std::vector<oracle::Vector>& crossings) {
+    Rational furthest = 0;
+    for (const oracle::Vector& x : crossings)
+      furthest = std::max(furthest, oracle::dot(difference, x));
+    const mpf_class length = oracle::root(oracle::dot(difference, difference));
+    return length + mpf_class(furthest, 400) / length;
+  }
+
+  /// Of the feature in a triangle and all from which no neighbour is nearer, the one with the
+  /// shortest way out; in its lowest triangle.
+  std::uint32_t shortest(const Vector3d& p, std::uint32_t vertex, const Moving& others,
+                         std::uint32_t triangle, const std::set<std::uint32_t>& starts,
+                         const std::vector<oracle::Vector>& crossings) const {
+    const auto count = static_cast<std::uint32_t>(others.triangles().size());
+    const auto mayHold = [&](std::uint32_t t) {
+      return !(m_self && holds(others.triangles()[t], vertex)) && side(others, t, p) < 0;
+    };
+    const auto wayTo = [&](std::uint32_t t) {
+      const Triangle& corners = others.triangles()[t];
+      const oracle::Closest found =
+          oracle::vertexTriangle(p, others[corners[0]], others[corners[1]], others[corners[2]]);
+      return wayOut(found.difference, crossings);
+    };
+    std::vector<Place> places;
+    for (std::uint32_t t = 0; t < count; ++t)
+      if (mayHold(t)) places.push_back(place(p, others, t));
+    // Which triangles connect with those that the edges cross.
+    const mpf_class reach = wayTo(triangle) * 1.5;
+    std::set<std::uint32_t> inReach, reached;
+    for (std::uint32_t t = 0; t < count; ++t)
+      if (!(m_self && holds(others.triangles()[t], vertex)) &&
+          oracle::root(place(p, others, t).square) <= reach)
+        inReach.insert(t);
+    for (const std::uint32_t t : starts)
+      if (inReach.contains(t)) reached.insert(t);
+    for (std::size_t last = 0; last != reached.size();) {
+      last = reached.size();
+      for (const std::uint32_t t : inReach)
+        for (const std::uint32_t v : others.triangles()[t])
+          if (std::any_of(reached.begin(), reached.end(),
+                          [&](std::uint32_t s) { return holds(others.triangles()[s], v); })) {
+            reached.insert(t);
+            break;
+          }
+    }
+    const auto isLocal = [&](const Place& at) {
+      return std::none_of(places.begin(), places.end(), [&](const Place& other) {
+        return other.square < at.square &&
+               std::all_of(at.feature.begin(), at.feature.end(), [&](std::uint32_t c) {
+                 return holds(others.triangles()[other.triangle], c);
+               });
+      });
+    };
+    std::stable_sort(places.begin(), places.end(),
+                     [](const Place& l, const Place& r) { return l.square < r.square; });
+    mpf_class way = wayTo(triangle);
+    std::set<std::uint32_t> best = place(p, others, triangle).feature;
+    for (const Place& at : places)
+      if (const mpf_class other = wayTo(at.triangle);
+          other < way * (1.0 - kWaySlack) && isLocal(at) && reached.contains(at.triangle)) {
+        way = other;
+        best = at.feature;
+      }
+    for (std::uint32_t t = 0; t < count; ++t)
+      if (mayHold(t) && place(p, others, t).feature == best) return t;
+    return triangle;
   }
 
   std::uint32_t nearest(const Vector3d& p, std::uint32_t vertex, const Moving& others,

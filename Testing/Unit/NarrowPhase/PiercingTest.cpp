@@ -142,6 +142,75 @@ TEST(Piercing, CornersOfOverlappingCubesLeaveThroughTheNearestFace) {
   EXPECT_TRUE(found.edgeEdge.empty());
 }
 
+/// Of the plate's vertices in a blunt tool, whether its wall or its end is nearer. The plate may be
+/// bumpy.
+TEST(Piercing, ABluntToolLeavesThroughItsEnd) {
+  std::size_t inside = 0;
+  for (const double depth : {0.01, 0.3})
+    for (const double width : {0.9, 1.3, 3.3})
+      for (const double bump : {0.0, 0.004}) {
+        const double low = 2.1 - width / 2, high = low + width;
+        TriangleMesh tool = cuboid({low, low + 0.1, -depth}, {high, high + 0.1, 5}), flat = plate();
+        Vertices positions;
+        for (std::size_t v = 0; v < flat.now.size(); ++v)
+          positions.push_back(flat.now[v] + Vector3d(0, 0, v % 2 == 0 ? bump : -bump));
+        const TriangleMesh surface =
+            piercingMesh(positions, {flat.topology.elements.begin(), flat.topology.elements.end()});
+        const ContactBuffers found = piercingContacts(tool, surface);
+        EXPECT_EQ(found.vertexTriangle.size(), 4u);
+        EXPECT_TRUE(found.edgeEdge.empty());
+        for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
+          for (const VertexTriangleContact& c : *list) {
+            EXPECT_GE(c.distance, -depth - bump - 1e-12) << c.vertex;
+            const double up = list == &found.vertexTriangle ? c.normal.z() : -c.normal.z();
+            EXPECT_GT(up, 0.98);
+            inside += list == &found.triangleVertex;
+          }
+      }
+  EXPECT_GE(inside, 20u);
+}
+
+/// The far side of a thin bar is nearer to the tip. It is no way out for the needle's sides.
+TEST(Piercing, ATipDeepInABarLeavesTheWayItCame) {
+  for (const double depth : {0.3, 0.7, 0.95}) {
+    const TriangleMesh bar = cuboid({-5, -5, -1}, {5, 5, 0});
+    const ContactBuffers found = piercingContacts(pyramid({0.1, 0.2, -depth}, 2, 0.1), bar);
+    ASSERT_EQ(found.vertexTriangle.size(), 1u);
+    EXPECT_DOUBLE_EQ(found.vertexTriangle[0].distance, -depth);
+    EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
+  }
+}
+
+/// A second plate below the first one, in one mesh with it: the tip is behind it, and nearer to it.
+TEST(Piercing, ATipBehindASheetDoesNotLeaveThroughAnother) {
+  TriangleMesh first = plate();
+  Vertices positions;
+  std::vector<Triangle> triangles(first.topology.elements.begin(), first.topology.elements.end());
+  const std::size_t count = triangles.size();
+  const auto vertices = static_cast<std::uint32_t>(first.now.size());
+  for (std::uint32_t v = 0; v < vertices; ++v) positions.push_back(first.now[v]);
+  for (std::uint32_t v = 0; v < vertices; ++v)
+    positions.push_back({1.6, first.now[v].y(), first.now[v].x() - 3});
+  for (std::size_t t = 0; t < count; ++t) {
+    const auto [i, j, k] = triangles[t];
+    triangles.push_back({i + vertices, k + vertices, j + vertices});
+  }
+  const ContactBuffers found =
+      piercingContacts(pyramid({1.5, 2.2, -0.9}, 1, 0.05), piercingMesh(positions, triangles));
+  ASSERT_EQ(found.vertexTriangle.size(), 1u);
+  EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
+  EXPECT_NEAR(found.vertexTriangle[0].distance, -0.9, 1e-15);
+}
+
+/// A rod that is far through the plate is led out sideways: its end is further than its wall.
+TEST(Piercing, ARodThroughAPlateLeavesThroughItsWall) {
+  const TriangleMesh rod = cuboid({1.6, 1.7, -3}, {2.5, 2.3, 3});
+  const ContactBuffers found = piercingContacts(rod, plate());
+  ASSERT_EQ(found.triangleVertex.size(), 1u);
+  EXPECT_NEAR(found.triangleVertex[0].distance, -0.3, 1e-15);
+  EXPECT_EQ(found.triangleVertex[0].normal.z(), 0.0);
+}
+
 /// Two long roofs cross at a right angle, ridge below ridge by 0.1.
 TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
   const double c = std::sqrt(0.5);
