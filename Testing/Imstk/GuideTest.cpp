@@ -13,7 +13,7 @@ namespace {
 
 TEST(Guide, ItsSceneKeepsTheBodiesApart) {
   TestScene test;
-  test.model->m_gravity = {0, -10, 0};
+  test.config().m_gravity = {0, -10, 0};
   const auto thread = std::make_shared<imstk::LineMesh>();
   thread->initialize(positionArray({{-2, 1, 0}, {0, 1, 0.1}, {2, 1, 0}}),
                      cellArray<2>({{0, 1}, {1, 2}}));

@@ -2,6 +2,7 @@
 #include "Scenes.h"
 
 #include <imstkCDObjectFactory.h>
+#include <imstkHexahedralMesh.h>
 
 #include <gtest/gtest.h>
 
@@ -64,8 +65,7 @@ TEST(PalpateCD, VertexInASphereIsAPointWithItsWayOut) {
 
 TEST(PalpateCD, SurfacesGiveCellsOfVertices) {
   const auto blade = triangle({0, 0, 0}, 0.25);
-  for (Vec3d& p : blade->getVertexPositions()->values)
-    p = Vec3d(p.x() + 0.1, p.z(), 0.1);  // upright
+  for (Vec3d& p : positionsIn(*blade)) p = Vec3d(p.x() + 0.1, p.z(), 0.1);  // upright
   const auto cd = detection(sheet({0, 0, 0}), blade);
   cd->update();
   const auto data = cd->getCollisionData();
@@ -90,14 +90,14 @@ TEST(PalpateCD, EveryPairOfTypesHasAMethod) {
                                                             std::make_shared<imstk::Cylinder>(),
                                                             std::make_shared<imstk::OrientedBox>(),
                                                             std::make_shared<imstk::Plane>()};
-  imstk::logged().clear();
+  logged().clear();
   for (const auto& a : types)
     for (const auto& b : types) {
       if (a == b && std::dynamic_pointer_cast<imstk::PointSet>(a) == nullptr) continue;
       const auto cd = detection(a, b);
       cd->update();
-      ASSERT_TRUE(imstk::logged().empty())
-          << a->getTypeName() << ", " << b->getTypeName() << ": " << imstk::logged()[0];
+      ASSERT_TRUE(logged().empty())
+          << a->getTypeName() << ", " << b->getTypeName() << ": " << logged()[0];
       const bool hasShape = std::dynamic_pointer_cast<imstk::PointSet>(a) == nullptr ||
                             std::dynamic_pointer_cast<imstk::PointSet>(b) == nullptr;
       const bool isTwoPlanes = a->getTypeName() == "Plane" && b->getTypeName() == "Plane";
@@ -108,8 +108,8 @@ TEST(PalpateCD, EveryPairOfTypesHasAMethod) {
   const auto hexahedra = std::make_shared<imstk::HexahedralMesh>();
   hexahedra->initialize(positionArray({{0, 0, 0}}), cellArray<8>({}));
   detection(hexahedra, types[0])->update();
-  ASSERT_EQ(imstk::logged().size(), 1u + 1u);
-  EXPECT_EQ(imstk::logged()[0], "Palpate: A HexahedralMesh does not collide.");
+  ASSERT_EQ(logged().size(), 1u + 1u);
+  EXPECT_EQ(logged()[0], "Palpate: A HexahedralMesh does not collide.");
 }
 
 TEST(PalpateCD, StepOfAPickerBeginsAtItsLastUpdate) {
@@ -118,7 +118,7 @@ TEST(PalpateCD, StepOfAPickerBeginsAtItsLastUpdate) {
   const auto cd = detection(needle, sheet({0, 0, 0}));
   cd->update();
   EXPECT_TRUE(cd->getCollisionData()->elementsA.empty());
-  for (Vec3d& p : needle->getVertexPositions()->values) p.y() -= 10;
+  for (Vec3d& p : positionsIn(*needle)) p.y() -= 10;
   cd->update();
   EXPECT_FALSE(cd->getCollisionData()->elementsA.empty());
   cd->update();

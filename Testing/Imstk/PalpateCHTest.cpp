@@ -20,13 +20,13 @@ TEST(PalpateCH, PushesToTheGapAndNeverPulls) {
     test.step();
     for (size_t i = 0; i < 9; ++i)
       EXPECT_NEAR(particle(*cloth, i).y(), std::max(start, 0.1), 1e-9) << start;
-    EXPECT_TRUE(imstk::logged().empty());
+    EXPECT_TRUE(logged().empty());
   }
 }
 
 TEST(PalpateCH, AClothRestsOnAFloorUnderGravity) {
   TestScene test;
-  test.model->m_gravity = {0, -9.81, 0};
+  test.config().m_gravity = {0, -9.81, 0};
   const auto cloth = test.deformable("cloth", sheet({0, 0.3, 0}));
   test.collide(test.floor(sheet({0, 0, 0}, 3, 4)), cloth, within(0.2));
   test.scene->initialize();
@@ -35,26 +35,26 @@ TEST(PalpateCH, AClothRestsOnAFloorUnderGravity) {
     EXPECT_NEAR(particle(*cloth, i).y(), 0.1, 1e-3);
     EXPECT_NEAR(velocity(*cloth, i).y(), 0, 1e-4);
   }
-  EXPECT_TRUE(imstk::logged().empty());
+  EXPECT_TRUE(logged().empty());
 }
 
 TEST(PalpateCH, FrictionIsCoulombs) {
   // Deceleration is the coefficient times gravity, until the cloth stops.
   TestScene test;
-  test.model->m_gravity = {0, -10, 0};
+  test.config().m_gravity = {0, -10, 0};
   const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
   test.collide(cloth, test.floor(sheet({0, 0, 0}, 1, 10)), within(0.2))->setFriction(0.5);
   test.scene->initialize();
   test.setVelocity(*cloth, {1, 0, 0});
   test.step(10);
-  EXPECT_NEAR(velocity(*cloth).x(), 1 - 0.5 * 10 * 10 * test.model->m_dt, 1e-6);
+  EXPECT_NEAR(velocity(*cloth).x(), 1 - 0.5 * 10 * 10 * test.config().m_dt, 1e-6);
   test.step(30);
   EXPECT_NEAR(velocity(*cloth).x(), 0, 1e-9);
 }
 
 TEST(PalpateCH, AToolThatSlidesDragsByFriction) {
   TestScene test;
-  test.model->m_gravity = {0, -10, 0};
+  test.config().m_gravity = {0, -10, 0};
   const auto plane = std::make_shared<imstk::Plane>();
   const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
   test.collide(cloth, test.tool(plane), within(0.2))->setFriction(0.5);
@@ -71,7 +71,8 @@ TEST(PalpateCH, AMappedSurfaceMovesItsParticles) {
   TestScene test;
   // The physics mesh has its vertices in another order, and one that the surface does not have.
   const auto surface = triangle({0.3, 0.05, 0.2}, 0.1);
-  auto positions = surface->getVertexPositions()->values;
+  const auto range = positionsIn(*surface);
+  const std::vector<Vec3d> positions(range.begin(), range.end());
   const auto physics = std::make_shared<imstk::PointSet>();
   physics->initialize(positionArray({{0, 5, 0}, positions[2], positions[0], positions[1]}));
   const auto body = std::make_shared<imstk::PbdObject>("mapped");
@@ -93,13 +94,13 @@ TEST(PalpateCH, AMappedSurfaceMovesItsParticles) {
   test.step();
   EXPECT_LT(particle(*body, 0).y(), -4);
   for (size_t i = 1; i < 4; ++i) EXPECT_GT(particle(*body, i).y(), 0);
-  EXPECT_TRUE(imstk::logged().empty());
+  EXPECT_TRUE(logged().empty());
 }
 
 TEST(PalpateCH, ARigidBodyTurnsWhereItIsHit) {
   for (const bool isShape : {false, true}) {
     TestScene test;
-    test.model->m_iterations = 100;
+    test.config().m_iterations = 100;
     std::shared_ptr<imstk::Geometry> geometry = sheet({0, 0, 0}, 1, 1);
     if (isShape)
       geometry = std::make_shared<imstk::Capsule>(
@@ -116,7 +117,7 @@ TEST(PalpateCH, ARigidBodyTurnsWhereItIsHit) {
     EXPECT_NEAR(particle(*body).y(), push * inverse, 0.1 * push) << isShape;
     const double angle = 2 * (*body->getPbdBody()->orientations)[0].z();
     EXPECT_NEAR(angle, push * arm * inverse, 0.1 * push) << isShape;
-    EXPECT_TRUE(imstk::logged().empty());
+    EXPECT_TRUE(logged().empty());
   }
 }
 
@@ -135,23 +136,25 @@ TEST(PalpateCH, AClothTouchesItself) {
   TestScene test;
   // Two sheets in one mesh.
   const auto low = sheet({0, 0, 0}, 1, 2), high = sheet({0.1, 0.05, 0.1}, 1, 2);
-  auto positions = low->getVertexPositions()->values;
-  auto cells = low->getCells()->values;
-  for (const Vec3d& p : high->getVertexPositions()->values) positions.push_back(p);
-  for (const Eigen::Vector3i& cell : high->getCells()->values)
+  const auto positionsOfLow = positionsIn(*low);
+  const auto cellsOfLow = valuesOf(low->getCells());
+  std::vector<Vec3d> positions(positionsOfLow.begin(), positionsOfLow.end());
+  std::vector<Eigen::Vector3i> cells(cellsOfLow.begin(), cellsOfLow.end());
+  for (const Vec3d& p : positionsIn(*high)) positions.push_back(p);
+  for (const Eigen::Vector3i& cell : valuesOf(high->getCells()))
     cells.push_back(cell + Eigen::Vector3i::Constant(4));
   const auto mesh = std::make_shared<imstk::SurfaceMesh>();
   mesh->initialize(positionArray(positions), cellArray<3>(cells));
   const auto cloth = test.deformable("cloth", mesh);
   test.collide(cloth, cloth, within(0.2));
-  test.model->m_iterations = 50;
+  test.config().m_iterations = 50;
   test.scene->initialize();
   test.step();
   for (size_t i = 0; i < 4; ++i) {
     EXPECT_LT(particle(*cloth, i).y(), -0.01) << i;
     EXPECT_GT(particle(*cloth, i + 4).y(), 0.06) << i;
   }
-  EXPECT_TRUE(imstk::logged().empty());
+  EXPECT_TRUE(logged().empty());
 }
 
 }  // namespace

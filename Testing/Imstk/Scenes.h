@@ -4,10 +4,13 @@
 #include <palpate/imstk/PalpateScene.h>
 
 #include <imstkCapsule.h>
+#include <imstkCollisionHandling.h>
 #include <imstkCylinder.h>
 #include <imstkLineMesh.h>
+#include <imstkLogger.h>
 #include <imstkOrientedBox.h>
 #include <imstkPbdModel.h>
+#include <imstkPbdModelConfig.h>
 #include <imstkPbdObject.h>
 #include <imstkPbdObjectCollision.h>
 #include <imstkPbdSolver.h>
@@ -18,7 +21,9 @@
 #include <imstkSurfaceMesh.h>
 #include <imstkTaskGraph.h>
 #include <imstkTetrahedralMesh.h>
+#include <imstkVecDataArray.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,12 +33,53 @@ using imstk::Vec3d;
 template <int N>
 using CellArray = std::shared_ptr<imstk::VecDataArray<int, N>>;
 
-inline std::shared_ptr<imstk::VecDataArray<double, 3>> positionArray(std::vector<Vec3d> positions) {
-  return std::make_shared<imstk::VecDataArray<double, 3>>(std::move(positions));
+template <class T, int N, class Values>
+std::shared_ptr<imstk::VecDataArray<T, N>> arrayOf(const Values& values) {
+  auto array = std::make_shared<imstk::VecDataArray<T, N>>();
+  for (const auto& value : values) array->push_back(value);
+  return array;
+}
+inline std::shared_ptr<imstk::VecDataArray<double, 3>> positionArray(
+    const std::vector<Vec3d>& positions) {
+  return arrayOf<double, 3>(positions);
 }
 template <int N>
-CellArray<N> cellArray(std::vector<Eigen::Matrix<int, N, 1>> cells) {
-  return std::make_shared<imstk::VecDataArray<int, N>>(std::move(cells));
+CellArray<N> cellArray(const std::vector<Eigen::Matrix<int, N, 1>>& cells) {
+  return arrayOf<int, N>(cells);
+}
+/// The elements of an array of iMSTK, to read and write.
+template <class Array>
+auto valuesOf(const std::shared_ptr<Array>& array) {
+  struct Range {
+    typename Array::ValueType *first, *last;
+    auto begin() const { return first; }
+    auto end() const { return last; }
+  };
+  auto* const first = array->getPointer();
+  return Range{first, first + array->size()};
+}
+inline auto positionsIn(const imstk::PointSet& mesh) { return valuesOf(mesh.getVertexPositions()); }
+
+// iMSTK's logger has one output. With g3log it writes from a thread of its own.
+#ifndef iMSTK_SYNCHRONOUS_LOGGING
+#error "The tests read iMSTK's log: build iMSTK with iMSTK_SYNCHRONOUS_LOGGING."
+#endif
+struct PalpateWarnings : imstk::LogOutput {
+  std::vector<std::string> texts;
+  bool writeMessage(const std::string& message) override {
+    const std::size_t start = message.find("Palpate: ");  // after the time and the level
+    if (start != std::string::npos) texts.push_back(message.substr(start));
+    return true;
+  }
+};
+/// The warnings of the adapter since the last clear().
+inline std::vector<std::string>& logged() {
+  static const auto warnings = [] {
+    auto output = std::make_shared<PalpateWarnings>();
+    imstk::LoggerSynchronous::instance()->setOutput(output);
+    return output;
+  }();
+  return warnings->texts;
 }
 
 /// A square of 2 x 2 around `centre`, of `n` x `n` squares across the y axis.
@@ -63,13 +109,27 @@ inline std::shared_ptr<imstk::SurfaceMesh> triangle(const Vec3d& centre, double 
   return mesh;
 }
 
-/// An iMSTK scene with one PbdModel and a PalpateScene.
+/// Leaves all to the guard.
+struct NoHandling : imstk::CollisionHandling {
+  const std::string getTypeName() const override { return "NoHandling"; }
+
+ protected:
+  void handle(const std::vector<imstk::CollisionElement>&,
+              const std::vector<imstk::CollisionElement>&) override {}
+};
+
+/// An iMSTK scene with one PbdModel, without gravity and damping, and a PalpateScene.
 struct TestScene {
   std::shared_ptr<imstk::Scene> scene = std::make_shared<imstk::Scene>("scene");
   std::shared_ptr<imstk::PbdModel> model = std::make_shared<imstk::PbdModel>();
   palpate::PalpateScene palpateScene{scene};
 
-  TestScene() { imstk::logged().clear(); }
+  TestScene() {
+    logged().clear();
+    config().m_gravity = Vec3d::Zero();
+    config().m_linearDampingCoeff = config().m_angularDampingCoeff = 0;
+  }
+  imstk::PbdModelConfig& config() const { return *model->getConfig(); }
 
   std::shared_ptr<imstk::PbdObject> deformable(const std::string& name,
                                                std::shared_ptr<imstk::PointSet> mesh) {
@@ -111,19 +171,27 @@ struct TestScene {
     scene->addInteraction(interaction);
     return interaction;
   }
-  /// With iMSTK's own handler, which here does nothing: the guard alone acts.
+  /// Without a handler: the guard alone acts.
   std::shared_ptr<imstk::PbdObjectCollision> guardOnly(std::shared_ptr<imstk::PbdObject> a,
                                                        std::shared_ptr<imstk::CollidingObject> b) {
     const auto interaction = std::make_shared<imstk::PbdObjectCollision>(a, b, "PalpateCD");
+    const auto handling = std::make_shared<NoHandling>();
+    handling->setInputObjectA(a);
+    handling->setInputObjectB(b);
+    handling->setInputCollisionData(interaction->getCollisionDetection()->getCollisionData());
+    interaction->setCollisionHandlingAB(handling);
     palpateScene.share(interaction);
     scene->addInteraction(interaction);
     return interaction;
   }
   void setVelocity(imstk::PbdObject& object, const Vec3d& velocity) {
-    for (Vec3d& v : object.getPbdBody()->velocities->values) v = velocity;
+    for (Vec3d& v : valuesOf(object.getPbdBody()->velocities)) v = velocity;
   }
   void step(int steps = 1) {
-    for (int i = 0; i < steps; ++i) scene->advance(model->m_dt);
+    for (int i = 0; i < steps; ++i) {
+      scene->advance(config().m_dt);
+      scene->updateVisuals(config().m_dt);
+    }
   }
 };
 
