@@ -67,6 +67,51 @@ TEST(PalpateCH, AToolThatSlidesDragsByFriction) {
   EXPECT_NEAR(particle(*cloth).y(), 0.1, 1e-6);
 }
 
+TEST(PalpateCH, AToolAtRestThatTheGuardHoldsDoesNotDrag) {
+  // A plane presses a cloth on a floor. The program leads it on, below the floor and aside.
+  TestScene test;
+  test.config().m_gravity = {0, -10, 0};
+  const auto plane = std::make_shared<imstk::Plane>(Vec3d(0, 1, 0), Vec3d(0, -1, 0));
+  const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
+  test.collide(cloth, test.floor(sheet({0, 0, 0}, 1, 10)), within(0.2));
+  test.collide(cloth, test.tool(plane), within(0.2))->setFriction(0.2);
+  test.scene->initialize();
+  for (int i = 1; i <= 20; ++i) {
+    plane->setPosition({0.02 * i, 1 - 0.07 * i, 0});
+    test.step();
+  }
+  test.step(20);
+  EXPECT_GT(test.palpateScene.held(), 0u);
+  const double x = particle(*cloth).x();
+  test.step(50);
+  EXPECT_NEAR(particle(*cloth).x(), x, 0.01);
+}
+
+TEST(PalpateCH, ADisabledInteractionDoesNotPush) {
+  TestScene test;
+  const auto cloth = test.deformable("cloth", sheet({0, 0.05, 0}));
+  const auto interaction = test.collide(cloth, test.floor(sheet({0, 0, 0}, 3, 4)), within(0.2));
+  test.scene->initialize();
+  interaction->setEnabled(false);
+  test.step();
+  EXPECT_EQ(particle(*cloth).y(), 0.05);
+  interaction->setEnabled(true);
+  test.step();
+  EXPECT_NEAR(particle(*cloth).y(), 0.1, 1e-9);
+}
+
+TEST(PalpateCH, WhatItDoesNotUseIsNamedOnce) {
+  TestScene test;
+  const auto cloth = test.deformable("cloth", sheet({0, 0.05, 0}));
+  const auto interaction = test.collide(cloth, test.floor(sheet({0, 0, 0}, 3, 4)), within(0.2));
+  interaction->setRestitution(0.5);
+  interaction->setDeformableStiffnessA(0.9);
+  test.scene->initialize();
+  test.step(3);
+  ASSERT_EQ(logged().size(), 1u);
+  EXPECT_NE(logged()[0].find("its restitution, stiffness:"), std::string::npos) << logged()[0];
+}
+
 TEST(PalpateCH, AMappedSurfaceMovesItsParticles) {
   TestScene test;
   // The physics mesh has its vertices in another order, and one that the surface does not have.

@@ -77,8 +77,10 @@ TEST(PalpateScene, ABodyThatWasMovedBeginsWhereItIs) {
   test.setVelocity(*falling, {0, 1000, 0});
   test.step();
   EXPECT_LT(particle(*falling).y(), 0);
-  test.scene->reset();
+  test.scene->reset();  // at the end of the next step
   test.palpateScene.restart();
+  test.step();
+  EXPECT_EQ(particle(*falling).y(), 1);
   test.step();
   EXPECT_EQ(particle(*falling).y(), 1);
   EXPECT_EQ(test.palpateScene.held(), 0u);
@@ -194,17 +196,75 @@ TEST(PalpateScene, ErrorsAreLoggedOnceAndEnd) {
   EXPECT_TRUE(test.palpateScene.trusted());
 }
 
-TEST(PalpateScene, AnErrorOfTheGuardIsLoggedOnce) {
-  TestScene test;
-  const auto box = std::make_shared<imstk::OrientedBox>();  // half of it is below the floor
-  test.guardOnly(test.floor(sheet({0, 0, 0})), test.tool(box));
-  test.scene->initialize();
-  for (int i = 1; i <= 3; ++i) {
-    box->setPosition({0, -0.01 * i, 0});
+TEST(PalpateScene, WhatCrossesAtTheStartIsNamedAndGuardedOnceItIsApart) {
+  for (const std::string kind : {"mesh", "box"}) {
+    TestScene test;
+    const auto box = std::make_shared<imstk::OrientedBox>(Vec3d(0.1, 0, 0.1));
+    std::shared_ptr<imstk::Geometry> geometry = box;
+    if (kind == "mesh") geometry = cube({0, 0, 0}, 0.5);
+    const auto body = test.rigid("body", geometry, {0.1, 0.1, 0.1});
+    const auto other = test.deformable("other", triangle({0.1, 3, 0.1}, 0.2));
+    const auto floor = test.floor(sheet({0, 0, 0}));
+    test.guardOnly(body, floor);
+    test.guardOnly(other, floor);
+    test.scene->initialize();
+    ASSERT_EQ(logged().size(), 1u) << kind;
+    EXPECT_NE(logged()[0].find("\"body\" and \"floor\" cross"), std::string::npos);
+    test.setVelocity(*body, {0, 10, 0});
+    test.setVelocity(*other, {0, -1000, 0});  // the other pair is guarded
+    test.step(8);
+    EXPECT_GT(particle(*body).y(), 0.8) << kind;
+    EXPECT_GT(particle(*other).y(), 0) << kind;
+    EXPECT_EQ(test.palpateScene.error(), "");
+    ASSERT_EQ(logged().size(), 2u) << kind;
+    EXPECT_NE(logged()[1].find("apart"), std::string::npos);
+    test.setVelocity(*body, {0, -1000, 0});
     test.step();
-    EXPECT_EQ(test.palpateScene.error(), logged().at(0).substr(9));
+    EXPECT_GT(particle(*body).y(), 0.4) << kind;
   }
-  EXPECT_EQ(logged().size(), 1u);
+}
+
+TEST(PalpateScene, ACubeRestsOnAFloorByDefault) {
+  for (const bool isShape : {false, true}) {
+    TestScene test;
+    test.config().m_gravity = {0, -9.81, 0};
+    std::shared_ptr<imstk::Geometry> geometry = cube({0, 0, 0}, 0.25);
+    if (isShape)
+      geometry = std::make_shared<imstk::OrientedBox>(Vec3d(0, 0, 0), Vec3d(0.25, 0.25, 0.25));
+    const auto body = test.rigid("cube", geometry, {0.1, 0.6, 0.1});
+    test.collide(body, test.floor(sheet({0, 0, 0}, 4, 4)), {});
+    test.scene->initialize();
+    int untrusted = 0;
+    for (int i = 0; i < 400; ++i) {
+      test.step();
+      untrusted += test.palpateScene.trusted() ? 0 : 1;
+      const imstk::Quatd q = (*body->getPbdBody()->orientations)[0];
+      for (int corner = 0; corner < 8; ++corner)
+        ASSERT_GT((particle(*body) + q * cornerOf(corner, 0.25)).y(), 0)
+            << isShape << ", step " << i;
+    }
+    EXPECT_EQ(untrusted, 0) << isShape;
+    EXPECT_LT(velocity(*body).norm(), 0.5 * 9.81 * test.config().m_dt) << isShape;
+    EXPECT_LT(particle(*body).y(), 0.27) << isShape;
+    EXPECT_TRUE(logged().empty());
+  }
+}
+
+TEST(PalpateScene, AToolThatIsHeldRestsWithTrust) {
+  TestScene test;
+  const auto sphere = std::make_shared<imstk::Sphere>(Vec3d(0.1, 1, 0.1), 0.3);
+  palpate::PalpateSettings settings;
+  settings.thickness = 0.1;
+  test.collide(test.floor(sheet({0, 0, 0})), test.tool(sphere), settings);
+  test.scene->initialize();
+  test.step();
+  sphere->setPosition({0.1, -0.5, 0.1});
+  test.step(30);
+  EXPECT_EQ(test.palpateScene.held(), 1u);
+  for (int i = 0; i < 100; ++i) {
+    test.step();
+    ASSERT_TRUE(test.palpateScene.trusted()) << i;
+  }
 }
 
 TEST(PalpateScene, OnlyInteractionsWithPalpateCDAreShared) {

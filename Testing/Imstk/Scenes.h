@@ -100,6 +100,29 @@ inline std::shared_ptr<imstk::SurfaceMesh> sheet(const Vec3d& centre, int n = 2,
   return mesh;
 }
 
+/// A corner of the cube of half the edge `half` around the origin, of 8.
+inline Vec3d cornerOf(int corner, double half) {
+  return half * Vec3d(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+}
+inline std::shared_ptr<imstk::SurfaceMesh> cube(const Vec3d& centre, double half) {
+  std::vector<Vec3d> positions;
+  for (int i = 0; i < 8; ++i) positions.push_back(centre + cornerOf(i, half));
+  auto mesh = std::make_shared<imstk::SurfaceMesh>();
+  mesh->initialize(positionArray(positions), cellArray<3>({{0, 2, 1},
+                                                           {1, 2, 3},
+                                                           {4, 5, 6},
+                                                           {5, 7, 6},
+                                                           {0, 1, 4},
+                                                           {1, 5, 4},
+                                                           {2, 6, 3},
+                                                           {3, 6, 7},
+                                                           {0, 4, 2},
+                                                           {2, 4, 6},
+                                                           {1, 3, 5},
+                                                           {3, 7, 5}}));
+  return mesh;
+}
+
 inline std::shared_ptr<imstk::SurfaceMesh> triangle(const Vec3d& centre, double size) {
   auto mesh = std::make_shared<imstk::SurfaceMesh>();
   mesh->initialize(

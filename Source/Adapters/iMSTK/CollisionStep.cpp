@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -65,9 +67,15 @@ struct Body {
   double radius;
   std::string name;
   GeometryId id{};
+  ShapeMeasures measures{};              // of a shape
+  bool isPlane = false;                  // without bounds
   std::vector<Eigen::Vector3d> local{};  // of a rigid mesh
   std::vector<Eigen::Vector3d> before{}, now{};
   BodyPose poseBefore{}, poseNow{};
+  // Where the program put a fixed body in the last step and in this one. What holds it back does
+  // not slide.
+  std::vector<Eigen::Vector3d> programBefore{}, program{};
+  BodyPose programPoseBefore{}, programPose{};
 
   bool isShape() const { return verticesPerCell == 0; }
   bool isPlaced() const { return isShape() || role == BodyRole::Rigid; }
@@ -156,7 +164,7 @@ struct CollisionStep::Implementation {
         whole.local += weight * side.local[vertex];
       } else {
         row.offset -= weight * row.normal.dot(side.now[vertex]);
-        row.fixedDisplacement += weight * (side.now[vertex] - side.before[vertex]);
+        row.fixedDisplacement += weight * (side.program[vertex] - side.programBefore[vertex]);
       }
     }
     if (whole.weight == 0) return;
@@ -175,7 +183,8 @@ struct CollisionStep::Implementation {
       row.terms[static_cast<std::size_t>(row.termCount++)] = {bodyIndex, -1, weight, local};
       row.offset += weight * row.normal.dot(end);
     } else {
-      row.fixedDisplacement += weight * (end - poseOf(side.poseBefore)(local));
+      row.fixedDisplacement +=
+          weight * (poseOf(side.programPose)(local) - poseOf(side.programPoseBefore)(local));
     }
   }
 };
@@ -192,7 +201,7 @@ int CollisionStep::addMesh(BodyRole role, const MeshArrays& mesh, double radius,
   Implementation& all = *m_implementation;
   Body body{role, mesh.verticesPerCell, radius, name};
   body.now.assign(mesh.positions, mesh.positions + mesh.vertices);
-  body.before = body.now;
+  body.before = body.program = body.programBefore = body.now;
   all.add(body, mesh);
   if (role == BodyRole::Rigid) {
     body.local = body.now;
@@ -208,8 +217,10 @@ int CollisionStep::addShape(BodyRole role, const ShapeMeasures& measures, const 
                             const std::string& name) {
   Implementation& all = *m_implementation;
   Body body{role, 0, 0.0, name};
+  body.measures = measures;
+  body.isPlane = measures.kind == ShapeMeasures::Kind::Plane;
   body.id = all.collisions.addAnalyticalGeometry(shapeOf(measures));
-  body.poseBefore = body.poseNow = pose;
+  body.poseBefore = body.poseNow = body.programPose = body.programPoseBefore = pose;
   all.collisions.setTransform(body.id, poseOf(pose), poseOf(pose));
   all.nameAndGroup(body);
   all.bodies.push_back(std::move(body));
@@ -237,7 +248,7 @@ void CollisionStep::replaceMesh(int index, const MeshArrays& mesh) {
   if (body.role == BodyRole::Rigid)
     body.place();
   else
-    body.before = body.now;
+    body.before = body.program = body.programBefore = body.now;
 }
 
 int CollisionStep::addPair(int a, int b, const Pair& settings) {
@@ -259,6 +270,8 @@ void CollisionStep::setPositions(int index, const Eigen::Vector3d* before,
   Body& body = m_implementation->body(index);
   const std::vector<Eigen::Vector3d> start(before, before + vertices), end(now, now + vertices);
   m_implementation->collisions.setPositions(body.id, start, end);
+  body.programBefore = start == end ? end : body.program;
+  body.program = end;
   body.before = start;
   body.now = end;
 }
@@ -266,6 +279,8 @@ void CollisionStep::setPositions(int index, const Eigen::Vector3d* before,
 void CollisionStep::setPose(int index, const BodyPose& before, const BodyPose& now) {
   Body& body = m_implementation->body(index);
   m_implementation->collisions.setTransform(body.id, poseOf(before), poseOf(now));
+  body.programPoseBefore = before == now ? now : body.programPose;
+  body.programPose = now;
   body.poseBefore = before;
   body.poseNow = now;
   body.place();
@@ -290,6 +305,47 @@ bool CollisionStep::trusted() const {
   for (int i = 0; i < static_cast<int>(m_implementation->pairs.size()); ++i)
     if (!m_implementation->contactsOf(i).validity().trusted) return false;
   return true;
+}
+
+bool CollisionStep::mayCross(int pair) const {
+  return !m_implementation->contactsOf(pair).validity().startedApart;
+}
+
+bool CollisionStep::isCrossed(int index, bool was) {
+  Implementation& all = *m_implementation;
+  const PairOfBodies& pair = all.pair(index);
+  const Body &a = all.body(pair.a), &b = all.body(pair.b);
+  const SpatialQueries queries = all.collisions.queries();
+  if (!a.isShape() && !b.isShape()) {
+    if (a.verticesPerCell == 1 || b.verticesPerCell == 1) return false;
+    std::vector<ElementPair> candidates;
+    all.collisions.forEachCandidate(a.id, b.id, [&](std::span<const ElementPair> batch) {
+      candidates.insert(candidates.end(), batch.begin(), batch.end());
+    });
+    return std::ranges::any_of(candidates, [&](const ElementPair& elements) {
+      return queries.pierce(a.id, elements.a, b.id, elements.b);
+    });
+  }
+  const auto sizeOf = [&](const Body& body) {
+    const Eigen::AlignedBox3d box = all.collisions.bounds(body.id);
+    return body.isPlane || box.isEmpty()
+               ? 0.0
+               : box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
+  };
+  // The guard's slack is 2^-33.
+  const double slack = std::ldexp(std::max(sizeOf(a), sizeOf(b)), -30);
+  if (a.isShape() && b.isShape()) {
+    if (a.isPlane && b.isPlane) return false;
+    const Penetration found = queries.penetration(a.id, b.id);
+    return was ? found.intersecting || queries.distance(a.id, b.id).distance < slack
+               : found.depth > slack;
+  }
+  const Body &shape = a.isShape() ? a : b, &mesh = a.isShape() ? b : a;
+  std::vector<ShapeContact> contacts;
+  queries.contacts(mesh.id, shapeOf(shape.measures), poseOf(shape.poseNow), slack, contacts);
+  return was ? !contacts.empty() : std::ranges::any_of(contacts, [&](const ShapeContact& c) {
+    return c.distance < -slack;
+  });
 }
 
 void CollisionStep::appendRows(int index, std::vector<StepRow>& rows) const {
@@ -399,6 +455,26 @@ std::size_t CollisionStep::hold() {
     }
   }
   return held;
+}
+
+void CollisionStep::stay(int index) {
+  Body& body = m_implementation->body(index);
+  body.poseNow = body.poseBefore;
+  m_implementation->collisions.setTransform(body.id, poseOf(body.poseNow));
+  body.place();
+}
+
+void CollisionStep::restoreFixedEnds() {
+  for (Body& body : m_implementation->bodies) {
+    if (body.role != BodyRole::Fixed) continue;
+    if (body.isShape()) {
+      body.poseNow = body.programPose;
+      m_implementation->collisions.setTransform(body.id, poseOf(body.poseNow));
+    } else {
+      body.now = body.program;
+      m_implementation->collisions.setPositions(body.id, body.now);
+    }
+  }
 }
 
 void CollisionStep::advance() {

@@ -36,6 +36,9 @@ struct MeshArrays {
 struct BodyPose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+  friend bool operator==(const BodyPose& a, const BodyPose& b) {
+    return a.rotation == b.rotation && a.translation == b.translation;
+  }
 };
 
 /// gap = normal . (sum of weights times positions) - offset: without contact while positive.
@@ -49,8 +52,9 @@ struct StepRow {
   std::array<Term, 4> terms;
   int termCount = 0;
   Eigen::Vector3d normal;
-  double offset;                      ///< with bodies that no row moves
-  Eigen::Vector3d fixedDisplacement;  ///< weighted, of those bodies in the step
+  double offset;  ///< with bodies that no row moves
+  /// Weighted, of those bodies in the step, as the program moved them: without what held them.
+  Eigen::Vector3d fixedDisplacement;
 };
 
 /// One side of an element of iMSTK: ids of vertices, or a point.
@@ -93,10 +97,17 @@ class CollisionStep {
 
   void detect();
   bool trusted() const;
+  /// Whether the bodies of a pair may have touched or crossed when the detected step began.
+  bool mayCross(int pair) const;
+  /// Whether surfaces pierce each other, or a shape overlaps by more than the guard's slack; of a
+  /// pair that `was` crossed, whether it is still not apart by that. At rest: after advance().
+  bool isCrossed(int pair, bool was);
   void appendRows(int pair, std::vector<StepRow>& rows) const;
   void appendElements(int pair, std::vector<StepElement>& a, std::vector<StepElement>& b) const;
   /// Shortens the step; returns how many vertices and bodies.
   std::size_t hold();
+  void stay(int body);      ///< a placed body ends the step where it began it
+  void restoreFixedEnds();  ///< undoes hold() for bodies that nothing but the program moves
   void advance();
 
  private:

@@ -6,12 +6,14 @@
 #include <imstkPbdSolver.h>
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 namespace palpate {
 
 namespace {
 
-// Pushes until the gap is there, and never pulls.
+// Pushes until the gap is there. It takes back what it pushed too far in the step, and never pulls.
 class RowConstraint : public imstk::PbdConstraint {
  public:
   RowConstraint(const ParticleRow& row, double gap)
@@ -28,17 +30,20 @@ class RowConstraint : public imstk::PbdConstraint {
       c += term.weight * m_row.normal.dot(bodies.getPosition(term.particle) + arm(bodies, term));
       dcdx[i] = term.weight * m_row.normal;
     }
-    return c < 0;
+    return c < 0 || m_lambda > 0;
   }
 
   void projectConstraint(imstk::PbdState& bodies, const double, const SolverType&) override {
     double c = 0;
-    if (!computeValueAndGradient(bodies, c, m_dcdx)) return;
+    const bool acts = computeValueAndGradient(bodies, c, m_dcdx);
+    m_C = std::min(c, 0.0);  // for SceneStep
+    if (!acts) return;
     const double mobility = mobilityIn(bodies, m_row.normal);
     if (mobility == 0) return;
-    m_pushed -= c;
+    const double change = std::max(-c / mobility, -m_lambda);
+    m_lambda += change;
     for (const ParticleRow::Term& term : m_row.terms) {
-      const imstk::Vec3d impulse = -c / mobility * term.weight * m_row.normal;
+      const imstk::Vec3d impulse = change * term.weight * m_row.normal;
       const imstk::Vec3d turn = turnBy(bodies, term, impulse);
       bodies.getPosition(term.particle) += bodies.getInvMass(term.particle) * impulse;
       if (!term.rigid) continue;
@@ -48,9 +53,9 @@ class RowConstraint : public imstk::PbdConstraint {
     }
   }
 
-  // Coulomb: the tangential impulse is at most the coefficient times what pushed.
+  // Coulomb: the tangential impulse is at most the coefficient times the normal one, m_lambda / dt.
   void correctVelocity(imstk::PbdState& bodies, const double dt) override {
-    if (m_friction == 0 || m_pushed == 0 || dt == 0) return;
+    if (m_friction == 0 || m_lambda == 0 || dt == 0) return;
     imstk::Vec3d sliding = m_row.fixedDisplacement / dt;
     for (const ParticleRow::Term& term : m_row.terms) {
       sliding += term.weight * bodies.getVelocity(term.particle);
@@ -61,9 +66,9 @@ class RowConstraint : public imstk::PbdConstraint {
     const double speed = sliding.norm();
     if (speed == 0) return;
     const imstk::Vec3d tangent = sliding / speed;
-    const double along = mobilityIn(bodies, tangent), across = mobilityIn(bodies, m_row.normal);
+    const double along = mobilityIn(bodies, tangent);
     if (along == 0) return;
-    const double impulse = std::min(speed / along, m_friction * m_pushed / (dt * across));
+    const double impulse = std::min(speed / along, m_friction * m_lambda / dt);
     for (const ParticleRow::Term& term : m_row.terms) {
       const imstk::Vec3d change = -impulse * term.weight * tangent;
       const imstk::Vec3d turn = turnBy(bodies, term, change);
@@ -97,7 +102,6 @@ class RowConstraint : public imstk::PbdConstraint {
 
   ParticleRow m_row;
   double m_gap;
-  double m_pushed = 0;  // L, the sum of corrections along the normal
 };
 
 }  // namespace
@@ -110,18 +114,44 @@ void PalpateCH::handle(const std::vector<imstk::CollisionElement>&,
   m_rows.clear();
   m_owned.clear();
   const std::shared_ptr<SceneStep>& step = m_detection->step();
-  if (step == nullptr || m_detection->pair() < 0) return;
+  if (step == nullptr || m_detection->pair() < 0 || !step->isEnabled(m_detection->pair())) return;
   imstk::PbdModel* model = step->modelOf(m_detection->pair());
+  if (model == nullptr) return;
+  warnOfUnused(*step);
+  appendRows();
+  model->getSolver()->addConstraints(&m_rows);
+  step->addHandler(this);
+}
+
+void PalpateCH::appendRows() {
+  const std::shared_ptr<SceneStep>& step = m_detection->step();
   std::vector<ParticleRow> rows;
   step->appendRows(m_detection->pair(), rows);
-  if (rows.empty() || model == nullptr) return;
   const double gap = step->gapOf(m_detection->pair());
   for (const ParticleRow& row : rows) {
     m_owned.push_back(std::make_unique<RowConstraint>(row, gap));
-    m_owned.back()->setFriction(getFriction());
+    m_owned.back()->setFriction(getUseCorrectVelocity() ? getFriction() : 0.0);
     m_rows.push_back(m_owned.back().get());
   }
-  model->getSolver()->addConstraints(&m_rows);
+}
+
+// Once for each handler.
+void PalpateCH::warnOfUnused(SceneStep& step) {
+  if (m_hasWarned) return;
+  const imstk::PbdCollisionHandling defaults;
+  std::string unused;
+  const auto add = [&](bool isSet, const char* name) {
+    if (isSet) unused += (unused.empty() ? "" : ", ") + std::string(name);
+  };
+  add(getRestitution() != defaults.getRestitution(), "restitution");
+  add(getDeformableStiffnessA() != defaults.getDeformableStiffnessA() ||
+          getDeformableStiffnessB() != defaults.getDeformableStiffnessB(),
+      "stiffness");
+  add(getRigidBodyCompliance() != defaults.getRigidBodyCompliance(), "compliance");
+  if (unused.empty()) return;
+  m_hasWarned = true;
+  step.note("PalpateCH of " + step.nameOf(m_detection->pair()) + " does not use its " + unused +
+            ": contacts are rigid and do not bounce.");
 }
 
 }  // namespace palpate

@@ -91,7 +91,10 @@ std::shared_ptr<imstk::PbdObjectCollision> PalpateScene::makeCollision(
   handler->setInputObjectB(second);
   handler->setInputCollisionData(detection->getCollisionData());
   interaction->setCollisionHandlingAB(handler);
-  share(interaction, settings);
+  PalpateSettings chosen = settings;
+  // Rows without a gap would leave no room but rounding.
+  if (chosen.thickness == 0 && chosen.method != PalpateMethod::Intersection) chosen.thickness = -1;
+  share(interaction, chosen);
   return interaction;
 }
 

@@ -1,6 +1,7 @@
 #include "iMSTK/SceneStep.h"
 
 #include <palpate/imstk/PalpateCD.h>
+#include <palpate/imstk/PalpateCH.h>
 
 #include <Eigen/Geometry>
 
@@ -14,6 +15,7 @@
 #include <imstkLogger.h>
 #include <imstkOrientedBox.h>
 #include <imstkPbdModel.h>
+#include <imstkPbdModelConfig.h>
 #include <imstkPbdObject.h>
 #include <imstkPlane.h>
 #include <imstkPointwiseMap.h>
@@ -23,7 +25,9 @@
 #include <imstkVecDataArray.h>
 
 #include <algorithm>
+#include <cmath>
 #include <exception>
+#include <limits>
 #include <stdexcept>
 
 namespace palpate {
@@ -89,9 +93,6 @@ BodyPose inverseOf(const BodyPose& pose) {
   const Eigen::Matrix3d rotation = pose.rotation.transpose();
   return {rotation, -(rotation * pose.translation)};
 }
-bool isSame(const BodyPose& a, const BodyPose& b) {
-  return a.rotation == b.rotation && a.translation == b.translation;
-}
 
 CollisionStep::Method methodOf(const PalpateSettings& settings, int verticesOfA, int verticesOfB) {
   switch (settings.method) {
@@ -114,9 +115,58 @@ CollisionStep::Method methodOf(const PalpateSettings& settings, int verticesOfA,
 
 }  // namespace
 
+namespace {
+
+// See Body::size. Infinite for a plane.
+double sizeOf(const std::vector<Eigen::Vector3d>& positions, const std::vector<int>& cells,
+              int verticesPerCell) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : positions) box.extend(p);
+  double edges = 0;
+  std::size_t count = 0;
+  const auto corners = static_cast<std::size_t>(verticesPerCell);
+  for (std::size_t first = 0; first < cells.size(); first += corners)
+    for (std::size_t i = 0; i < corners; ++i)
+      for (std::size_t k = 0; k < i; ++k, ++count)
+        edges += (positions.at(static_cast<std::size_t>(cells[first + i])) -
+                  positions.at(static_cast<std::size_t>(cells[first + k])))
+                     .norm();
+  const double whole = box.isEmpty() ? 0.0 : box.diagonal().norm() / 50;
+  return count == 0 ? whole : std::min(whole, 0.5 * edges / static_cast<double>(count));
+}
+double sizeOf(const ShapeMeasures& shape) {
+  switch (shape.kind) {
+    case ShapeMeasures::Kind::Plane:
+      return std::numeric_limits<double>::infinity();
+    case ShapeMeasures::Kind::Box:
+      return 2 * shape.halfExtents.norm() / 50;
+    case ShapeMeasures::Kind::Sphere:
+    case ShapeMeasures::Kind::Capsule:
+    case ShapeMeasures::Kind::Cylinder:
+      break;
+  }
+  return (2 * shape.radius + shape.length) / 50;
+}
+
+// Rounds of rows after iMSTK's solver, while the guard would hold something.
+constexpr int kRounds = 2;
+// Sweeps over the rows in a round, until none is violated by more than this share of its gap.
+constexpr int kSweeps = 20;
+constexpr double kViolationLeft = 1.0 / 64;
+// Calls of the guard for poses that are rounded as iMSTK's quaternions.
+constexpr int kPlacements = 4;
+
+}  // namespace
+
 struct SceneStep::Body {
+  struct Placement {
+    imstk::Quatd orientation = imstk::Quatd::Identity();
+    imstk::Vec3d position = imstk::Vec3d::Zero();
+  };
+
   int id;
   std::shared_ptr<imstk::Geometry> geometry;
+  std::string name{};
   std::shared_ptr<imstk::PointSet> mesh{};     // null: a shape
   std::shared_ptr<imstk::PbdObject> object{};  // null: nothing that a solver moves
   BodyRole role = BodyRole::Fixed;
@@ -124,6 +174,10 @@ struct SceneStep::Body {
   int verticesPerCell = 0;
   std::vector<Eigen::Vector3d> positions{};  // as read last
   BodyPose local{}, pose{};                  // of a shape in its rigid body; as read last
+  // A rigid body where the step began, and where the last one ended: its pose in CollisionStep has
+  // exactly the rotation of this quaternion.
+  Placement start{}, end{};
+  double size = 0;  // L, of a fiftieth of its box, or half its mean edge if that is less
 
   std::shared_ptr<imstk::PointwiseMap> map() const {
     if (object->getPhysicsGeometry() == geometry) return nullptr;
@@ -148,16 +202,23 @@ struct SceneStep::Pair {
   PalpateSettings settings;
   std::weak_ptr<imstk::CollisionInteraction> interaction{};
   std::weak_ptr<PalpateCD> detection{};
+  bool isNew = true, isCrossed = false;
 };
 
 SceneStep::SceneStep(int threads) : m_step(std::make_unique<CollisionStep>(threads)) {}
 SceneStep::~SceneStep() = default;
 
+std::string SceneStep::error() const {
+  const std::lock_guard<std::mutex> lock(m_errorLock);
+  return m_error;
+}
+
+void SceneStep::note(const std::string& message) { LOG(WARNING) << "Palpate: " << message; }
+
 void SceneStep::warn(const std::string& message) {
+  const std::lock_guard<std::mutex> lock(m_errorLock);
   m_error = message;
-  if (message != m_lastWarning) {  // LOG() is an if of its own
-    LOG(WARNING) << "Palpate: " << message;
-  }
+  if (message != m_lastWarning) note(message);
   m_lastWarning = message;
 }
 
@@ -203,11 +264,12 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
     body.role = body.object->getPbdBody()->bodyType == imstk::PbdBody::Type::RIGID
                     ? BodyRole::Rigid
                     : BodyRole::Particles;
-  const std::string name = object == nullptr ? geometry->getTypeName() : object->getName();
+  body.name = object == nullptr ? geometry->getTypeName() : object->getName();
   const bool isRigid = body.role == BodyRole::Rigid;
   if (isRigid) {
     imstk::PbdBody& pbd = *body.object->getPbdBody();
-    body.pose = poseOf((*pbd.orientations)[0], (*pbd.vertices)[0]);
+    body.end = {(*pbd.orientations)[0], (*pbd.vertices)[0]};
+    body.pose = poseOf(body.end.orientation, body.end.position);
   }
   if (body.mesh != nullptr) {
     const Cells cells = cellsOf(*body.mesh);
@@ -215,9 +277,10 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
     body.cells.assign(cells.indices,
                       cells.indices + cells.count * static_cast<std::size_t>(cells.vertices));
     body.positions = body.positionsOf(isRigid ? DataType::PreTransform : DataType::PostTransform);
+    body.size = sizeOf(body.positions, body.cells, body.verticesPerCell);
     const auto radius = m_radii.find(geometry.get());
     body.id = m_step->addMesh(body.role, body.arrays(cells),
-                              radius == m_radii.end() ? 0.0 : radius->second, body.pose, name);
+                              radius == m_radii.end() ? 0.0 : radius->second, body.pose, body.name);
   } else {
     if (isRigid) {
       body.local = poseOf(*geometry, DataType::PreTransform);
@@ -226,7 +289,8 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
       body.role = BodyRole::Fixed;
       body.pose = poseOf(*geometry, DataType::PostTransform);
     }
-    body.id = m_step->addShape(body.role, measuresOf(*geometry), body.pose, name);
+    body.size = sizeOf(measuresOf(*geometry));
+    body.id = m_step->addShape(body.role, measuresOf(*geometry), body.pose, body.name);
   }
   m_bodies.push_back(std::move(body));
   return static_cast<int>(m_bodies.size()) - 1;
@@ -249,6 +313,7 @@ void SceneStep::addSharedPairs() {
       const auto handler = interaction->getCollisionHandlingA();
       pair.bodyA = bodyOf(detection->getInput(0), handler->getInputObjectA());
       pair.bodyB = bodyOf(detection->getInput(1), handler->getInputObjectB());
+      setDefaults(pair);
       pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, pair.settings);
       m_pairs.push_back(pair);
       detection->setPair(static_cast<int>(m_pairs.size()) - 1);
@@ -257,6 +322,46 @@ void SceneStep::addSharedPairs() {
   m_newPairs.clear();
   // Geometries begin at rest: iMSTK predicts before it first detects.
   m_step->advance();
+  attempt([&] { findCrossedPairs(); });
+}
+
+void SceneStep::setDefaults(Pair& pair) {
+  PalpateSettings& settings = pair.settings;
+  if (settings.thickness >= 0) return;
+  settings.thickness = std::min(m_bodies[static_cast<std::size_t>(pair.bodyA)].size,
+                                m_bodies[static_cast<std::size_t>(pair.bodyB)].size);
+  if (pair.bodyA == pair.bodyB && settings.restDistance == 0)
+    settings.restDistance = 2 * settings.thickness;
+}
+
+std::string SceneStep::nameOf(int pair) const {
+  const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+  const auto name = [&](int body) {
+    return "\"" + m_bodies[static_cast<std::size_t>(body)].name + "\"";
+  };
+  return found.bodyA == found.bodyB ? name(found.bodyA)
+                                    : name(found.bodyA) + " and " + name(found.bodyB);
+}
+
+bool SceneStep::isEnabled(int pair) const {
+  const auto interaction = m_pairs[static_cast<std::size_t>(pair)].interaction.lock();
+  return interaction == nullptr || interaction->getEnabled();
+}
+
+// The guard would keep what has crossed where it is.
+void SceneStep::findCrossedPairs() {
+  for (std::size_t i = 0; i < m_pairs.size(); ++i) {
+    Pair& pair = m_pairs[i];
+    if (!pair.settings.guarded || pair.interaction.expired()) continue;
+    const bool isSuspect =
+        pair.isNew || pair.isCrossed || (m_hasAnswer && m_step->mayCross(pair.id));
+    pair.isNew = false;
+    if (!isSuspect || m_step->isCrossed(pair.id, pair.isCrossed) == pair.isCrossed) continue;
+    pair.isCrossed = !pair.isCrossed;
+    note(nameOf(static_cast<int>(i)) + (pair.isCrossed
+                                            ? " cross: they are not guarded until they are apart."
+                                            : " are apart: they are guarded from now on."));
+  }
 }
 
 int SceneStep::addPair(const std::shared_ptr<imstk::Geometry>& a,
@@ -272,26 +377,25 @@ int SceneStep::addPair(const std::shared_ptr<imstk::Geometry>& a,
 // Passes the positions now. At a step's start also `before`: where the last step ended, or for what
 // something else moved since, where iMSTK's step began.
 void SceneStep::read(Body& body, bool startsStep) {
-  const bool rests = startsStep && m_restarts;
+  const bool rests = startsStep && m_restarts > 0;
   if (body.isPlaced()) {
     BodyPose before = m_step->poseBefore(body.id);
     if (body.role == BodyRole::Rigid) {
       const imstk::PbdBody& pbd = *body.object->getPbdBody();
       body.pose = poseOf((*pbd.orientations)[0], (*pbd.vertices)[0]) * body.local;
+      if (startsStep) body.start = body.end;
       if (startsStep && pbd.prevVertices != nullptr && pbd.prevOrientations != nullptr &&
           (*pbd.invMasses)[0] > 0) {
-        const BodyPose began =
-            poseOf((*pbd.prevOrientations)[0], (*pbd.prevVertices)[0]) * body.local;
-        if (!began.rotation.isApprox(before.rotation, 1e-12) ||
-            began.translation != before.translation)
-          before = began;
+        body.start = {(*pbd.prevOrientations)[0], (*pbd.prevVertices)[0]};
+        before = poseOf(body.start.orientation, body.start.position) * body.local;
       }
     } else if (startsStep) {
       body.pose = poseOf(*body.geometry, DataType::PostTransform);
+      if (rests) before = body.pose;
     } else {
       return;
     }
-    m_step->setPose(body.id, rests ? body.pose : before, body.pose);
+    m_step->setPose(body.id, before, body.pose);
     return;
   }
   if (body.role == BodyRole::Fixed && !startsStep) return;
@@ -307,7 +411,7 @@ void SceneStep::read(Body& body, bool startsStep) {
     const std::shared_ptr<imstk::PointwiseMap> map = body.map();
     std::vector<Eigen::Vector3d> began = positions;
     const std::vector<Eigen::Vector3d>& last = m_step->before(body.id);
-    bool isMoved = isCut;
+    bool isMoved = isCut || rests;
     for (std::size_t i = 0; i < positions.size(); ++i) {
       const int particle = body.particleOf(map.get(), static_cast<int>(i));
       if (particle < 0 || particle >= pbd.vertices->size()) continue;
@@ -327,26 +431,36 @@ void SceneStep::read(Body& body, bool startsStep) {
     body.cells.assign(cells.indices, cells.indices + indices);
   }
   if (before.empty()) before = m_step->before(body.id);
-  m_step->setPositions(body.id, rests ? body.positions.data() : before.data(),
-                       body.positions.data(), body.positions.size());
+  if (rests && body.role == BodyRole::Fixed) before = body.positions;
+  m_step->setPositions(body.id, before.data(), body.positions.data(), body.positions.size());
 }
 
 void SceneStep::detect() {
   end(false);
-  m_error.clear();
+  {
+    const std::lock_guard<std::mutex> lock(m_errorLock);
+    m_error.clear();
+  }
   m_isDetected = true;
+  m_handlers.clear();
   m_hasAnswer = attempt([&] {
     for (Body& body : m_bodies) read(body, true);
-    for (const Pair& pair : m_pairs)
-      if (const auto interaction = pair.interaction.lock())
-        m_step->setGuarded(pair.id, pair.settings.guarded && interaction->getEnabled());
+    for (std::size_t i = 0; i < m_pairs.size(); ++i) {
+      const Pair& pair = m_pairs[i];
+      if (!pair.interaction.expired())
+        m_step->setGuarded(
+            pair.id, pair.settings.guarded && !pair.isCrossed && isEnabled(static_cast<int>(i)));
+    }
     m_step->detect();
   });
   m_isTrusted = m_hasAnswer && m_step->trusted();
-  m_restarts = false;
+  if (m_restarts > 0) --m_restarts;
 }
 
-void SceneStep::write(Body& body) {
+// Makes the particles and poses of iMSTK those that the guard left. Returns whether a pose was
+// rounded to its quaternion, so that another one is to be guarded. `last`: bodies that the guard
+// held stay where they began.
+bool SceneStep::write(Body& body, bool last) {
   if (body.role == BodyRole::Particles) {
     const imstk::PbdBody& pbd = *body.object->getPbdBody();
     const std::shared_ptr<imstk::PointwiseMap> map = body.map();
@@ -355,26 +469,89 @@ void SceneStep::write(Body& body) {
       const int particle = body.particleOf(map.get(), static_cast<int>(i));
       if (particle >= 0 && held[i] != body.positions[i]) (*pbd.vertices)[particle] = held[i];
     }
-  } else if (body.role == BodyRole::Rigid && !isSame(body.pose, m_step->poseNow(body.id))) {
-    imstk::PbdBody& pbd = *body.object->getPbdBody();
-    const BodyPose held = m_step->poseNow(body.id) * inverseOf(body.local);
-    (*pbd.vertices)[0] = held.translation;
-    (*pbd.orientations)[0] = imstk::Quatd(held.rotation).normalized();
+    return false;
   }
+  const BodyPose &before = m_step->poseBefore(body.id), held = m_step->poseNow(body.id);
+  if (!body.isPlaced() || held == body.pose) return false;
+  // Room that shrinks without end would end within rounding.
+  const double motion = (held.translation - before.translation).norm() +
+                        (held.rotation - before.rotation).norm() * 50 * body.size;
+  const bool stays = last || motion < std::ldexp(body.size, -20);
+  if (stays && !(held == before)) m_step->stay(body.id);
+  if (body.role == BodyRole::Fixed) {
+    body.pose = m_step->poseNow(body.id);
+    return stays && !(held == before);
+  }
+  imstk::PbdBody& pbd = *body.object->getPbdBody();
+  if (stays) {
+    (*pbd.vertices)[0] = body.start.position;
+    (*pbd.orientations)[0] = body.start.orientation;
+    body.pose = before;
+    return !(held == before);
+  }
+  const BodyPose whole = held * inverseOf(body.local);
+  (*pbd.vertices)[0] = whole.translation;
+  (*pbd.orientations)[0] = imstk::Quatd(whole.rotation).normalized();
+  body.pose = poseOf((*pbd.orientations)[0], (*pbd.vertices)[0]) * body.local;
+  if (body.pose == held) return false;
+  m_step->setPose(body.id, before, body.pose);
+  return true;
+}
+
+// iMSTK's solver projects internal constraints last, and leaves rows violated.
+void SceneStep::project() {
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    bool isViolated = false;
+    for (PalpateCH* handler : m_handlers) {
+      imstk::PbdModel& model = *modelOf(handler->pair());
+      const double most = kViolationLeft * gapOf(handler->pair());
+      for (imstk::PbdConstraint* row : handler->rows()) {
+        row->projectConstraint(model.getBodies(), model.getTimeStep(),
+                               model.getConfig()->m_solverType);
+        isViolated |= row->getConstraintC() < -most;
+      }
+    }
+    if (!isViolated) return;
+  }
+}
+
+void SceneStep::hold() {
+  project();
+  for (int round = 0;; ++round) {
+    for (Body& body : m_bodies) read(body, false);
+    m_held = m_step->hold();
+    if (m_held == 0) return;
+    if (m_handlers.empty() || round == kRounds) break;
+    // The solver moved bodies to where the rows do not see what they touch.
+    m_step->restoreFixedEnds();
+    for (Body& body : m_bodies) read(body, false);
+    m_step->detect();
+    for (PalpateCH* handler : m_handlers) handler->appendRows();
+    project();
+  }
+  for (int i = 1; i <= kPlacements; ++i) {
+    bool isRounded = false;
+    for (Body& body : m_bodies) isRounded |= write(body, i == kPlacements);
+    if (!isRounded) return;
+    m_step->hold();
+  }
+  for (Body& body : m_bodies) write(body, false);
 }
 
 void SceneStep::end(bool guarded) {
   if (!m_isDetected) return;
   m_isDetected = false;
   m_held = 0;
-  if (guarded && m_hasAnswer)
-    attempt([&] {
-      for (Body& body : m_bodies) read(body, false);
-      m_held = m_step->hold();
-      for (Body& body : m_bodies) write(body);
-    });
-  if (m_error.empty()) m_lastWarning.clear();
+  if (guarded && m_hasAnswer) attempt([&] { hold(); });
+  for (Body& body : m_bodies)
+    if (body.role == BodyRole::Rigid) {
+      const imstk::PbdBody& pbd = *body.object->getPbdBody();
+      body.end = {(*pbd.orientations)[0], (*pbd.vertices)[0]};
+    }
   m_step->advance();
+  if (guarded) attempt([&] { findCrossedPairs(); });
+  const std::lock_guard<std::mutex> lock(m_errorLock);
+  if (m_error.empty()) m_lastWarning.clear();
 }
 
 void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a,

@@ -8,8 +8,10 @@
 #include <imstkMath.h>
 #include <imstkPbdConstraint.h>
 
+#include <atomic>
 #include <cstddef>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -26,6 +28,7 @@ class PbdObject;
 namespace palpate {
 
 class PalpateCD;
+class PalpateCH;
 
 /// A row in iMSTK's numbers: gap = normal . (sum of weights times positions) - offset.
 struct ParticleRow {
@@ -64,18 +67,24 @@ class SceneStep {
   bool isDetected() const { return m_isDetected; }
   /// Ends the step, if a detection began it, at the positions now; guarded: after hold().
   void end(bool guarded);
-  void restart() { m_restarts = true; }
+  /// Of the next two steps: Scene::reset() acts at the end of the next one.
+  void restart() { m_restarts = 2; }
 
   void appendElements(int pair, std::vector<imstk::CollisionElement>& a,
                       std::vector<imstk::CollisionElement>& b);
   void appendRows(int pair, std::vector<ParticleRow>& rows);
   double gapOf(int pair) const;
+  bool isEnabled(int pair) const;
+  std::string nameOf(int pair) const;
   imstk::PbdModel* modelOf(int pair) const;  ///< null: no PbdObject
+  /// A handler with rows in this step.
+  void addHandler(PalpateCH* handler) { m_handlers.push_back(handler); }
 
   bool trusted() const { return m_isTrusted; }
   std::size_t held() const { return m_held; }
-  const std::string& error() const { return m_error; }
+  std::string error() const;
   void warn(const std::string& message);
+  void note(const std::string& message);  ///< a warning that is no error
 
  private:
   struct Body;
@@ -86,15 +95,24 @@ class SceneStep {
              const std::shared_ptr<imstk::CollidingObject>& object);
   int addPairOfBodies(int a, int b, const PalpateSettings& settings);
   void read(Body& body, bool startsStep);
-  void write(Body& body);
+  bool write(Body& body, bool last);
+  void project();
+  void hold();
+  void findCrossedPairs();
+  void setDefaults(Pair& pair);
 
   std::unique_ptr<CollisionStep> m_step;
   std::vector<Body> m_bodies;
   std::vector<Pair> m_pairs;
   std::vector<Pair> m_newPairs;
   std::unordered_map<const imstk::Geometry*, double> m_radii;
-  bool m_isDetected = false, m_hasAnswer = false, m_restarts = false, m_isTrusted = false;
-  std::size_t m_held = 0;
+  std::vector<PalpateCH*> m_handlers;
+  bool m_isDetected = false, m_hasAnswer = false;
+  // Read and set from other threads.
+  std::atomic<int> m_restarts{0};
+  std::atomic<bool> m_isTrusted{false};
+  std::atomic<std::size_t> m_held{0};
+  mutable std::mutex m_errorLock;
   std::string m_error, m_lastWarning;
 };
 

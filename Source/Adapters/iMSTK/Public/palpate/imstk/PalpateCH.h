@@ -16,7 +16,10 @@ namespace palpate {
 /// are within a thickness and do not touch. Vertices that a PointwiseMap maps move the particles
 /// they come from. Rigid PbdObjects move and turn. Other objects do not move.
 /// Friction of PbdObjectCollision::setFriction(): Coulomb's coefficient, on the velocities of the
-///          step. Restitution, stiffness and compliance are not used.
+///          step; iMSTK's own handler takes the number as the share of the sliding that a contact
+///          ends. An object that no solver moves slides as the program moves it. None with
+///          setUseCorrectVelocity(false).
+/// Unused   restitution, stiffness and compliance: a warning names those that were set.
 class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
  public:
   explicit PalpateCH(std::shared_ptr<PalpateCD> detection);
@@ -25,13 +28,19 @@ class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
 
   /// Those of this step, in the order of palpate::appendRows().
   const std::vector<imstk::PbdConstraint*>& rows() const { return m_rows; }
+  /// For the scene's step: adds rows of the last detection.
+  void appendRows();
+  int pair() const { return m_detection->pair(); }
 
  protected:
   void handle(const std::vector<imstk::CollisionElement>& elementsA,
               const std::vector<imstk::CollisionElement>& elementsB) override;
 
  private:
+  void warnOfUnused(SceneStep& step);
+
   std::shared_ptr<PalpateCD> m_detection;
+  bool m_hasWarned = false;
   std::vector<std::unique_ptr<imstk::PbdConstraint>> m_owned;
   std::vector<imstk::PbdConstraint*> m_rows;
 };

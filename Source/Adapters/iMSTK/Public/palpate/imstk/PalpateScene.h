@@ -34,10 +34,15 @@ PALPATE_EXPORT const char* toString(PalpateMethod) noexcept;  ///< its name, or 
 /// How one interaction is detected. Lengths are in L, the scene's unit.
 struct PalpateSettings {
   PalpateMethod method = PalpateMethod::Default;
-  double thickness = 0.0;     ///< features at most this far apart are contacts
-  double gap = -1.0;          ///< that PalpateCH keeps; negative: half the thickness
-  double restDistance = 0.0;  ///< self-collision: nearer ones along edges, at rest, do not touch
-  bool guarded = true;        ///< whether the end of the step holds back what would pass through
+  /// Features at most this far apart are contacts. Negative, and 0 of makeCollision() but for
+  /// Intersection: a fiftieth of the diagonal of the smaller body's box, or half the mean length of
+  /// its edges if that is less.
+  double thickness = 0.0;
+  double gap = -1.0;  ///< that PalpateCH keeps; negative: half the thickness
+  /// Self-collision: nearer features along edges, at rest, do not touch. With the thickness chosen
+  /// by default, 0 is twice that.
+  double restDistance = 0.0;
+  bool guarded = true;  ///< whether the end of the step holds back what would pass through
 };
 
 /// One OctreeBasedCD for all interactions of an iMSTK scene. Each geometry is added once. One task
@@ -50,6 +55,7 @@ struct PalpateSettings {
 ///          particles and rigid bodies of PbdObjects. Other objects are held inside Palpate only:
 ///          their geometries stay where your program put them, and the next step begins where they
 ///          were held. All PbdObjects must share one PbdModel.
+/// Crossing pairs at a step's start are named in iMSTK's log, and not guarded until they are apart.
 /// Cuts     a geometry whose cells or number of vertices changed is replaced before the detection.
 /// Errors   are logged by iMSTK as warnings, each once in a row; error() has the last. A step whose
 ///          detection failed has no contacts and no guard.
@@ -73,8 +79,10 @@ class PALPATE_EXPORT PalpateScene {
   /// L, of the lines or points of a geometry. Call it before the scene is initialized.
   void setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius);
 
-  /// The next step begins where all bodies then are. Call it with Scene::reset(), and when an
-  /// object that is no PbdObject jumps.
+  /// The next two steps begin where all objects then are, PbdObjects as always. Call it with
+  /// Scene::reset(), which acts at the end of the next step, and when an object that is no
+  /// PbdObject jumps.
+  /// Threads  restart(), trusted(), held() and error() may be called from any thread.
   void restart();
 
   /// Whether all answers of the last detection are trusted (Docs/HowTo/Validity.md).
