@@ -152,7 +152,8 @@ TEST(OuterSurface, VerticesNearACoveredEdgeOfACavityLeaveByIt) {
          {both, {0, 0, 0}, Vector3d::Constant(0.8), -1},
          {randomTurn(random), both * Vector3d(0.9, 0.9, 0.9), Vector3d::Constant(0.8)}}};
     std::vector<Vector3d> points;
-    for (int k = 0; k < casesOf(40, 13); ++k) points.push_back(both * randomPoint(random, 0.4, 1.2));
+    for (int k = 0; k < casesOf(40, 13); ++k)
+      points.push_back(both * randomPoint(random, 0.4, 1.2));
     expectWaysOut(body, points);
   }
 }
