@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <tuple>
 #include <utility>
@@ -37,8 +39,10 @@ void sortUnique(Buffer<Side>& sides) {
               sides.end());
 }
 
+}  // namespace
+
 /// A vertex and a triangle: of which meshes they are, and by what ids of a passage.
-struct VertexSide {
+struct SideMemory::VertexSide {
   VertexSide(const MeshPair& pair, ContactKind kind)
       : swapped(kind == ContactKind::TriangleVertex),
         vertices(swapped ? pair.b : pair.a),
@@ -49,6 +53,10 @@ struct VertexSide {
   bool swapped;
   const TriangleMesh &vertices, &triangles;
 };
+
+namespace {
+
+using VertexSide = SideMemory::VertexSide;
 
 /// At an end of the step.
 const Positions& at(const TriangleMesh& mesh, bool now) { return now ? mesh.now : mesh.before; }
@@ -103,8 +111,52 @@ bool isNear(const Segment& edge, const Segment& other, bool& isTurned) {
   return false;
 }
 
+bool hasFaces(const MeshPair& pair) {
+  return pair.a.topology.hasFaces() || pair.b.topology.hasFaces();
+}
+
+/// Whether edge a passes forward where it passes to the side of the surface's normals, here at edge
+/// b. None of two lines, or where no side is certain.
+std::optional<bool> isForwardAlongNormal(const MeshPair& pair, bool now, const Segment& a,
+                                         const Segment& b) {
+  const bool ofB = pair.b.topology.hasFaces();
+  const TriangleMesh& mesh = ofB ? pair.b : pair.a;
+  if (!hasFaces(pair)) return {};
+  const std::uint32_t edge = mesh.topology.edgeOf(ofB ? b : a);
+  if (edge == kNoEdge) return {};
+  Vector3d normal = Vector3d::Zero();
+  const Positions &p = at(pair.a, now), &q = at(pair.b, now), &own = at(mesh, now);
+  for (const std::uint32_t t : mesh.topology.edgeTriangles[edge]) {
+    const auto& [i, j, k] = mesh.topology.elements[t];
+    normal += windingNormal(own[i], own[j], own[k]);
+  }
+  const Vector3d along = (p[a[1]] - p[a[0]]).cross(q[b[1]] - q[b[0]]);
+  const double side = along.dot(normal);
+  constexpr double kClearly = 0.25;  // a cosine
+  if (!(std::abs(side) > kClearly * along.norm() * normal.norm())) return {};
+  return side > 0.0;
+}
+
+/// Whether a passage of these edges in the direction of `forward` is one of those edges forward.
+/// isTurned: a path through both has one of them reversed.
+bool forwardOf(const MeshPair& pair, bool now, const Crossing& passage, const Segment& a,
+               const Segment& b, bool isTurned) {
+  const std::optional<bool> here = isForwardAlongNormal(pair, now, edgeA(passage), edgeB(passage)),
+                            there = isForwardAlongNormal(pair, now, a, b);
+  if (here && there) return passage.forward == (*here == *there);
+  return passage.forward != isTurned;
+}
+
 bool shareCorner(const Triangle& s, const Triangle& t) {
   return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) { return containsVertex(t, v); });
+}
+
+/// Whether the exact side of the plane through the features is the one to which they passed.
+bool isOn(bool forward, const Vector3d& a, const Vector3d& b, const Vector3d& c,
+          const Vector3d& d) {
+  SignCounts counts;
+  const int sign = orient3d(a, b, c, d, counts);
+  return sign == 0 || (sign > 0) == forward;
 }
 
 /// Slides a vertex along the surface to the next triangle that is nearer to it.
@@ -136,9 +188,15 @@ bool slideEdges(const MeshPair& pair, bool now, Side& side) {
   const auto offer = [&](const Segment& nextA, const Segment& nextB, bool isTurned) {
     const double distance = distanceOf(pair, nextA, nextB, now).distance;
     if (!(distance < least) || !mayTouch(pair, nextA, nextB)) return;
+    const bool forward = forwardOf(pair, now, side.passage, nextA, nextB, isTurned);
+    // An edge that pierces a surface is nearest where it has not passed, or along the surface.
+    const Positions &p = at(pair.a, now), &q = at(pair.b, now);
+    if (hasFaces(pair) && (!isForwardAlongNormal(pair, now, nextA, nextB) ||
+                           !isOn(forward, p[nextA[0]], p[nextA[1]], q[nextB[0]], q[nextB[1]])))
+      return;
     least = distance;
     nearest.ids = {nextA[0], nextA[1], nextB[0], nextB[1]};
-    nearest.forward = side.passage.forward != isTurned;
+    nearest.forward = forward;
   };
   forEachNeighbour(pair.a.topology, a, [&](const Segment& e, bool turned) { offer(e, b, turned); });
   forEachNeighbour(pair.b.topology, b, [&](const Segment& e, bool turned) { offer(a, e, turned); });
@@ -160,14 +218,6 @@ bool isInside(const MeshTopology& topology, const MeshFeature& feature) {
     return topology.hasFaces() ? topology.hasClosedStar[feature.id] != 0
                                : topology.vertexTriangles[feature.id].size() > 1;
   return !topology.hasFaces() || topology.edgeTriangles[feature.id].size() == 2;
-}
-
-/// Whether the exact side of the plane through the features is the one to which they passed.
-bool isOn(bool forward, const Vector3d& a, const Vector3d& b, const Vector3d& c,
-          const Vector3d& d) {
-  SignCounts counts;
-  const int sign = orient3d(a, b, c, d, counts);
-  return sign == 0 || (sign > 0) == forward;
 }
 
 /// Finds a triangle with these corners, whatever its index is now. Returns whether there is one.
@@ -375,7 +425,8 @@ void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
 
 /// Whether features are among those along which a side of the same vertex, or of edges, slides, or
 /// next to them. isSame: receives whether the passage has the direction in which the side passed.
-bool SideMemory::contains(const Course& course, const Side& features, bool* isSame) const {
+bool SideMemory::contains(const MeshPair& pair, const Course& course, const Side& features,
+                          bool* isSame) const {
   const Crossing& passage = features.passage;
   const std::size_t end = course.first + course.count;
   PALPATE_ASSERT(course.count > 0 && end <= m_visited.size());
@@ -386,7 +437,11 @@ bool SideMemory::contains(const Course& course, const Side& features, bool* isSa
                                !isNear(edgeB(visited), edgeB(passage), isTurnedB)
                          : !shareCorner(corners, features.corners))
       continue;
-    if (isSame) *isSame = (visited.forward == passage.forward) == (isTurnedA == isTurnedB);
+    if (isSame)
+      *isSame = isEdges(passage)
+                    ? passage.forward == forwardOf(pair, true, visited, edgeA(passage),
+                                                   edgeB(passage), isTurnedA != isTurnedB)
+                    : visited.forward == passage.forward;
     return true;
   }
   return false;
@@ -414,7 +469,7 @@ void SideMemory::take(const MeshPair& pair, const Crossing& passage) {
   }
   bool isKnown = false, isSame = false;
   anyCourse(passage, [&](std::uint32_t i) {
-    if (contains(m_courses[i], side, &isSame)) {
+    if (contains(pair, m_courses[i], side, &isSame)) {
       m_courses[i].hasPassed = isSame;
       isKnown = true;
     }
@@ -457,9 +512,132 @@ void SideMemory::follow(const MeshPair& pair, std::span<const Crossing> passages
   });
   for (const std::uint32_t i : m_order) take(pair, passages[i]);
   m_next.clear();
-  for (const Course& course : m_courses)
-    if (course.hasPassed) m_next.push_back(course.side);
+  m_searches.clear();
+  for (std::uint32_t i = 0; i < m_courses.size(); ++i)
+    if (isEdges(m_courses[i].side.passage) ? hasFaces(pair) : !m_courses[i].hasPassed)
+      searchHooked(pair, i);
+    else if (m_courses[i].hasPassed)
+      m_next.push_back(m_courses[i].side);
+  std::sort(m_searches.begin(), m_searches.end());
+  for (std::size_t i = 0; i < m_searches.size(); ++i)
+    if (i == 0 || m_searches[i].kind != m_searches[i - 1].kind ||
+        m_searches[i].edge != m_searches[i - 1].edge)
+      addHooked(pair, m_searches[i]);
   sortUnique(m_next);
+}
+
+/// A vertex has returned, or edges have passed. An edge is hooked if its ends have not passed, are
+/// on one side of the surface, and it pierces the surface. It may have passed while an end of it
+/// was behind the surface; the places at which it pierces tell where.
+void SideMemory::searchHooked(const MeshPair& pair, std::uint32_t course) {
+  const Crossing& passage = m_courses[course].side.passage;
+  if (isEdges(passage)) {
+    if (pair.b.topology.hasFaces())
+      m_searches.push_back({ContactKind::VertexTriangle, edgeA(passage), course});
+    if (pair.a.topology.hasFaces()) m_searches.push_back({m_ofSecond, edgeB(passage), course});
+    return;
+  }
+  const VertexSide of(pair, passage.kind);
+  const MeshTopology& topology = of.vertices.topology;
+  const std::uint32_t vertex = of.vertexOf(passage);
+  for (const std::uint32_t element : topology.vertexTriangles[vertex])
+    for (const std::uint32_t id : topology.triangleEdges[element]) {
+      // Each edge once: by the first of its elements.
+      if (id == kNoEdge || topology.edgeTriangles[id][0] != element) continue;
+      const Segment& edge = topology.edges[id];
+      if (edge[0] == vertex || edge[1] == vertex)
+        m_searches.push_back({passage.kind, edge, course});
+    }
+}
+
+/// Searches the surface around the places of the course, as far as the edge is long.
+void SideMemory::addHooked(const MeshPair& pair, const HookSearch& search) {
+  const auto& [kind, edge, index] = search;
+  const Course& course = m_courses[index];
+  for (const std::uint32_t end : edge)
+    if (anyCourse({kind, {end, end}}, [&](std::uint32_t i) { return m_courses[i].hasPassed; }))
+      return;
+  const VertexSide of(pair, kind);
+  const MeshTopology& topology = of.triangles.topology;
+  const Positions& at = of.triangles.now;
+  const Vector3d &p = of.vertices.now[edge[0]], &q = of.vertices.now[edge[1]];
+  const Vector3d along = q - p, lower = p.cwiseMin(q), upper = p.cwiseMax(q);
+  const double reach = along.norm();
+  const auto isInReach = [&](const Triangle& t) {
+    const Vector3d &a = at[t[0]], &b = at[t[1]], &c = at[t[2]];
+    return ((a.cwiseMin(b).cwiseMin(c) - upper).array() <= reach).all() &&
+           ((lower - a.cwiseMax(b).cwiseMax(c)).array() <= reach).all();
+  };
+  m_searched.resize(std::max(m_searched.size(), topology.elements.size()), 0);
+  ++m_search;
+  m_region.clear();
+  const auto visit = [&](std::uint32_t triangle) {
+    if (std::exchange(m_searched[triangle], m_search) == m_search) return;
+    if (isInReach(topology.elements[triangle])) m_region.push_back(triangle);
+  };
+  for (std::size_t i = course.first; i < course.first + course.count; ++i) {
+    const Crossing& passage = m_visited[i].passage;
+    if (!isEdges(passage)) {
+      visit(of.triangleOf(passage));
+      continue;
+    }
+    for (const std::uint32_t vertex :
+         of.swapped || (pair.self() && edge == edgeB(passage)) ? edgeA(passage) : edgeB(passage))
+      for (const std::uint32_t triangle : topology.vertexTriangles[vertex]) visit(triangle);
+  }
+  SignCounts counts;
+  m_pierced.clear();
+  for (std::size_t next = 0; next < m_region.size(); ++next) {
+    const std::uint32_t triangle = m_region[next];
+    const Triangle& t = topology.elements[triangle];
+    for (const std::uint32_t corner : t)
+      for (const std::uint32_t neighbour : topology.vertexTriangles[corner]) visit(neighbour);
+    if (pair.self() && (containsVertex(t, edge[0]) || containsVertex(t, edge[1]))) continue;
+    const Vector3d &a = at[t[0]], &b = at[t[1]], &c = at[t[2]];
+    const int side = orient3d(a, b, c, q, counts);
+    if (side == 0 || orient3d(a, b, c, p, counts) != -side) continue;
+    if (side * orient3d(p, q, a, b, counts) < 0 || side * orient3d(p, q, b, c, counts) < 0 ||
+        side * orient3d(p, q, c, a, counts) < 0)
+      continue;
+    const Vector3d normal = (b - a).cross(c - a);
+    m_pierced.push_back({normal.dot(a - p) / normal.dot(along), triangle, side});
+  }
+  std::sort(m_pierced.begin(), m_pierced.end());
+  if (m_pierced.empty() || m_pierced.front().side == m_pierced.back().side) return;
+  // Between the first place and the last one, the edge is on the side to which it passed.
+  for (const Pierced& pierced : m_pierced)
+    addHooked(pair, of, edge, pierced, pierced.side == m_pierced.front().side ? 1.0 : -1.0);
+}
+
+/// From where an edge pierces a triangle, it leads on past one of the triangle's edges, which it
+/// has passed. direction: 1 towards the edge's second end, or -1.
+void SideMemory::addHooked(const MeshPair& pair, const VertexSide& of, const Segment& edge,
+                           const Pierced& pierced, double direction) {
+  const MeshTopology& topology = of.triangles.topology;
+  const Triangle& t = topology.elements[pierced.triangle];
+  const Positions& at = of.triangles.now;
+  const Vector3d &p = of.vertices.now[edge[0]], &q = of.vertices.now[edge[1]];
+  const Vector3d along = direction * (q - p), place = p + pierced.place * (q - p),
+                 normal = (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
+  SignCounts counts;
+  double least = std::numeric_limits<double>::infinity();
+  std::size_t nearest = 3;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vector3d &first = at[t[k]], &second = at[t[(k + 1) % 3]];
+    const Vector3d inward = normal.cross(second - first);
+    const double distance = inward.dot(place - first), speed = -inward.dot(along);
+    if (!(speed > 0.0) || !(distance < least * speed)) continue;
+    if (orient3d(p, q, first, second, counts) == 0) continue;
+    least = distance / speed;
+    nearest = k;
+  }
+  if (nearest == 3) return;
+  Segment ofA = edge, ofB = topology.edges[topology.triangleEdges[pierced.triangle][nearest]];
+  if (of.swapped || (pair.self() && ofB < ofA)) std::swap(ofA, ofB);
+  if (!mayTouch(pair, ofA, ofB)) return;
+  const Positions &x = pair.a.now, &y = pair.b.now;
+  const bool passed = orient3d(x[ofA[0]], x[ofA[1]], y[ofB[0]], y[ofB[1]], counts) > 0;
+  m_next.push_back({{ContactKind::EdgeEdge, {ofA[0], ofA[1], ofB[0], ofB[1]}, 0.0, passed}, {}});
 }
 
 void SideMemory::apply(const MeshPair& pair, Contents& contents) const {
@@ -473,7 +651,7 @@ void SideMemory::apply(const MeshPair& pair, Contents& contents) const {
       const Course& course = m_courses[i];
       const bool isLater = course.hasPassed && time > course.time &&
                            m_visited[course.first].passage.ids != features.passage.ids;
-      return (i < m_here.size() || isLater) && contains(course, features);
+      return (i < m_here.size() || isLater) && contains(pair, course, features);
     });
   };
   const auto replace = [&](ContactKind kind, auto& contacts, auto&& cornersOf) {
@@ -514,6 +692,10 @@ void SideMemory::releaseMemory() {
   m_visited = {};
   m_heads = {};
   m_order = {};
+  m_region = {};
+  m_searched = {};
+  m_searches = {};
+  m_pierced = {};
 }
 
 }  // namespace palpate

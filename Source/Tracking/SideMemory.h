@@ -8,6 +8,7 @@
 #include "Core/MemoryBudget.h"
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -29,6 +30,8 @@ class SideMemory : public CountedObject {
     Crossing passage;
     Triangle corners;  ///< of the triangle
   };
+
+  struct VertexSide;
 
   /// If a step has begun since, the sides at the end of the last one become those at its start.
   void startStep(std::uint64_t step) noexcept;
@@ -70,6 +73,21 @@ class SideMemory : public CountedObject {
     std::uint32_t next;        ///< in the list of its features
   };
 
+  /// An edge that may be hooked. kind: of its mesh's vertices.
+  struct HookSearch {
+    ContactKind kind;
+    Segment edge;
+    std::uint32_t course;  ///< near which it is searched
+    auto operator<=>(const HookSearch&) const = default;
+  };
+  /// A triangle that an edge pierces.
+  struct Pierced {
+    double place;  ///< on the edge, in [0, 1]
+    std::uint32_t triangle;
+    int side;  ///< of the edge's second end
+    auto operator<=>(const Pierced&) const = default;
+  };
+
   std::size_t listOf(const Crossing&) const;
   template <class F>
   bool anyCourse(const Crossing& features, F&&) const;
@@ -77,10 +95,14 @@ class SideMemory : public CountedObject {
   template <std::size_t N>
   std::optional<bool> sideOf(ContactKind, const Part<N>&) const;
   void turnPassed(const MeshPair&, Contents&) const;
-  bool contains(const Course&, const Side&, bool* isSame = nullptr) const;
+  bool contains(const MeshPair&, const Course&, const Side&, bool* isSame = nullptr) const;
   bool hasPassedEnd(const Crossing&) const;
   void add(const MeshPair&, const Side&, double time);
   void take(const MeshPair&, const Crossing&);
+  void searchHooked(const MeshPair&, std::uint32_t course);
+  void addHooked(const MeshPair&, const HookSearch&);
+  void addHooked(const MeshPair&, const VertexSide&, const Segment& edge, const Pierced&,
+                 double direction);
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t m_step = kNoStep, m_version = 0;
@@ -92,6 +114,11 @@ class SideMemory : public CountedObject {
   Buffer<Side> m_visited;
   Buffer<std::uint32_t> m_heads;  ///< of lists of m_courses: by the vertex, the last one of edges
   Buffer<std::uint32_t> m_order;
+  Buffer<std::uint32_t> m_region;    ///< triangles near an edge
+  Buffer<std::uint32_t> m_searched;  ///< per triangle: the last search that came to it
+  std::uint32_t m_search = 0;
+  Buffer<HookSearch> m_searches;
+  Buffer<Pierced> m_pierced;
   ContactKind m_ofSecond = ContactKind::TriangleVertex;  ///< of the second mesh's vertices
 };
 

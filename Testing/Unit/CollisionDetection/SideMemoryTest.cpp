@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
@@ -681,6 +682,63 @@ TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
   EXPECT_FALSE(data.edgeEdge().empty());
   for (const auto& contact : data.edgeEdge()) EXPECT_GE(contact.normal[2], -1e-12);
   for (const auto& contact : data.triangleVertex()) EXPECT_LE(contact.normal[2], 1e-12);
+}
+
+/// An end of a thread passes a membrane, the thread then passes the membrane's fold, and the end
+/// comes back. The thread is led back over the fold, in a membrane of any fineness.
+TEST(SideMemory, AnEdgeStaysHookedWhereItsEndReturned) {
+  for (const std::uint32_t cells : {2u, 6u, 20u})
+    for (const bool swapped : {false, true}) {
+      Mesh membrane;
+      for (std::uint32_t i = 0; i <= cells; ++i)
+        for (std::uint32_t j = 0; j <= cells; ++j)
+          membrane.positions.push_back({12.0 * i / cells - 6.0, 12.0 * j / cells - 6.0, 0.0});
+      for (std::uint32_t i = 0; i < cells; ++i)
+        for (std::uint32_t j = 0; j < cells; ++j) {
+          const std::uint32_t p = i * (cells + 1) + j, q = p + cells + 1;
+          membrane.triangles.push_back({p, q, q + 1});
+          membrane.triangles.push_back({p, q + 1, p + 1});
+        }
+      Positions thread{{-4, 0.1, 0.4}, {4, 0.1, 0.4}};
+      OctreeBasedCD collisions;
+      const GeometryId tissue = addMesh(collisions, membrane),
+                       suture = collisions.addLineMesh(thread, std::vector<Segment>{{0, 1}}),
+                       a = swapped ? tissue : suture, b = swapped ? suture : tissue;
+      collisions.addCollisionPair(a, b, remembering(0.3));
+      collisions.advance();
+      const auto step = [&](const Vector3d& p, const Vector3d& q, double fold) {
+        thread = {p, q};
+        for (Vector3d& v : membrane.positions) v[2] = fold * (1.0 - std::abs(v[0]) / 6.0);
+        collisions.setPositions(suture, thread);
+        collisions.setPositions(tissue, membrane.positions);
+        collisions.detectCollision();
+        collisions.advance();
+      };
+      const auto edgesLedBack = [&] {
+        const CollisionData& data = collisions.collisionData(a, b);
+        std::size_t count = 0;
+        for (const EdgeEdgeContact& contact : data.edgeEdge())
+          if (contact.timeOfImpact == 0.0 && contact.distance < 0.0) {
+            EXPECT_GT((swapped ? -1 : 1) * contact.normal[2], 0.5);
+            ++count;
+          }
+        return count;
+      };
+      step({-4, 0.1, -6}, {4, 0.1, 0.4}, 0.0);
+      step({-4, 0.1, -6}, {4, 0.1, 0.4}, 1.0);
+      step({-5, 0.1, 0.6}, {5, 0.1, 0.6}, 1.0);
+      EXPECT_EQ(edgesLedBack(), 0u);
+      step({-5, 0.1, 0.6}, {5, 0.1, 0.6}, 0.7);
+      EXPECT_GT(edgesLedBack(), 0u) << cells;
+      step({-5, 0.1, 0.8}, {5, 0.1, 0.8}, 0.7);
+      step({-5, 0.1, 0.8}, {5, 0.1, 0.8}, 0.7);
+      EXPECT_TRUE(collisions.collisionData(a, b).rememberedSides().empty()) << cells;
+      // Without a fold nothing is hooked.
+      step({-4, 0.1, -6}, {4, 0.1, 0.4}, 0.0);
+      step({-5, 0.1, 0.6}, {5, 0.1, 0.6}, 0.0);
+      step({-5, 0.1, 0.6}, {5, 0.1, 0.6}, 0.0);
+      EXPECT_TRUE(collisions.collisionData(a, b).rememberedSides().empty()) << cells;
+    }
 }
 
 /// A needle that a hand drives into a membrane and lets go. The solver has one iteration, and ends
