@@ -9,6 +9,7 @@
 #include "NarrowPhase/TouchNormal.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
 #include "Math/TriangleIntersection.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
@@ -51,6 +52,24 @@ ExcludedFeatures featuresInCommon(const MeshTriangle& a, const MeshTriangle& b) 
   return excluded;
 }
 
+/// Whether a direction from a feature leads below the surface, or, from an edge, below one of its
+/// triangles and along the other: above the end of a tool a wall may lie in one plane with it.
+bool mayBeBelow(const TriangleMesh& mesh, const MeshFeature& feature,
+                const Eigen::Vector3d& direction) {
+  if (liesBelow(mesh, feature, direction)) return true;
+  if (feature.kind != MeshFeature::Kind::Edge) return false;
+  const auto triangles = mesh.topology.edgeTriangles[feature.id];
+  if (triangles.size() != 2) return false;
+  double sum = 0.0;
+  for (const std::uint32_t t : triangles) {
+    const auto [a, b, c] = cornersOf(mesh.topology.elements[t], mesh.now);
+    const double above = direction.dot(windingNormal(a, b, c));
+    if (above > kTouchAngle) return false;
+    sum += above;
+  }
+  return sum < -kTouchAngle;
+}
+
 /// The corner between two edges, given as bits.
 int sharedCorner(unsigned twoEdges) {
   PALPATE_ASSERT(std::popcount(twoEdges) == 2);
@@ -71,8 +90,17 @@ class IntersectionContacts {
     } else if (std::popcount(edgesOfB) == 2) {
       addCornerOfB(sharedCorner(edgesOfB));
     } else if (edgesOfA != 0 && edgesOfB != 0) {
-      addEdges(std::countr_zero(edgesOfA), std::countr_zero(edgesOfB));
+      addEdges(m_a.edge(std::countr_zero(edgesOfA)), m_b.edge(std::countr_zero(edgesOfB)));
     }
+  }
+
+  /// Returns whether the edges have crossed. Then it adds their contact.
+  bool addIfCrossed(std::uint32_t edgeA, std::uint32_t edgeB) {
+    sort(edgeA, edgeB);
+    const EdgeEdgeDistance at = distanceOf(edgeA, edgeB);
+    if (!haveCrossed(edgeA, edgeB, at)) return false;
+    addEdges(edgeA, edgeB, at);
+    return true;
   }
 
   /// Touching features also touch in the triangles that own them. Only the pair of these triangles
@@ -85,7 +113,7 @@ class IntersectionContacts {
       for (int j = 0; j < 3; ++j) {
         if (intersection.touchingEdges & TriangleIntersection::edgesBit(i, j) &&
             topologyA.ownsEdge(m_a.id, i) && topologyB.ownsEdge(m_b.id, j))
-          addEdges(i, j);
+          addEdges(m_a.edge(i), m_b.edge(j));
       }
     }
   }
@@ -126,14 +154,22 @@ class IntersectionContacts {
       answer.normal = windingNormal(a, b, c);
   }
 
-  void addEdges(int i, int j) {
-    std::uint32_t edgeA = m_a.edge(i), edgeB = m_b.edge(j);
-    if (m_self && m_a.mesh.topology.precedes(edgeB, edgeA)) std::swap(edgeA, edgeB);
+  void sort(std::uint32_t& edgeA, std::uint32_t& edgeB) const {
+    if (m_self && m_pair.a.topology.precedes(edgeB, edgeA)) std::swap(edgeA, edgeB);
+  }
+  EdgeEdgeDistance distanceOf(std::uint32_t edgeA, std::uint32_t edgeB) const {
+    const Segment &p = m_pair.a.topology.edges[edgeA], &q = m_pair.b.topology.edges[edgeB];
+    const auto &positionsA = m_pair.a.now, &positionsB = m_pair.b.now;
+    return finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]], positionsB[q[0]],
+                                  positionsB[q[1]]);
+  }
+  void addEdges(std::uint32_t edgeA, std::uint32_t edgeB) {
+    sort(edgeA, edgeB);
+    addEdges(edgeA, edgeB, distanceOf(edgeA, edgeB));
+  }
+  void addEdges(std::uint32_t edgeA, std::uint32_t edgeB, EdgeEdgeDistance answer) {
     if (rejectsEdges(m_pair, edgeA, edgeB)) return;
-    const Segment &p = m_a.mesh.topology.edges[edgeA], &q = m_b.mesh.topology.edges[edgeB];
-    const auto &positionsA = m_a.mesh.now, &positionsB = m_b.mesh.now;
-    EdgeEdgeDistance answer = finiteEdgeEdgeDistance(positionsA[p[0]], positionsA[p[1]],
-                                                     positionsB[q[0]], positionsB[q[1]]);
+    const Segment &p = m_pair.a.topology.edges[edgeA], &q = m_pair.b.topology.edges[edgeB];
     m_out.exactDecisions += answer.exact;
     if (haveCrossed(edgeA, edgeB, answer)) {
       answer.normal = -answer.normal;
@@ -147,8 +183,8 @@ class IntersectionContacts {
 
   bool haveCrossed(std::uint32_t edgeA, std::uint32_t edgeB, const EdgeEdgeDistance& at) const {
     return at.distance > 0.0 &&
-           liesBelow(m_pair.b, featureOf(m_pair.b.topology, edgeB, at.featureB), at.normal) &&
-           liesBelow(m_pair.a, featureOf(m_pair.a.topology, edgeA, at.featureA), -at.normal);
+           mayBeBelow(m_pair.b, featureOf(m_pair.b.topology, edgeB, at.featureB), at.normal) &&
+           mayBeBelow(m_pair.a, featureOf(m_pair.a.topology, edgeA, at.featureA), -at.normal);
   }
 
   const MeshPair& m_pair;
@@ -238,6 +274,13 @@ void addPierced(const MeshPair& pair, const PiercedPair& pierced, ContactBuffers
   const MeshTriangle a(pair.a, pierced.triangles.a, pair.a.now),
       b(pair.b, pierced.triangles.b, pair.b.now);
   IntersectionContacts(pair, a, b, out).addPierced(pierced.edgesOfA, pierced.edgesOfB);
+}
+
+bool addIfCrossed(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                  ContactBuffers& out) {
+  const MeshTriangle a(pair.a, pair.a.topology.edgeTriangles[edgeA][0], pair.a.now),
+      b(pair.b, pair.b.topology.edgeTriangles[edgeB][0], pair.b.now);
+  return IntersectionContacts(pair, a, b, out).addIfCrossed(edgeA, edgeB);
 }
 
 void addIntersection(const MeshPair& pair, const ElementPair& candidate, ContactBuffers& out) {

@@ -13,10 +13,12 @@ namespace palpate {
 /// (1) Features touch: every vertex-triangle and edge-edge pair at distance zero.
 /// (2) An end of a crossing edge is behind the surface: this end's contact with the nearest feature
 ///     of the surface (PiercingContacts).
-/// (3) Two edges of one triangle cross the other: the vertex that these edges share.
-/// (4) One edge of each triangle crosses the other: these two edges.
+/// (3) A crossing edge passes below an edge or a vertex of the surface: the contact of both
+///     (PiercingContacts).
+/// (4) Two edges of one triangle cross the other: the vertex that these edges share.
+/// (5) One edge of each triangle crosses the other: these two edges.
 /// Touching features are reported once, by the pair of triangles that own them. findIntersections()
-/// adds only these. PiercingContacts adds the others after the last batch; of rules 3 and 4 several
+/// adds only these. PiercingContacts adds the others after the last batch; of rules 3 to 5 several
 /// triangle pairs have the same contact, each time with the same bits.
 ///
 /// The winding normal points to the triangle's front. A vertex behind the triangle has a negative
@@ -27,13 +29,14 @@ namespace palpate {
 /// <palpate/FeaturePairs.h> defines.
 ///
 /// Two edges have crossed if each of the closest points lies below the surface around the other
-/// (liesBelow()). Their distance is then negative, and the normal leads out.
+/// (liesBelow()), or in line with one of two faces. Their distance is then negative, and the normal
+/// leads out.
 ///
 /// Self-collision: two triangles with common vertices intersect in three cases:
 /// (1) A vertex touches the other triangle and is not a corner of it.
 /// (2) An edge of one touches an edge of the other, and these have no common vertex.
 /// (3) An edge crosses the other triangle's interior.
-/// Case 3 alone gives no contact by rules 3 and 4: no two edges of one triangle cross the other,
+/// Case 3 alone gives no contact by rules 3 to 5: no two edges of one triangle cross the other,
 /// and features that touch at the common vertex are excluded. Pairs with common vertices must be
 /// among the candidates.
 void findIntersections(const MeshPair&, std::span<const ElementPair> candidates,
@@ -52,7 +55,11 @@ void findCrossingsAtStart(const MeshPair&, std::span<const ElementPair> candidat
                           ContactBuffers& out);
 void addCrossingsAtStart(const MeshPair&, const ElementPair&, ContactBuffers& out);
 
-/// Adds the contact of two triangles by rule 3 or 4.
+/// Adds the contact of an edge of a and an edge of b, if they have crossed. Returns whether they
+/// have.
+bool addIfCrossed(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, ContactBuffers& out);
+
+/// Adds the contact of two triangles by rule 4 or 5.
 void addPierced(const MeshPair&, const PiercedPair&, ContactBuffers& out);
 
 /// Makes a measured distance at a vertex strictly behind the triangle negative, with the normal

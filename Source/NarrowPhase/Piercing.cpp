@@ -324,7 +324,8 @@ void PiercingContacts::find(const MeshPair& pair, const TrianglesInBox& near,
   for (const ContactBuffers* buffers : found)
     for (const PiercedPair& pierced : buffers->pierced) {
       check();
-      if (!hasEndBehind(pair, pierced)) addPierced(pair, pierced, out);
+      if (!hasEndBehind(pair, pierced) && !addBelow(pair, pierced, out))
+        addPierced(pair, pierced, out);
     }
 }
 
@@ -406,6 +407,53 @@ bool PiercingContacts::hasEndBehind(const MeshPair& pair, const PiercedPair& pie
   };
   return isEndBehind(false, pair.a, pierced.triangles.a, pierced.edgesOfA) ||
          isEndBehind(!pair.self(), pair.b, pierced.triangles.b, pierced.edgesOfB);
+}
+
+std::span<const EdgeCrossing> PiercingContacts::crossingsOf(bool ofB, std::uint32_t edge) const {
+  const auto first = std::partition_point(
+      m_crossings.begin(), m_crossings.end(),
+      [&](const EdgeCrossing& c) { return std::tie(c.ofB, c.edge) < std::tie(ofB, edge); });
+  return {first, std::find_if(first, m_crossings.end(), [&](const EdgeCrossing& c) {
+            return c.ofB != ofB || c.edge != edge;
+          })};
+}
+
+/// Returns whether other contacts stand for the pair.
+bool PiercingContacts::addBelow(const MeshPair& pair, const PiercedPair& pierced,
+                                ContactBuffers& out) const {
+  bool any = false;
+  /// here, there: where an edge leaves the surface and enters it.
+  const auto addBetween = [&](bool ofB, const EdgeCrossing& here, const EdgeCrossing& there) {
+    const PlacedMesh surface(ofB ? pair.a : pair.b, false);
+    const MeshTopology& topology = surface.topology;
+    const Triangle &crossed = topology.elements[here.triangle],
+                   &other = topology.elements[there.triangle];
+    for (const std::uint32_t v : crossed)
+      any |= containsVertex(other, v) && isBehind(!ofB && !pair.self(), v);
+    for (const std::uint32_t ridge : topology.triangleEdges[here.triangle]) {
+      if (ridge == kNoEdge) continue;
+      const auto both = topology.edgeTriangles[ridge];
+      if (both.size() != 2 || both[0] + both[1] != here.triangle + there.triangle) continue;
+      for (const std::uint32_t v : other)
+        if (!containsVertex(crossed, v) &&
+            sideOf(surface.corners(here.triangle), surface.at[v]) < 0)
+          any |= addIfCrossed(pair, ofB ? ridge : here.edge, ofB ? here.edge : ridge, out);
+    }
+  };
+  const auto addOf = [&](bool ofB, std::uint32_t triangle, unsigned edges, std::uint32_t crossed) {
+    for (int i = 0; i < 3; ++i) {
+      if (!(edges >> i & 1)) continue;
+      const std::uint32_t edge = (ofB ? pair.b : pair.a).topology.triangleEdges[triangle][i];
+      const auto crossings = crossingsOf(ofB && !pair.self(), edge);
+      for (const EdgeCrossing& here : crossings)
+        for (const EdgeCrossing& there : crossings)
+          if (here.triangle == crossed && there.lowerIsBehind != here.lowerIsBehind)
+            addBetween(ofB, here, there);
+    }
+  };
+  addOf(false, pierced.triangles.a, pierced.edgesOfA, pierced.triangles.b);
+  addOf(true, pierced.triangles.b, pierced.edgesOfB, pierced.triangles.a);
+  return any;
 }
 
 void KnownSides::add(const ContactBuffers& found, Buffer<Side>& sides) {

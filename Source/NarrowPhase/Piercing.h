@@ -52,6 +52,10 @@ using TrianglesInBox = std::function<void(bool ofB, bool atStart, const Eigen::A
 ///          feature with one that such an edge crosses: another sheet is no way out of this one.
 /// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
 ///          one of the crossing edges is behind: that end's contact then stands for the pair.
+/// Below    an edge that enters the surface through one triangle and leaves it through another one
+///          is below what they have in common. If that is a convex edge, and both edges have
+///          crossed, their contact stands for the pair; if it is a vertex behind the
+///          other surface, this vertex' contact.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the triangles in a box around it
 ///          that is 1.5 times as large as its first way.
@@ -91,6 +95,8 @@ class PiercingContacts {
   void addDepths(const MeshPair&, const TrianglesInBox&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
+  std::span<const EdgeCrossing> crossingsOf(bool ofB, std::uint32_t edge) const;
+  bool addBelow(const MeshPair&, const PiercedPair&, ContactBuffers& out) const;
 
   Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;

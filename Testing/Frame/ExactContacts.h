@@ -14,6 +14,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 namespace palpate::testing {
@@ -182,6 +183,89 @@ class ExactContacts {
     }
   };
 
+  /// What crossing edges of two triangles pass below, on their way in and out of the other mesh.
+  struct Below {
+    std::set<std::pair<Segment, Segment>> edges;  ///< of a and b, that have crossed
+    bool stands = false;                          ///< other contacts stand for the triangles
+    bool unsure = false;                          ///< ends of edges are nearest
+  };
+  Below belowOf(const Meeting& meeting, std::uint32_t s, std::uint32_t t) const {
+    Below below;
+    for (int i = 0; i < 3; ++i) {
+      if (meeting.throughB[i]) addBelow(m_a, m_b, false, {s, i}, t, below);
+      if (meeting.throughA[i]) addBelow(m_b, m_a, true, {t, i}, s, below);
+    }
+    below.stands |= !below.edges.empty();
+    return below;
+  }
+  void addBelow(const Moving& own, const Moving& surface, bool ofB,
+                const std::pair<std::uint32_t, int>& edge, std::uint32_t crossed,
+                Below& below) const {
+    const Triangle& corners = own.triangles()[edge.first];
+    const Segment e = sorted(corners[edge.second], corners[(edge.second + 1) % 3]);
+    const Depths& depths = ofB && !m_self ? m_depthsOfA : m_self ? m_depthsOfA : m_depthsOfB;
+    const Triangle& here = surface.triangles()[crossed];
+    for (std::uint32_t u = 0; u < surface.triangles().size(); ++u) {
+      const Triangle& there = surface.triangles()[u];
+      if (!mayMeet(surface, u, e) ||
+          side(surface, u, own[e[0]]) * side(surface, crossed, own[e[0]]) >= 0 ||
+          side(surface, u, own[e[0]]) * side(surface, u, own[e[1]]) >= 0 ||
+          crossedFeature(own[e[0]], own[e[1]], surface, u).empty())
+        continue;
+      std::vector<std::uint32_t> common;
+      for (const std::uint32_t v : here)
+        if (holds(there, v)) common.push_back(v);
+      for (const std::uint32_t v : common) below.stands |= depths.contains(v);
+      if (common.size() != 2) continue;
+      const Segment ridge = sorted(common[0], common[1]);
+      if (at(surface, ridge).size() != 2) continue;
+      for (const std::uint32_t v : there)
+        if (!holds(here, v) && side(surface, crossed, surface[v]) < 0) {
+          const Segment &p = ofB ? ridge : e, &q = ofB ? e : ridge;
+          const Answer crossedEach = haveCrossed(p, q);
+          below.unsure |= crossedEach == Answer::Either;
+          if (crossedEach == Answer::Yes) below.edges.insert({p, q});
+        }
+    }
+  }
+  static Segment sorted(std::uint32_t p, std::uint32_t q) {
+    return {std::min(p, q), std::max(p, q)};
+  }
+
+  Answer haveCrossed(const Segment& p, const Segment& q) const {
+    const oracle::Closest points = oracle::edgeEdge(m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]);
+    if (!points.interior) return Answer::Either;
+    using namespace oracle;
+    const Vector up = points.difference, down = Rational(-1) * up;
+    return isBelow(m_b, q, up) && isBelow(m_a, p, down) ? Answer::Yes : Answer::No;
+  }
+  /// Whether a direction from an edge leads below the triangles around it.
+  static bool isBelow(const Moving& m, const Segment& edge, const oracle::Vector& direction) {
+    using namespace oracle;
+    const std::vector<std::uint32_t> around = at(m, edge);
+    std::size_t below = 0;
+    mpf_class most = -1, sum = 0;  // of the sines above the triangles
+    bool isConvex = true;
+    for (const std::uint32_t t : around) {
+      const auto& [a, b, c] = m.triangles()[t];
+      const Vector origin = toRational(m[a]);
+      const Vector normal = cross(toRational(m[b]) - origin, toRational(m[c]) - origin);
+      const Rational above = dot(direction, normal);
+      below += above < 0;
+      if (dot(normal, normal) != 0) {
+        const mpf_class sine =
+            mpf_class(above, 400) / root(dot(normal, normal)) / root(dot(direction, direction));
+        most = std::max(most, sine);
+        sum += sine;
+      }
+      for (const std::uint32_t v : m.triangles()[around.back()])
+        if (around.size() == 2 && t == around[0] && !holds({edge[0], edge[1], edge[1]}, v))
+          isConvex = side(m, t, m[v]) < 0;
+    }
+    if (around.size() == 2 && most <= kTouchAngle && sum < -kTouchAngle) return true;
+    return isConvex ? below == around.size() : below > 0;
+  }
+
   /// For each vertex behind the other mesh, the triangle of its contact.
   using Depths = std::map<std::uint32_t, std::uint32_t>;
 
@@ -203,8 +287,8 @@ class ExactContacts {
 
   /// The corners of the feature of triangle t that a segment with its ends strictly on different
   /// sides passes through; empty if it misses the triangle.
-  static std::set<std::uint32_t> crossed(const Vector3d& p, const Vector3d& q, const Moving& others,
-                                         std::uint32_t t) {
+  static std::set<std::uint32_t> crossedFeature(const Vector3d& p, const Vector3d& q,
+                                                const Moving& others, std::uint32_t t) {
     const Triangle& corners = others.triangles()[t];
     std::set<std::uint32_t> feature(corners.begin(), corners.end());
     int signs[3], most = 0, least = 0;
@@ -259,7 +343,7 @@ class ExactContacts {
         const Vector3d &p = vertices[edge[0]], &q = vertices[edge[1]];
         const int first = side(others, t, p);
         if (first * side(others, t, q) >= 0) continue;
-        const auto feature = crossed(p, q, others, t);
+        const auto feature = crossedFeature(p, q, others, t);
         if (feature.empty()) continue;
         sides[feature].insert(first);
         triangles[first].insert(t);
@@ -404,7 +488,7 @@ class ExactContacts {
     const std::uint32_t v = ids[1], t = ids[2];
     switch (m_settings.method) {
       case Method::Intersection:
-        return cornerMeets(vertices, ids) || isDepth(ids) ? Answer::Yes : Answer::No;
+        return isDepth(ids) ? Answer::Yes : cornerMeets(vertices, ids);
       case Method::Proximity: {
         if (m_settings.contacts == Contacts::Distinct) return distinct(vertices, triangles, ids);
         const auto positions = positionsOf(vertices, v, triangles, t);
@@ -424,7 +508,8 @@ class ExactContacts {
     const auto found = depths.find(ids[1]);
     return found != depths.end() && found->second == ids[2];
   }
-  bool cornerMeets(const Moving& vertices, const Ids& ids) const {
+  Answer cornerMeets(const Moving& vertices, const Ids& ids) const {
+    Answer answer = Answer::No;
     const std::uint32_t v = ids[1], t = ids[2];
     // A mesh with itself: the vertex may be of the pair's second triangle.
     const bool first = ids[0] == PlainContact::VertexTriangle;
@@ -432,23 +517,35 @@ class ExactContacts {
       const int corner = cornerOf(vertices.triangles()[s], v);
       const Meeting meeting = first ? Meeting(*this, s, t) : Meeting(*this, t, s);
       if (!(first ? meeting.cornerOfA(corner) : meeting.cornerOfB(corner))) continue;
-      if (meeting.touch || !(first ? meeting.isBehind(*this, s, t) : meeting.isBehind(*this, t, s)))
-        return true;
+      if (meeting.touch) return Answer::Yes;
+      const std::uint32_t ofA = first ? s : t, ofB = first ? t : s;
+      if (meeting.isBehind(*this, ofA, ofB)) continue;
+      const Below below = belowOf(meeting, ofA, ofB);
+      if (below.unsure) answer = Answer::Either;
+      if (!below.stands && !below.unsure) return Answer::Yes;
     }
-    return false;
+    return answer;
   }
 
   Answer edges(const Segment& p, const Segment& q) const {
     switch (m_settings.method) {
-      case Method::Intersection:
+      case Method::Intersection: {
+        Answer answer = Answer::No;
         for (const std::uint32_t s : at(m_a, p))
           for (const std::uint32_t t : at(m_b, q)) {
             const Meeting meeting(*this, s, t);
-            if (meeting.edgePair(edgeOf(m_a.triangles()[s], p), edgeOf(m_b.triangles()[t], q)) &&
-                (meeting.touch || !meeting.isBehind(*this, s, t)))
+            const bool isPair =
+                meeting.edgePair(edgeOf(m_a.triangles()[s], p), edgeOf(m_b.triangles()[t], q));
+            if (isPair && meeting.touch) return Answer::Yes;
+            if (!meeting.any || meeting.touch || meeting.isBehind(*this, s, t)) continue;
+            const Below below = belowOf(meeting, s, t);
+            if (below.edges.contains({p, q}) || (m_self && below.edges.contains({q, p})))
               return Answer::Yes;
+            if (below.unsure) answer = Answer::Either;
+            if (isPair && !below.stands && !below.unsure) return Answer::Yes;
           }
-        return Answer::No;
+        return answer;
+      }
       case Method::Proximity: {
         const std::array positions{m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]};
         const oracle::Closest points =

@@ -234,6 +234,29 @@ TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
   EXPECT_TRUE(swapped.edgeEdge[0].normal.isApprox(-Vector3d::UnitZ(), 1e-12));
 }
 
+/// The ridge of a roof, 0.05 above the flat end of a tool, and longer than the tool. All edges that
+/// cross do so twice, and no end is behind. Corners of the tool are 1 beside the ridge.
+TEST(Piercing, EdgesBelowARidgeHaveItsDepth) {
+  for (const double angle : {0.0, 0.3, 1.1}) {
+    const TriangleMesh roof =
+        turned(piercingMesh({{0, -5, 0.05}, {0, 5, 0.05}, {-5, 0, -1}, {5, 0, -1}},
+                            {{0, 1, 2}, {1, 0, 3}}),
+               Eigen::AngleAxisd(angle, Vector3d::UnitZ()), {0, 0, 0});
+    const TriangleMesh tool = cuboid({-1.3, -1.1, 0}, {1.2, 1.0, 3});
+    for (const bool swapped : {false, true}) {
+      const ContactBuffers found =
+          swapped ? piercingContacts(roof, tool) : piercingContacts(tool, roof);
+      EXPECT_FALSE(found.edgeEdge.empty());
+      for (const EdgeEdgeContact& c : found.edgeEdge) {
+        EXPECT_NEAR(c.distance, -0.05, 0.001);
+        EXPECT_GT(swapped ? -c.normal.z() : c.normal.z(), 0.98);
+      }
+      for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
+        for (const VertexTriangleContact& c : *list) EXPECT_GE(c.distance, -0.06) << angle;
+    }
+  }
+}
+
 /// A bumpy plate: the depth is the least distance to any point near the tip.
 TEST(Piercing, TheDepthIsThatOfTheNearestTriangleAround) {
   for (int seed = 0; seed < 200; ++seed) {
