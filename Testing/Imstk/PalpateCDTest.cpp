@@ -80,6 +80,49 @@ TEST(PalpateCD, SurfacesGiveCellsOfVertices) {
     }
 }
 
+TEST(PalpateCD, EveryCellElementHasTheCellThatHoldsIt) {
+  const auto solid = tetrahedron({0.1, -0.1, 0.1});
+  const auto thread = segment({0.2, -0.01, 0.2}, {0.4, 0.01, 0.3});
+  const std::shared_ptr<imstk::PointSet> meshes[] = {sheet({0, 0, 0}, 4), solid, thread};
+  const auto cellsOf = [](const imstk::PointSet& mesh) {
+    std::vector<std::vector<int>> cells;
+    const auto add = [&](const auto& array) {
+      for (const auto& cell : valuesOf(array)) cells.emplace_back(cell.begin(), cell.end());
+    };
+    if (const auto* const triangles = dynamic_cast<const imstk::SurfaceMesh*>(&mesh))
+      add(const_cast<imstk::SurfaceMesh*>(triangles)->getCells());
+    else if (const auto* const tetrahedra = dynamic_cast<const imstk::TetrahedralMesh*>(&mesh))
+      add(const_cast<imstk::TetrahedralMesh*>(tetrahedra)->getCells());
+    else
+      add(const_cast<imstk::LineMesh&>(dynamic_cast<const imstk::LineMesh&>(mesh)).getCells());
+    return cells;
+  };
+  std::size_t elements = 0;
+  for (const auto& a : meshes)
+    for (const auto& b : meshes) {
+      if (a == b) continue;
+      const auto cd = detection(a, b);
+      palpate::PalpateSettings settings;
+      settings.thickness = 0.05;
+      cd->setSettings(settings);
+      cd->update();
+      for (const bool first : {true, false})
+        for (const auto& element :
+             first ? cd->getCollisionData()->elementsA : cd->getCollisionData()->elementsB) {
+          ASSERT_EQ(element.m_type, CollisionElementType::CellIndex);
+          const imstk::CellIndexElement& cell = element.m_element.m_CellIndexElement;
+          const auto cells = cellsOf(first ? *a : *b);
+          ASSERT_GE(cell.parentId, 0);
+          ASSERT_LT(cell.parentId, static_cast<int>(cells.size()));
+          const std::vector<int>& parent = cells[static_cast<std::size_t>(cell.parentId)];
+          for (int k = 0; k < cell.idCount; ++k)
+            EXPECT_NE(std::find(parent.begin(), parent.end(), cell.ids[k]), parent.end());
+          ++elements;
+        }
+    }
+  EXPECT_GT(elements, 10u);
+}
+
 TEST(PalpateCD, EveryPairOfTypesHasAMethod) {
   const std::vector<std::shared_ptr<imstk::Geometry>> types{sheet({0, 0, 0}),
                                                             tetrahedron({0.1, -0.1, 0.1}),

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace {
 
 palpate::PalpateSettings within(double thickness) {
@@ -68,23 +71,73 @@ TEST(PalpateCH, AToolThatSlidesDragsByFriction) {
 }
 
 TEST(PalpateCH, AToolAtRestThatTheGuardHoldsDoesNotDrag) {
-  // A plane presses a cloth on a floor. The program leads it on, below the floor and aside.
+  // A wall stops a plate on which a cloth lies. The program leads the plate on and lets it rest.
   TestScene test;
   test.config().m_gravity = {0, -10, 0};
-  const auto plane = std::make_shared<imstk::Plane>(Vec3d(0, 1, 0), Vec3d(0, -1, 0));
-  const auto cloth = test.deformable("cloth", triangle({0.3, 0.1, 0.2}, 0.1));
-  test.collide(cloth, test.floor(sheet({0, 0, 0}, 1, 10)), within(0.2));
-  test.collide(cloth, test.tool(plane), within(0.2))->setFriction(0.2);
+  const auto plate = std::make_shared<imstk::OrientedBox>(Vec3d(0, -0.1, 0), Vec3d(1, 0.1, 1));
+  const auto wall = std::make_shared<imstk::SurfaceMesh>();
+  wall->initialize(positionArray({{1.3, -1, -1}, {1.3, -1, 1}, {1.3, -0.05, 0}}),
+                   cellArray<3>({{0, 1, 2}}));
+  const auto cloth = test.deformable("cloth", triangle({0, 0.1, 0}, 0.1));
+  const auto tool = test.tool(plate);
+  test.collide(cloth, tool, within(0.2))->setFriction(0.2);
+  test.guardOnly(test.floor(wall), tool);
   test.scene->initialize();
-  for (int i = 1; i <= 20; ++i) {
-    plane->setPosition({0.02 * i, 1 - 0.07 * i, 0});
+  for (int i = 1; i <= 40; ++i) {
+    plate->setPosition({0.02 * i, -0.1, 0});
     test.step();
   }
-  test.step(20);
-  EXPECT_GT(test.palpateScene.held(), 0u);
-  const double x = particle(*cloth).x();
-  test.step(50);
-  EXPECT_NEAR(particle(*cloth).x(), x, 0.01);
+  EXPECT_GT(velocity(*cloth).x(), 0.5);
+  test.step(80);
+  EXPECT_EQ(test.palpateScene.held(), 1u);
+  EXPECT_NEAR(velocity(*cloth).x(), 0, 1e-6);
+}
+
+TEST(PalpateCH, TissueGivesWayToAToolAsWithoutTheGuardAndLetsItGo) {
+  // A tool on a spring, as a haptic device holds it, is pressed into tissue, held and drawn back.
+  const std::shared_ptr<imstk::Geometry> tools[] = {
+      std::make_shared<imstk::Capsule>(
+          Vec3d(0, 0, 0), 0.2, 0.6, imstk::Quatd::FromTwoVectors(Vec3d(0, 1, 0), Vec3d(1, 0, 0))),
+      std::make_shared<imstk::Sphere>(Vec3d(0, 0, 0), 0.2),
+      std::make_shared<imstk::OrientedBox>(Vec3d(0, 0, 0), Vec3d(0.2, 0.2, 0.2)),
+      cube({0, 0, 0}, 0.2)};
+  for (int kind = 0; kind < 4; ++kind) {
+    std::vector<double> forces[2];
+    for (const bool guarded : {false, true}) {
+      TestScene test;
+      const auto mesh = block(4, 3, 4, {-1, -1, -1}, {2, 1, 2});
+      const auto tissue = test.deformable("tissue", mesh);
+      for (int i = 0; i < mesh->getNumVertices(); ++i)
+        if (mesh->getVertexPosition(i).y() == -1) tissue->getPbdBody()->fixedNodeIds.push_back(i);
+      tissue->getPbdBody()->uniformMassValue = 0.02;
+      test.config().m_linearDampingCoeff = 0.03;
+      test.config().enableFemConstraint(imstk::PbdFemConstraint::MaterialType::NeoHookean, 5000,
+                                        0.4, tissue->getPbdBody()->bodyHandle);
+      const auto tool = test.rigid("tool", tools[kind], {0.03, 0.3, 0.02});
+      palpate::PalpateSettings settings = within(0.01);
+      settings.guarded = guarded;
+      test.collide(tissue, tool, settings);
+      test.scene->initialize();
+      imstk::PbdBody& body = *tool->getPbdBody();
+      (*body.invInertias)[0].setZero();  // it does not turn
+      constexpr double kStiffness = 500;
+      const double damping = 2 * std::sqrt(kStiffness);  // of mass 1
+      for (int i = 0; i < 240; ++i) {
+        const double way = std::min(1.0, std::min(i, 240 - i) / 80.0);
+        const Vec3d device(0.03, 0.3 - 0.45 * way, 0.02), before = particle(*tool);
+        body.externalForce = kStiffness * (device - before) - damping * velocity(*tool);
+        test.step();
+        EXPECT_LT((particle(*tool) - before).norm(), 2 * 0.45 / 80) << kind << ", step " << i;
+        EXPECT_TRUE(!guarded || test.palpateScene.trusted()) << kind << ", step " << i;
+        forces[guarded].push_back(kStiffness * (device - particle(*tool)).y());
+      }
+      EXPECT_LT(forces[guarded][120], -60) << kind;
+      EXPECT_TRUE(logged().empty());
+    }
+    for (std::size_t i = 0; i < forces[0].size(); ++i)
+      EXPECT_NEAR(forces[1][i], forces[0][i], 0.05 * std::abs(forces[0][120]))
+          << kind << ", step " << i;
+  }
 }
 
 TEST(PalpateCH, ADisabledInteractionDoesNotPush) {

@@ -1,6 +1,8 @@
 // The step of a scene: one detection, the guard, and what else moves bodies.
 #include "Scenes.h"
 
+#include <imstkPointToTetMap.h>
+
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -154,6 +156,37 @@ TEST(PalpateScene, ACutIsFollowed) {
   test.step();
   EXPECT_LT(particle(*falling).y(), -5);
   EXPECT_TRUE(logged().empty());
+}
+
+TEST(PalpateScene, ACellThatNamesAVertexTwiceIsRemoved) {
+  TestScene test;
+  const auto mesh = block(1, 1, 1, {-0.5, -1, -0.5}, {1, 1, 1});
+  const auto falling = test.deformable("falling", triangle({0, 1, 0}, 0.1));
+  test.guardOnly(falling, test.floor(mesh));
+  test.scene->initialize();
+  test.setVelocity(*falling, {0, -1000, 0});
+  test.step();
+  EXPECT_GT(particle(*falling).y(), 0);
+  for (Eigen::Vector4i& cell : valuesOf(mesh->getCells())) cell.setZero();
+  test.setVelocity(*falling, {0, -1000, 0});
+  test.step();
+  EXPECT_LT(particle(*falling).y(), -5);
+  EXPECT_TRUE(logged().empty());
+}
+
+TEST(PalpateScene, AMapWithoutParticlesIsRefused) {
+  TestScene test;
+  const auto solid = block(1, 1, 1, {-0.5, -1, -0.5}, {1, 1, 1});
+  const auto body = test.deformable("mapped", solid);
+  const auto surface = triangle({0, -0.1, 0}, 0.1);
+  body->setCollidingGeometry(surface);
+  body->setPhysicsToCollidingMap(std::make_shared<imstk::PointToTetMap>(solid, surface));
+  test.collide(body, test.floor(sheet({0, -2, 0})), {});
+  test.scene->initialize();
+  test.step(3);
+  ASSERT_FALSE(logged().empty());
+  EXPECT_NE(logged()[0].find("\"mapped\" does not collide"), std::string::npos);
+  EXPECT_NE(logged()[0].find("PointToTetMap"), std::string::npos);
 }
 
 TEST(PalpateScene, ACutSutureIsReplaced) {

@@ -26,6 +26,7 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 using imstk::Vec3d;
@@ -97,6 +98,40 @@ inline std::shared_ptr<imstk::SurfaceMesh> sheet(const Vec3d& centre, int n = 2,
     }
   auto mesh = std::make_shared<imstk::SurfaceMesh>();
   mesh->initialize(positionArray(positions), cellArray<3>(triangles));
+  return mesh;
+}
+
+/// A box of nx x ny x nz cells of six tetrahedra each.
+inline std::shared_ptr<imstk::TetrahedralMesh> block(int nx, int ny, int nz, const Vec3d& corner,
+                                                     const Vec3d& size) {
+  std::vector<Vec3d> positions;
+  std::vector<Eigen::Vector4i> tetrahedra;
+  const auto vertex = [&](const Eigen::Vector3i& i) {
+    return (i[0] * (ny + 1) + i[1]) * (nz + 1) + i[2];
+  };
+  for (int i = 0; i <= nx; ++i)
+    for (int j = 0; j <= ny; ++j)
+      for (int k = 0; k <= nz; ++k)
+        positions.push_back(corner +
+                            Vec3d(size.x() * i / nx, size.y() * j / ny, size.z() * k / nz));
+  for (int i = 0; i < nx; ++i)
+    for (int j = 0; j < ny; ++j)
+      for (int k = 0; k < nz; ++k) {
+        int axes[] = {0, 1, 2};
+        do {  // from corner to corner along the edges
+          Eigen::Vector3i at(i, j, k);
+          Eigen::Vector4i cell;
+          cell[0] = vertex(at);
+          for (int n = 0; n < 3; ++n) {
+            ++at[axes[n]];
+            cell[n + 1] = vertex(at);
+          }
+          if ((axes[1] - axes[0] + 3) % 3 != 1) std::swap(cell[2], cell[3]);  // an odd order
+          tetrahedra.push_back(cell);
+        } while (std::next_permutation(axes, axes + 3));
+      }
+  auto mesh = std::make_shared<imstk::TetrahedralMesh>();
+  mesh->initialize(positionArray(positions), cellArray<4>(tetrahedra));
   return mesh;
 }
 

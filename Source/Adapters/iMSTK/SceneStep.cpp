@@ -170,7 +170,8 @@ struct SceneStep::Body {
   std::shared_ptr<imstk::PointSet> mesh{};     // null: a shape
   std::shared_ptr<imstk::PbdObject> object{};  // null: nothing that a solver moves
   BodyRole role = BodyRole::Fixed;
-  std::vector<int> cells{};
+  std::vector<int> cells{}, kept{};         // all of iMSTK's, and those that collide
+  std::vector<std::vector<int>> cellsAt{};  // of each vertex; filled when it is read first
   int verticesPerCell = 0;
   std::vector<Eigen::Vector3d> positions{};  // as read last
   BodyPose local{}, pose{};                  // of a shape in its rigid body; as read last
@@ -188,8 +189,42 @@ struct SceneStep::Body {
     return map == nullptr ? vertex : map->getParentVertexId(vertex);
   }
   bool isPlaced() const { return mesh == nullptr || role == BodyRole::Rigid; }
-  MeshArrays arrays(const Cells& from) const {
-    return {positions.data(), positions.size(), from.indices, from.count, from.vertices};
+  // A cell that names a vertex twice is one that PbdObjectCellRemoval removed.
+  void setCells(const Cells& from) {
+    const auto corners = static_cast<std::size_t>(from.vertices);
+    verticesPerCell = from.vertices;
+    cells.assign(from.indices, from.indices + from.count * corners);
+    kept.clear();
+    cellsAt.clear();
+    for (std::size_t first = 0; first < cells.size(); first += corners) {
+      const int* const cell = &cells[first];
+      bool isWhole = true;
+      for (std::size_t i = 0; i < corners; ++i)
+        isWhole &= std::find(cell, cell + i, cell[i]) == cell + i;
+      if (isWhole) kept.insert(kept.end(), cell, cell + corners);
+    }
+  }
+  MeshArrays arrays() const {
+    return {positions.data(), positions.size(), kept.data(),
+            kept.size() / static_cast<std::size_t>(verticesPerCell), verticesPerCell};
+  }
+  // The lowest cell that names all vertices of an element, or -1.
+  int cellWith(const StepElement& element) {
+    if (cells.empty()) return -1;
+    const auto corners = static_cast<std::size_t>(verticesPerCell);
+    if (cellsAt.empty()) {
+      cellsAt.resize(positions.size());
+      for (std::size_t i = 0; i < cells.size(); ++i)
+        cellsAt[static_cast<std::size_t>(cells[i])].push_back(static_cast<int>(i / corners));
+    }
+    for (const int index : cellsAt[static_cast<std::size_t>(element.ids[0])]) {
+      const int* const cell = &cells[static_cast<std::size_t>(index) * corners];
+      if (std::all_of(element.ids.begin(), element.ids.begin() + element.idCount, [&](int vertex) {
+            return std::find(cell, cell + corners, vertex) != cell + corners;
+          }))
+        return index;
+    }
+    return -1;
   }
   std::vector<Eigen::Vector3d> positionsOf(DataType type) const {
     const std::shared_ptr<imstk::VecDataArray<double, 3>> array = mesh->getVertexPositions(type);
@@ -265,6 +300,14 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
                     ? BodyRole::Rigid
                     : BodyRole::Particles;
   body.name = object == nullptr ? geometry->getTypeName() : object->getName();
+  if (body.role == BodyRole::Particles && body.map() == nullptr &&
+      body.object->getPhysicsGeometry() != geometry) {
+    const auto map = body.object->getPhysicsToCollidingMap();
+    throw std::invalid_argument("\"" + body.name +
+                                "\" does not collide: of maps to a colliding "
+                                "geometry, only a PointwiseMap names particles, and it has " +
+                                (map == nullptr ? "none." : "a " + map->getTypeName() + "."));
+  }
   const bool isRigid = body.role == BodyRole::Rigid;
   if (isRigid) {
     imstk::PbdBody& pbd = *body.object->getPbdBody();
@@ -273,14 +316,12 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
   }
   if (body.mesh != nullptr) {
     const Cells cells = cellsOf(*body.mesh);
-    body.verticesPerCell = cells.vertices;
-    body.cells.assign(cells.indices,
-                      cells.indices + cells.count * static_cast<std::size_t>(cells.vertices));
+    body.setCells(cells);
     body.positions = body.positionsOf(isRigid ? DataType::PreTransform : DataType::PostTransform);
-    body.size = sizeOf(body.positions, body.cells, body.verticesPerCell);
     const auto radius = m_radii.find(geometry.get());
-    body.id = m_step->addMesh(body.role, body.arrays(cells),
+    body.id = m_step->addMesh(body.role, body.arrays(),
                               radius == m_radii.end() ? 0.0 : radius->second, body.pose, body.name);
+    body.size = sizeOf(body.positions, body.kept, body.verticesPerCell);  // cells are checked now
   } else {
     if (isRigid) {
       body.local = poseOf(*geometry, DataType::PreTransform);
@@ -427,8 +468,8 @@ void SceneStep::read(Body& body, bool startsStep) {
   }
   body.positions = std::move(positions);
   if (isCut) {
-    m_step->replaceMesh(body.id, body.arrays(cells));
-    body.cells.assign(cells.indices, cells.indices + indices);
+    body.setCells(cells);
+    m_step->replaceMesh(body.id, body.arrays());
   }
   if (before.empty()) before = m_step->before(body.id);
   if (rests && body.role == BodyRole::Fixed) before = body.positions;
@@ -561,7 +602,8 @@ void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a
     std::vector<StepElement> sides[2];
     m_step->appendElements(m_pairs[static_cast<std::size_t>(pair)].id, sides[0], sides[1]);
     const imstk::CellTypeId types[] = {IMSTK_VERTEX, IMSTK_EDGE, IMSTK_TRIANGLE};
-    const auto convert = [&](const StepElement& from, bool otherIsPoint) {
+    const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+    const auto convert = [&](int body, const StepElement& from, bool otherIsPoint) {
       if (from.idCount == 0) {
         imstk::PointDirectionElement element;
         element.pt = from.point;
@@ -580,11 +622,12 @@ void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a
       for (int i = 0; i < from.idCount; ++i) element.ids[i] = from.ids[static_cast<std::size_t>(i)];
       element.idCount = from.idCount;
       element.cellType = types[from.idCount - 1];
+      element.parentId = m_bodies[static_cast<std::size_t>(body)].cellWith(from);
       return imstk::CollisionElement(element);
     };
     for (std::size_t i = 0; i < sides[0].size(); ++i) {
-      a.push_back(convert(sides[0][i], sides[1][i].idCount == 0));
-      b.push_back(convert(sides[1][i], sides[0][i].idCount == 0));
+      a.push_back(convert(found.bodyA, sides[0][i], sides[1][i].idCount == 0));
+      b.push_back(convert(found.bodyB, sides[1][i], sides[0][i].idCount == 0));
     }
   });
 }

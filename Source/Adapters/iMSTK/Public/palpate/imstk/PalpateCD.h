@@ -17,8 +17,9 @@ namespace palpate {
 /// itself. A PalpateScene shares its work among interactions. Without one, as in a picker, it is an
 /// OctreeBasedCD of its own, whose step begins at the positions of the last update().
 /// Elements of meshes: a CellIndex for each, of one vertex, of two vertices (edge), or of three
-///          (triangle). Of a shape: a PointDirection, with a PointIndexDirection for a vertex, or a
-///          CellIndex for an edge or triangle. Two shapes: a PointDirection for each.
+///          (triangle). parentId is the lowest cell of the mesh that has these vertices. Of a
+///          shape: a PointDirection, with a PointIndexDirection for a vertex, or a CellIndex for an
+///          edge or triangle. Two shapes: a PointDirection for each.
 /// Depth    positive where they overlap. `dir` of a side is the way out for that side.
 class PALPATE_EXPORT PalpateCD : public imstk::CCDAlgorithm {
  public:
