@@ -33,6 +33,11 @@ if(PALPATE_SANITIZE)
   target_compile_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE} -fno-omit-frame-pointer
                                                   -fno-sanitize-recover=all)
   target_link_options(PalpateOptions INTERFACE -fsanitize=${PALPATE_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL Clang AND PALPATE_SANITIZE MATCHES undefined)
+    # Of tests, the addresses are checked: other checks take a third of their compile time.
+    target_compile_options(PalpateOptions INTERFACE
+      $<$<BOOL:$<TARGET_PROPERTY:PALPATE_IS_TEST>>:-fno-sanitize=undefined,fuzzer-no-link>)
+  endif()
   if(CMAKE_CXX_COMPILER_ID STREQUAL Clang)
     # With this check clang 14 takes up to six times as long for SIMD code.
     target_compile_options(PalpateOptions INTERFACE -fno-sanitize=pointer-overflow)
