@@ -376,39 +376,53 @@ std::optional<bool> SideMemory::sideOf(ContactKind kind, std::uint32_t vertex) c
   return forward;
 }
 
-/// The same for all vertices with weight.
+/// The side to which vertices with weight had passed; none if they had not, or to both sides.
 template <std::size_t N>
-std::optional<bool> SideMemory::sideOf(ContactKind kind, const Part<N>& part) const {
-  std::optional<bool> forward;
+SideMemory::PartSide SideMemory::sideOf(ContactKind kind, const Part<N>& part) const {
+  PartSide found{{}, true};
   for (std::size_t i = 0; i < N; ++i) {
     if (part.weights[i] == 0.0) continue;
     const std::optional<bool> side = sideOf(kind, part.vertices[i]);
-    if (!side || (forward && forward != side)) return {};
-    forward = side;
+    if (side && found.forward && found.forward != side) return {{}, false};
+    if (side) found.forward = side;
+    found.isWhole &= side.has_value();
   }
-  return forward;
+  return found;
 }
 
 /// Turns contacts of elements all of whose vertices had passed through the other mesh. Not where
-/// they are clearly on the side from which they came: this is another fold of the surface.
+/// they are clearly on the side from which they came: this is another fold of the surface. Elements
+/// of which some vertices had passed pierce the surface; those of their contacts that lead
+/// these vertices further behind it are removed.
 void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
   constexpr double kClearly = 0.5;  // a cosine; directions along the surface are on no side
   constexpr ContactKind kOfA = ContactKind::VertexTriangle, kOfB = ContactKind::TriangleVertex;
-  const auto hasPassed = [&](ContactKind kind, const auto& part, const TriangleMesh& surface,
-                             const auto& onSurface, const Vector3d& direction, double time) {
-    const std::optional<bool> forward = sideOf(kind, part);
-    if (!forward) return false;
+  enum class Change { None, Turned, Removed };
+  const auto changeOf = [&](ContactKind kind, const auto& part, const TriangleMesh& surface,
+                            const auto& onSurface, const Vector3d& direction, double time) {
+    const PartSide side = sideOf(kind, part);
+    if (!side.forward) return Change::None;
     const Vector3d normal =
         interpolatedNormal(surface, onSurface.vertices, onSurface.weights.data(), time);
-    return (*forward ? -1.0 : 1.0) * direction.dot(normal) < kClearly;
+    const double back = (*side.forward ? -1.0 : 1.0) * direction.dot(normal);
+    if (side.isWhole) return back < kClearly ? Change::Turned : Change::None;
+    return back < 0.0 ? Change::Removed : Change::None;
   };
   // a, b: parts of both meshes. toA: from b to a.
-  const auto turn = [&](auto& contact, const auto& a, const auto& b, const Vector3d& toA) {
+  const auto change = [&](const auto& contact, const auto& a, const auto& b, const Vector3d& toA) {
     const double time = contact.timeOfImpact;
-    if (!hasPassed(kOfA, a, pair.b, b, toA, time) && !hasPassed(kOfB, b, pair.a, a, -toA, time))
-      return;
-    contact.normal = -contact.normal;
-    contact.distance = -contact.distance - 2.0 * (pair.a.largestRadius + pair.b.largestRadius);
+    const Change ofA = changeOf(kOfA, a, pair.b, b, toA, time),
+                 ofB = changeOf(kOfB, b, pair.a, a, -toA, time);
+    if (ofA == Change::Turned || ofB == Change::Turned) return Change::Turned;
+    return ofA == Change::None ? ofB : ofA;
+  };
+  const auto apply = [&](auto& contacts, auto&& changeOfContact) {
+    std::erase_if(contacts, [&](const auto& c) { return changeOfContact(c) == Change::Removed; });
+    for (auto& contact : contacts) {
+      if (changeOfContact(contact) != Change::Turned) continue;
+      contact.normal = -contact.normal;
+      contact.distance = -contact.distance - 2.0 * (pair.a.largestRadius + pair.b.largestRadius);
+    }
   };
   const auto vertexOf = [](const VertexTriangleContact& c) { return Part<1>{{c.vertex}, {1.0}}; };
   const auto cornersOf = [](const VertexTriangleContact& c) {
@@ -417,10 +431,15 @@ void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
   const auto endsOf = [](const Segment& edge, double weight) {
     return Part<2>{edge, {1.0 - weight, weight}};
   };
-  for (auto& c : contents.vertexTriangle) turn(c, vertexOf(c), cornersOf(c), c.normal);
-  for (auto& c : contents.triangleVertex) turn(c, cornersOf(c), vertexOf(c), -c.normal);
-  for (auto& c : contents.edgeEdge)
-    turn(c, endsOf(c.edgeA, c.weightA), endsOf(c.edgeB, c.weightB), c.normal);
+  apply(contents.vertexTriangle, [&](const VertexTriangleContact& c) {
+    return change(c, vertexOf(c), cornersOf(c), c.normal);
+  });
+  apply(contents.triangleVertex, [&](const VertexTriangleContact& c) {
+    return change(c, cornersOf(c), vertexOf(c), -c.normal);
+  });
+  apply(contents.edgeEdge, [&](const EdgeEdgeContact& c) {
+    return change(c, endsOf(c.edgeA, c.weightA), endsOf(c.edgeB, c.weightB), c.normal);
+  });
 }
 
 /// Whether features are among those along which a side of the same vertex, or of edges, slides, or

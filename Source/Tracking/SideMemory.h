@@ -64,6 +64,10 @@ class SideMemory : public CountedObject {
     std::array<std::uint32_t, N> vertices;
     std::array<double, N> weights;
   };
+  struct PartSide {
+    std::optional<bool> forward;
+    bool isWhole;  ///< all vertices of the part had passed
+  };
   /// A remembered side within the step, and the features along which it slides.
   struct Course {
     Side side;    ///< at the step's end
@@ -93,7 +97,7 @@ class SideMemory : public CountedObject {
   bool anyCourse(const Crossing& features, F&&) const;
   std::optional<bool> sideOf(ContactKind, std::uint32_t vertex) const;
   template <std::size_t N>
-  std::optional<bool> sideOf(ContactKind, const Part<N>&) const;
+  PartSide sideOf(ContactKind, const Part<N>&) const;
   void turnPassed(const MeshPair&, Contents&) const;
   bool contains(const MeshPair&, const Course&, const Side&, bool* isSame = nullptr) const;
   bool hasPassedEnd(const Crossing&) const;
