@@ -274,6 +274,17 @@ constexpr double kExitWeight = 0x1p-30;
 /// touch last. Any value well above the roundings of moved positions, some 2^-51, will do. Meshes
 /// whose vertices are in front of neighbouring faces by no more than this count as convex.
 constexpr double kExitSlack = 0x1p-40;
+/// Relative to the largest coordinate: how far beside the middle of a triangle it is tested whether
+/// a body is there. Well above the roundings of that point, some 2^-51. Thinner bodies count as
+/// flat.
+constexpr double kBesideTriangle = 0x1p-38;
+/// Relative to the largest coordinate: by how much a body is made smaller where a translation is
+/// searched, so that faces that lie in each other do not meet. Well above the roundings of
+/// coordinates, and of kExitSlack.
+constexpr double kInset = 0x1p-36;
+/// Sine of an angle: a motion at less than this to a plane counts as along it. Above the rounding
+/// of a unit vector, and so far below kInset that no such motion leads through an inset.
+constexpr double kAlongPlane = 0x1p-44;
 /// Relative to the largest coordinate: how far beside a point of a surface it is asked whether a
 /// body ends there. Points where triangles intersect are right to some 2^-50, and triangles within
 /// kExitSlack of such a point count as triangles at it.

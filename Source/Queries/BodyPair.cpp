@@ -26,10 +26,10 @@ void BodyVertices::assign(const Body& geometry, const Deadline* deadline) {
     positions[v] = now[v];
   }
   triangleOf.assign(now.size(), kNoElement);
-  m_links.resize(now.size());
-  std::iota(m_links.begin(), m_links.end(), 0u);
+  partOf.resize(now.size());
+  std::iota(partOf.begin(), partOf.end(), 0u);
   const auto root = [&](std::uint32_t v) {
-    while (m_links[v] != v) v = m_links[v] = m_links[m_links[v]];
+    while (partOf[v] != v) v = partOf[v] = partOf[partOf[v]];
     return v;
   };
   box.setEmpty();
@@ -39,12 +39,14 @@ void BodyVertices::assign(const Body& geometry, const Deadline* deadline) {
     for (const std::uint32_t v : triangles[t]) {
       if (triangleOf[v] == kNoElement) triangleOf[v] = t, box.extend(positions[v]);
       const std::uint32_t first = root(triangles[t][0]), second = root(v);
-      m_links[std::max(first, second)] = std::min(first, second);
+      partOf[std::max(first, second)] = std::min(first, second);
     }
   });
   parts.clear();
-  for (std::uint32_t v = 0; v < now.size(); ++v)
-    if (m_links[v] == v && triangleOf[v] != kNoElement) parts.push_back(v);
+  for (std::uint32_t v = 0; v < now.size(); ++v) {
+    partOf[v] = partOf[partOf[v]];  // a lower vertex, which has been visited
+    if (partOf[v] == v && triangleOf[v] != kNoElement) parts.push_back(v);
+  }
 }
 
 double BodyVertices::magnitude() const {
@@ -153,13 +155,20 @@ bool BodyPair::isInside(bool ofA, std::uint32_t vertex) const {
   return vertices(!ofA).box.contains(p) && windingNumberOf(!ofA, p) != 0;
 }
 
-bool BodyPair::isInBoth(const Vector3d& p) const {
-  return windingNumberOf(true, p) != 0 && windingNumberOf(false, p) != 0;
+bool BodyPair::isInB(const Vector3d& p) const {
+  return m_scratch.b.box.contains(p) && windingNumberOf(false, p) != 0;
 }
 
 /// Tests every triangle, because no octree holds a where it is moved to. It is rare that a point
 /// must be tested.
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
+  // The box of a where it is moved to, with its roundings.
+  const Vector3d slack =
+      Vector3d::Constant(kExitSlack * (m_magnitude + shift.cwiseAbs().maxCoeff()));
+  const Eigen::AlignedBox3d box(m_scratch.a.box.min() + shift - slack,
+                                m_scratch.a.box.max() + shift + slack);
+  if (!box.contains(p)) return false;
+  if (shift.isZero(0.0)) return windingNumberOf(true, p) != 0;
   SignCounts counts;
   TimeCheck check(deadline(), 256);
   const auto cornersAt = [&](std::size_t i) {
@@ -171,34 +180,10 @@ bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   return number != 0;
 }
 
-std::optional<BodyPair::PartVertex> BodyPair::findInsidePart(const Vector3d& shift) const {
-  for (const std::uint32_t v : m_scratch.a.parts) {
-    const Vector3d p = moved(v, shift);
-    if (m_scratch.b.box.contains(p) && windingNumberOf(false, p) != 0) return PartVertex{true, v};
-  }
-  // The box of a where it is moved to, with its roundings.
-  const Vector3d slack =
-      Vector3d::Constant(kExitSlack * (m_magnitude + shift.cwiseAbs().maxCoeff()));
-  const Eigen::AlignedBox3d box(m_scratch.a.box.min() + shift - slack,
-                                m_scratch.a.box.max() + shift + slack);
-  for (const std::uint32_t v : m_scratch.b.parts) {
-    const Vector3d& p = m_scratch.b.positions[v];
-    if (box.contains(p) && isInMovedA(p, shift)) return PartVertex{false, v};
-  }
-  return {};
-}
-
-bool BodyPair::areApart(const Vector3d& shift) const {
-  bool apart = true;
-  forEachIntersecting(shift, [&](const IntersectingTriangles&) { return apart = false; });
-  return apart && !findInsidePart(shift);
-}
-
-std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& shift,
-                                      const Vector3d& direction) const {
+std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& direction) const {
   checkTime(deadline());
   const Vector3d& p = vertices(part.ofA).positions[part.vertex];
-  const Ray ray = part.ofA ? Ray{p + shift, direction} : Ray{p - shift, -direction};
+  const Ray ray{p, part.ofA ? direction : Vector3d(-direction)};
   constexpr double kLargest = std::numeric_limits<double>::max();
   RayHits hits(geometry(!part.ofA), {ray.origin, ray.direction, 0.0, kLargest},
                m_engine == Engine::BruteForce, m_scratch.met);

@@ -26,15 +26,13 @@ struct BodyVertices {
   CountedVector<Eigen::Vector3d> positions;  ///< L, in the world
   CountedVector<std::uint32_t> triangleOf;   ///< per vertex: its lowest triangle, or kNoElement
   CountedVector<std::uint32_t> parts;        ///< a vertex of each connected part of the surface
+  CountedVector<std::uint32_t> partOf;       ///< per vertex: the vertex that stands for its part
   Eigen::AlignedBox3d box;                   ///< of the vertices that are in triangles
 
   void assign(const Body&, const Deadline* = nullptr);
   double magnitude() const;  ///< L: the largest coordinate
   /// The vertex that is furthest along a direction.
   Eigen::Vector3d furthest(const Eigen::Vector3d& direction, const Deadline* = nullptr) const;
-
- private:
-  CountedVector<std::uint32_t> m_links;  ///< per vertex: another vertex of its part, or itself
 };
 
 /// 1/L: a power of two that brings coordinates up to a magnitude to about 1, so that no product of
@@ -61,9 +59,11 @@ class BodyPair {
 
   const Body& geometry(bool ofA) const { return ofA ? m_a : m_b; }
   const BodyVertices& vertices(bool ofA) const { return ofA ? m_scratch.a : m_scratch.b; }
+  Engine engine() const { return m_engine; }
   double magnitude() const { return m_magnitude; }  ///< L: the largest coordinate
   /// Of the scratch. Null: none. Searches that say nothing else throw OutOfTime.
   const Deadline* deadline() const { return m_scratch.stack.deadline; }
+  void countExactDecisions(std::size_t count) const { m_scratch.stack.exactDecisions += count; }
 
   Corners cornersOfA(std::uint32_t element, const Eigen::Vector3d& shift) const;
   Corners cornersOfB(std::uint32_t element) const;
@@ -81,21 +81,19 @@ class BodyPair {
   bool isInside(bool ofA, std::uint32_t vertex) const;
   /// The winding number of a body about a point, a not moved; 0 on the surface.
   int windingNumberOf(bool ofA, const Eigen::Vector3d& p) const;
-  /// Whether a point is inside both bodies, a not moved.
-  bool isInBoth(const Eigen::Vector3d& p) const;
   struct PartVertex {
     bool ofA;
     std::uint32_t vertex;
   };
-  /// A vertex of a part of one surface that is inside the other body, where the surfaces have no
-  /// common point.
-  std::optional<PartVertex> findInsidePart(const Eigen::Vector3d& shift) const;
-  /// Whether the bodies have no common point.
-  bool areApart(const Eigen::Vector3d& shift) const;
-  /// Where a vertex of a, moved by `shift`, meets b along a direction; a vertex of b meets a, moved
-  /// by `shift`, against it.
-  std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& shift,
-                              const Eigen::Vector3d& direction) const;
+  /// Whether a point is inside b, or inside a that is moved. Exact.
+  bool isInB(const Eigen::Vector3d& p) const;
+  bool isInMovedA(const Eigen::Vector3d& p, const Eigen::Vector3d& shift) const;
+  /// Where a vertex is, a moved.
+  Eigen::Vector3d position(const PartVertex& at, const Eigen::Vector3d& shift) const {
+    return at.ofA ? moved(at.vertex, shift) : m_scratch.b.positions[at.vertex];
+  }
+  /// Where a vertex of a meets b along a direction; a vertex of b meets a against it.
+  std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& direction) const;
   /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
   /// surface last. Both are L, from where it is. Looks at no deadline.
   struct Exit {
@@ -107,7 +105,6 @@ class BodyPair {
 
  private:
   Eigen::Vector3d moved(std::uint32_t vertexOfA, const Eigen::Vector3d& shift) const;
-  bool isInMovedA(const Eigen::Vector3d& p, const Eigen::Vector3d& shift) const;
 
   const Body &m_a, &m_b;
   const Engine m_engine;

@@ -1,18 +1,15 @@
 #include "Queries/BodyPenetration.h"
 
-#include "Queries/BodyOverlap.h"
 #include "Queries/HullSeparation.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
-#include "Math/TranslationExit.h"
 #include "Core/Assert.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <optional>
 #include <tuple>
@@ -26,25 +23,20 @@ namespace {
 
 constexpr std::size_t kMostRays = 8;          ///< of vertices that bound one translation
 constexpr std::size_t kMostFaceNormals = 32;  ///< directions from faces
-constexpr int kMostSteps = 256;               ///< of one translation
+constexpr int kMostTests = 64;                ///< of whether one direction separates
+/// Operations of all sweeps, for each triangle and besides; more if nothing separates the bodies.
+constexpr std::size_t kOperationsPerTriangle = 96, kOperations = 20000;
 constexpr int kMostDescents = 10;
 /// A direction whose translation is longer than the best one by more than this starts no descent.
 constexpr double kWorthDescent = 1.15;
 /// Cosine: normals that are nearer to each other count once.
 constexpr double kSameNormal = 0.98;
 
-/// Where two surfaces touch last.
-struct LastContact {
-  std::uint32_t elementA = kNoElement, elementB = kNoElement;
-  Vector3d weightsA = Vector3d::Zero(), weightsB = Vector3d::Zero();
-  Vector3d normal = Vector3d::Zero();  ///< unit: a leaves b along it
-};
-
 /// A translation along a direction.
 struct Translation {
   Vector3d direction = Vector3d::Zero();
   double depth = std::numeric_limits<double>::infinity();  ///< L
-  LastContact last;
+  TranslationSweep::Contact last;
   bool separates = false;  ///< proven; else it ended at the limit
 };
 
@@ -63,25 +55,38 @@ void forEachAround(F&& f) {
 
 class Search {
  public:
-  Search(const BodyPair& pair, PenetrationScratch& scratch, const PenetrationEffort& effort)
+  Search(const BodyPair& pair, OverlapTest& test, PenetrationScratch& scratch,
+         const PenetrationEffort& effort)
       : m_pair(pair),
+        m_test(test),
         m_scratch(scratch),
         m_effort(effort),
         m_unit(unitOf(pair.magnitude())),
-        m_slack(kExitSlack * pair.magnitude()) {}
+        m_hulls(separateHulls([&](const Vector3d& d) { return furthest(true, d); },
+                              [&](const Vector3d& d) { return furthest(false, d); }, kExitSlack,
+                              scratch.difference)),
+        m_sweep(pair, m_hulls.direction, scratch.sweep),
+        m_slack(kExitSlack * pair.magnitude()),
+        m_mostSlack(4 * kInset * pair.magnitude()),
+        m_triangles(pair.geometry(true).mesh.topology.count() +
+                    pair.geometry(false).mesh.topology.count()) {}
 
   Penetration run() {
-    findInside(true, m_scratch.insideA);
-    findInside(false, m_scratch.insideB);
-    const HullSeparation hulls = separateHulls(
-        [&](const Vector3d& d) { return furthest(true, d); },
-        [&](const Vector3d& d) { return furthest(false, d); }, kExitSlack, m_scratch.difference);
-    if (hulls.direction != Vector3d::Zero()) improve(hulls.direction, kInfinity);
+    const bool hasHulls = m_hulls.direction != Vector3d::Zero();
+    if (hasHulls && areConvex()) {
+      // No shorter translation separates them.
+      const double least = (m_hulls.depth - m_hulls.gap) / m_unit - m_mostSlack;
+      improve(m_hulls.direction, {kInfinity, std::max(least, 0.0), operations()});
+    }
+    if (!isOver() && !isMinimal()) {
+      findInside(true, m_scratch.insideA);
+      findInside(false, m_scratch.insideB);
+      searchDirections();
+    }
     if (isOver()) return {};
-    if (!m_best.separates || !isMinimal(hulls)) searchDirections();
-    if (isOver()) return {};
+    if (!m_best.separates) leaveHull(m_hulls.direction);
     Penetration out = result();
-    out.minimal = isMinimal(hulls);
+    out.minimal = isMinimal();
     return out;
   }
 
@@ -95,89 +100,74 @@ class Search {
 
   // ---- One direction ----
 
-  /// Ends at the deadline without having separated the bodies, as follow() may end there.
-  Translation translate(const Vector3d& direction, double limit) {
+  struct Limits {
+    double end;              ///< L
+    double least;            ///< L: no shorter translation separates the bodies
+    std::size_t operations;  ///< of all sweeps
+  };
+  /// Ends at the deadline without having separated the bodies. wantsLast: the last contact is
+  /// wanted even if the bodies are not separated before the end.
+  Translation translate(const Vector3d& direction, const Limits& limits, bool wantsLast) {
     Translation at;
     at.direction = direction;
-    at.depth = 0;
-    boundByRays(at, limit);
+    at.depth = limits.least;
+    boundByRays(at, limits.end);
+    if (!(at.depth < limits.end)) return at;
+    const double from = std::max(at.depth - m_mostSlack, 0.0);
+    m_sweep.start(direction, from, m_isClosed);
     double slack = m_slack;
-    for (int step = 0; step < kMostSteps && at.depth < limit && !isOver(); ++step) {
-      const double before = at.depth;
-      if (!follow(at)) {
-        at.separates = true;
-        return at;
+    bool isInside = false;
+    for (int i = 0; i < kMostTests; ++i) {
+      const bool isFree = m_sweep.advance({limits.end, limits.operations, wantsLast}, isInside);
+      if (m_sweep.last().elementA != kNoElement) at.last = m_sweep.last();
+      at.depth = std::max(at.depth, m_sweep.t());
+      if (!isFree) return at;
+      at.depth = m_sweep.t() + slack;
+      // Not tested, as it is no better. Of equal depths, descents have the better direction.
+      at.separates = wantsLast ? at.depth > m_best.depth : at.depth >= m_best.depth;
+      if (at.separates) return at;
+      switch (m_test.find(at.depth * direction)) {
+        case OverlapTest::Result::Apart:
+          at.separates = !isOver();
+          // Where they overlap by less than the inset, nothing has crossed.
+          if (at.last.elementA == kNoElement) at.last = m_sweep.touchingAt(direction, m_sweep.t());
+          return at;
+        case OverlapTest::Result::Inside:
+          isInside = true;
+          break;
+        case OverlapTest::Result::Piercing:
+          if ((isInside = m_sweep.isInsetInside())) break;
+          slack *= 2;  // within rounding
+          isInside = slack > m_mostSlack;
+          m_isClosed |= isInside;
       }
-      if (at.depth > before) {
-        at.depth += m_slack;
-      } else {
-        at.depth = before + slack;
-        slack *= 2;
-      }
+      if (isInside) slack = m_slack;
     }
     return at;
   }
-  /// Moves on to where the triangles that meet come apart. Returns false if the bodies are apart.
-  bool follow(Translation& at) {
-    const Vector3d shift = at.depth * at.direction;
-    const double start = at.depth;
-    bool any = false;
-    const auto takeIntersecting = [&](const BodyPair::IntersectingTriangles& both) {
-      any = true;
-      takeExit(at, start, both);
-      return true;
-    };
-    m_pair.forEachIntersecting(shift, std::ref(takeIntersecting));  // a copy would allocate
-    if (any || isOver()) return true;
-    const auto part = m_pair.findInsidePart(shift);
-    if (!part) return false;
-    takeHit(at, *part, start);
-    return true;
-  }
-  void takeExit(Translation& at, double start, const BodyPair::IntersectingTriangles& both) {
-    const auto scaled = [&](const Corners& c) {
-      return Corners{m_unit * c[0], m_unit * c[1], m_unit * c[2]};
-    };
-    const TranslationExit exit = lastTouch(scaled(both.a), scaled(both.b), at.direction);
-    const double depth = start + exit.t / m_unit;
-    const auto precedes = [&] {
-      return std::pair(both.elementA, both.elementB) <
-             std::pair(at.last.elementA, at.last.elementB);
-    };
-    // Bodies that overlap by less than rounding may have no exit after the start.
-    const bool isOnly = at.last.elementA == kNoElement && exit.t > -kInfinity;
-    if (!(isOnly || depth > at.depth || (depth == at.depth && depth > start && precedes()))) return;
-    at.depth = std::max(at.depth, depth);
-    at.last = {both.elementA, both.elementB, exit.weightsA, exit.weightsB, exit.normal};
-  }
-  /// Moves on to where a vertex meets the other surface.
-  void takeHit(Translation& at, const BodyPair::PartVertex& vertex, double start) {
-    const auto hit = m_pair.hitOf(vertex, start * at.direction, at.direction);
-    if (!hit || !(start + hit->t > at.depth)) return;
-    at.depth = start + hit->t;
-    const std::uint32_t own = m_pair.vertices(vertex.ofA).triangleOf[vertex.vertex];
-    Vector3d corner = Vector3d::Zero();
-    const Triangle& corners = m_pair.geometry(vertex.ofA).mesh.topology.elements[own];
-    for (int i = 0; i < 3; ++i)
-      if (corners[static_cast<std::size_t>(i)] == vertex.vertex) corner = Vector3d::Unit(i);
-    const Vector3d normal = normalOf(!vertex.ofA, hit->element);
-    at.last = {own, hit->element, corner, hit->weights,
-               normal.dot(at.direction) < 0 ? Vector3d(-normal) : normal};
-    if (vertex.ofA) return;
-    std::swap(at.last.elementA, at.last.elementB);
-    std::swap(at.last.weightsA, at.last.weightsB);
-  }
   /// No translation that is shorter than where any inside vertex leaves separates the bodies.
-  void boundByRays(Translation& at, double limit) {
+  void boundByRays(Translation& at, double limit) const {
     for (const bool ofA : {true, false}) {
       const auto& inside = insideOf(ofA);
       if (inside.empty()) continue;
-      takeHit(at, {ofA, deepest(ofA, at.direction)}, 0.0);
+      takeHit(at, {ofA, deepest(ofA, at.direction)}, limit);
       const std::size_t stride = std::max<std::size_t>(1, inside.size() / kMostRays);
       for (std::size_t i = 0; i < inside.size() && at.depth < limit; i += stride)
-        takeHit(at, {ofA, inside[i]}, 0.0);
+        takeHit(at, {ofA, inside[i]}, limit);
     }
   }
+  /// Moves on to where a vertex meets the other surface, at most to a limit.
+  void takeHit(Translation& at, const BodyPair::PartVertex& vertex, double limit) const {
+    const auto hit = m_sweep.firstHit(vertex.ofA, vertex.vertex, at.direction, limit);
+    if (!hit) at.depth = limit < kInfinity ? limit : at.depth;
+    if (!hit || !(hit->t > at.depth)) return;
+    at.depth = hit->t;
+    const std::uint32_t own = m_pair.vertices(vertex.ofA).triangleOf[vertex.vertex];
+    const Vector3d normal = normalOf(!vertex.ofA, hit->element);
+    at.last = {vertex.ofA ? own : hit->element, vertex.ofA ? hit->element : own,
+               normal.dot(at.direction) < 0 ? Vector3d(-normal) : normal};
+  }
+  std::size_t operations() const { return kOperations + kOperationsPerTriangle * m_triangles; }
 
   // ---- Vertices inside the other body ----
 
@@ -217,16 +207,17 @@ class Search {
   // ---- Directions ----
 
   /// Follows a direction, and goes on from there if it is worth it.
-  void improve(const Vector3d& direction, double limit) {
-    const Translation first = translate(direction, limit);
+  void improve(const Vector3d& direction, const Limits& limits) {
+    const Translation first = translate(direction, limits, false);
     if (!first.separates) return;
     take(first);
-    descend(first);
+    descend(first, limits.operations);
   }
-  void take(const Translation& found) {
-    if (found.separates && found.depth < m_best.depth) m_best = found;
+  void take(const Translation& found, bool orEqual = false) {
+    if (!found.separates || found.depth > m_best.depth) return;
+    if (orEqual || found.depth < m_best.depth) m_best = found;
   }
-  void descend(const Translation& first) {
+  void descend(const Translation& first, std::size_t operations) {
     ShortestTranslation& shortest = m_scratch.shortest;
     shortest.clear();
     shortest.add(first.last.normal, first.last.normal.dot(first.depth * first.direction));
@@ -236,9 +227,11 @@ class Search {
       if (!next) return;
       const double length = stableLength(*next);
       if (!(length > 0) || !(length < (1.0 - kDepthGain) * std::min(depth, m_best.depth))) return;
-      const Translation found = translate(*next / length, kWorthDescent * depth);
-      if (found.last.elementA == kNoElement || isOver()) return;
-      take(found);
+      const Translation found =
+          translate(*next / length, {kWorthDescent * depth, 0.0, operations}, true);
+      if (found.last.elementA == kNoElement || isOver() || m_sweep.operations() > operations)
+        return;
+      take(found, true);
       if (found.separates) depth = std::min(depth, found.depth);
       shortest.add(found.last.normal, found.last.normal.dot(found.depth * found.direction));
     }
@@ -246,27 +239,39 @@ class Search {
   void searchDirections() {
     auto& seeds = m_scratch.seeds;
     seeds.clear();
+    addSeed(m_hulls.direction);
     addNormals();
-    if (m_effort.aroundTheSphere || !m_best.separates)
+    if (m_effort.aroundTheSphere || seeds.empty())
       forEachAround([&](const Vector3d& direction) { seeds.push_back({direction, seeds.size()}); });
-    for (auto& seed : seeds) seed.bound = boundOf(seed.direction);
+    // Short ways first: one through many layers, or across a hollow, costs more.
+    const double most = m_hulls.depth / m_unit;
+    for (auto& seed : seeds) seed.bound = boundOf(seed.direction, kWorthDescent * most);
     std::sort(seeds.begin(), seeds.end(), [](const auto& l, const auto& r) {
       return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
     });
+    for (double limit = std::max(kWorthDescent * seeds.front().bound, most / 64);
+         limit < most && !m_best.separates && m_sweep.operations() < operations() / 2; limit *= 2)
+      trySeeds(limit, operations() / 2);
+    if (!m_best.separates) improve(m_hulls.direction, {kInfinity, 0.0, 4 * operations()});
+    trySeeds(kInfinity, std::max(operations(), m_sweep.operations() + operations() / 4));
+  }
+  void trySeeds(double limit, std::size_t operations) {
     int translations = 0;
-    for (const auto& seed : seeds) {
+    for (const auto& seed : m_scratch.seeds) {
       if (translations++ >= m_effort.translations && m_best.separates) break;
-      if (!(seed.bound < m_best.depth)) break;
-      improve(seed.direction, kWorthDescent * m_best.depth);
+      const double end = std::min(limit, kWorthDescent * m_best.depth);
+      if (!(seed.bound < std::min(end, m_best.depth)) || m_sweep.operations() > operations) break;
+      improve(seed.direction, {end, seed.bound, operations});
       if (isOver()) return;
     }
   }
-  double boundOf(const Vector3d& direction) {
+  /// At most the limit.
+  double boundOf(const Vector3d& direction, double limit) const {
     Translation at;
     at.direction = direction;
     at.depth = 0;
     for (const bool ofA : {true, false})
-      if (!insideOf(ofA).empty()) takeHit(at, {ofA, deepest(ofA, direction)}, 0.0);
+      if (!insideOf(ofA).empty()) takeHit(at, {ofA, deepest(ofA, direction)}, limit);
     return at.depth;
   }
   void addSeed(const Vector3d& direction) {
@@ -302,10 +307,10 @@ class Search {
 
   // ---- The answer ----
 
-  bool isMinimal(const HullSeparation& hulls) const {
+  bool isMinimal() const {
     const double most = kMinimalSlack * m_pair.magnitude();
-    return m_best.separates && hulls.direction != Vector3d::Zero() &&
-           m_best.depth <= (hulls.depth - hulls.gap) / m_unit + most && areConvex();
+    return m_best.separates && m_hulls.direction != Vector3d::Zero() &&
+           m_best.depth <= (m_hulls.depth - m_hulls.gap) / m_unit + most && areConvex();
   }
   ElementPair firstIntersecting() const {
     if (m_scratch.intersecting.empty()) return {0, 0};
@@ -315,12 +320,41 @@ class Search {
     if (!m_areConvex) m_areConvex = isConvex(m_pair, true) && isConvex(m_pair, false);
     return *m_areConvex;
   }
-  SurfacePoint pointOf(bool ofA) const {
+  /// Where the triangles that meet last are nearest to each other afterwards.
+  struct NearestPoints {
+    Vector3d weightsA, weightsB;
+    double distance = kInfinity;
+  };
+  NearestPoints nearestPoints() const {
+    const Corners a = m_pair.cornersOfA(m_best.last.elementA, m_best.depth * m_best.direction),
+                  b = m_pair.cornersOfB(m_best.last.elementB);
+    NearestPoints best;
+    const auto take = [&](double distance, const Vector3d& ofA, const Vector3d& ofB) {
+      if (distance < best.distance) best = {ofA, ofB, distance};
+    };
+    const auto onEdge = [](int i, double weight) {
+      return Vector3d((1.0 - weight) * Vector3d::Unit(i) + weight * Vector3d::Unit((i + 1) % 3));
+    };
+    for (int i = 0; i < 3; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const VertexTriangleDistance ofA = finiteVertexTriangleDistance(a[k], b[0], b[1], b[2]),
+                                   ofB = finiteVertexTriangleDistance(b[k], a[0], a[1], a[2]);
+      take(ofA.distance, Vector3d::Unit(i), ofA.weights);
+      take(ofB.distance, ofB.weights, Vector3d::Unit(i));
+    }
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const auto k = static_cast<std::size_t>(i), l = static_cast<std::size_t>(j);
+        const EdgeEdgeDistance both =
+            finiteEdgeEdgeDistance(a[k], a[(k + 1) % 3], b[l], b[(l + 1) % 3]);
+        take(both.distance, onEdge(i, both.weightA), onEdge(j, both.weightB));
+      }
+    return best;
+  }
+  SurfacePoint pointOf(bool ofA, const Vector3d& weights) const {
     const std::uint32_t element = ofA ? m_best.last.elementA : m_best.last.elementB;
     const Body& geometry = m_pair.geometry(ofA);
     const Triangle& vertices = geometry.mesh.topology.elements[element];
-    Vector3d weights = (ofA ? m_best.last.weightsA : m_best.last.weightsB).cwiseMax(0.0);
-    weights /= weights.sum();
     Vector3d position = Vector3d::Zero();
     for (int i = 0; i < 3; ++i)
       position +=
@@ -328,19 +362,49 @@ class Search {
     return {geometry.id, element, vertices, weights, position, m_best.depth};
   }
   Penetration result() {
-    if (m_best.last.elementA == kNoElement) {  // no exit was found in floating point
-      const Vector3d middle = Vector3d::Constant(1.0 / 3.0);
+    if (m_best.last.elementA == kNoElement) {  // the bodies overlap by less than kInset
       const auto& [a, b] = firstIntersecting();
-      m_best.last = {a, b, middle, middle, m_best.direction};
+      m_best.last = {a, b, m_best.direction};
     }
-    return {true, m_best.direction, m_best.depth, pointOf(true), pointOf(false), false};
+    const NearestPoints points = nearestPoints();
+    return {true,
+            m_best.direction,
+            m_best.depth,
+            pointOf(true, points.weightsA),
+            pointOf(false, points.weightsB),
+            false};
+  }
+  /// Leaves the whole hull of b along a direction.
+  void leaveHull(Vector3d direction) {
+    if (direction == Vector3d::Zero()) direction = Vector3d::UnitX();
+    const auto lastOf = [&](bool ofA, const Vector3d& way) {
+      const BodyVertices& own = m_pair.vertices(ofA);
+      std::uint32_t best = own.parts.front();
+      for (std::uint32_t v = 0; v < own.positions.size(); ++v)
+        if (own.triangleOf[v] != kNoElement &&
+            way.dot(own.positions[v]) > way.dot(own.positions[best]))
+          best = v;
+      return best;
+    };
+    const std::uint32_t a = lastOf(true, -direction), b = lastOf(false, direction);
+    const BodyVertices &ofA = m_pair.vertices(true), &ofB = m_pair.vertices(false);
+    m_best.direction = direction;
+    m_best.depth = direction.dot(ofB.positions[b] - ofA.positions[a]) + m_mostSlack;
+    m_best.last = {ofA.triangleOf[a], ofB.triangleOf[b], direction};
+    m_best.separates = true;
   }
 
   const BodyPair& m_pair;
+  OverlapTest& m_test;
   PenetrationScratch& m_scratch;
   const PenetrationEffort m_effort;
-  const double m_unit;   ///< 1/L: brings coordinates to about 1
-  const double m_slack;  ///< L
+  const double m_unit;  ///< 1/L: brings coordinates to about 1
+  const HullSeparation m_hulls;
+  TranslationSweep m_sweep;
+  const double m_slack;      ///< L
+  const double m_mostSlack;  ///< L
+  const std::size_t m_triangles;
+  bool m_isClosed = false;  ///< faces lie in each other within rounding
   Translation m_best;
   mutable std::optional<bool> m_areConvex;
 };
@@ -363,9 +427,10 @@ Penetration penetrationOf(const Body& a, const Body& b, Engine engine, Penetrati
 
 Penetration penetrationOf(const BodyPair& pair, PenetrationScratch& scratch,
                           const PenetrationEffort& effort) {
-  if (!overlap(pair, scratch.intersecting))
+  OverlapTest test(pair, scratch.overlap);
+  if (test.find(Vector3d::Zero(), &scratch.intersecting) == OverlapTest::Result::Apart)
     return apart(pair.geometry(true).id, pair.geometry(false).id);
-  return Search(pair, scratch, effort).run();
+  return Search(pair, test, scratch, effort).run();
 }
 
 }  // namespace palpate

@@ -2,8 +2,10 @@
 
 #include <palpate/SpatialQueries.h>
 
+#include "Queries/BodyOverlap.h"
 #include "Queries/BodyPair.h"
 #include "Queries/ShortestTranslation.h"
+#include "Queries/TranslationSweep.h"
 #include "Shapes/Polytope.h"
 
 #include <Eigen/Core>
@@ -23,6 +25,8 @@ struct PenetrationScratch {
   };
 
   BodyPairScratch pair;
+  OverlapScratch overlap;
+  SweepScratch sweep;
   Polytope difference;
   ShortestTranslation shortest;
   CountedVector<BodyPair::IntersectingTriangles> intersecting;  ///< where a is not moved

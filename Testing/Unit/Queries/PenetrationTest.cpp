@@ -261,6 +261,126 @@ TEST(Penetration, ABodyInsideAnotherIntersectsItUnlessItIsInAHollow) {
   expectApart(hollow, inner);
 }
 
+/// Of a ball among many plates, which fits between none, the way along the stack is shortest.
+TEST(Penetration, LayersAreLeftByTheShortWay) {
+  Mesh plates;
+  for (int i = 0; i < 300; ++i) append(plates, boxMesh({-600, -600, i - 0.3}, {600, 600, i + 0.3}));
+  const Mesh ball = moved(sphere(8, 10, {0, 0, 0}, 0.9), {0, 0, 150.2});
+  const Penetration p = Bodies(ball, plates).penetration();
+  ASSERT_TRUE(p.intersecting);
+  EXPECT_LE(p.depth, 1.5 * 150);
+  EXPECT_FALSE(Bodies(moved(ball, p.depth * p.direction), plates).penetration().intersecting);
+}
+
+/// Two stacks of plates that reach into each other: one plate's thickness is the way out, not one
+/// body's size.
+TEST(Penetration, StacksOfPlatesShiftByOnePlate) {
+  for (const double shift : {0.02, 0.5}) {
+    Mesh a, b;
+    for (int i = 0; i < 60; ++i) {
+      append(b, boxMesh({-5, -5, i - 0.2}, {5, 5, i + 0.2}));
+      const double z = i + 0.4 - shift;
+      append(a, boxMesh({-3, -4, z - 0.2}, {7, 6, z + 0.2}));
+    }
+    const Penetration p = Bodies(a, b).penetration();
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_NEAR(p.depth, shift == 0.02 ? 0.02 : 0.3, 1e-9);
+  }
+}
+
+/// Pieces of a planned cut with fingers that fit: sides that lie in each other hold nothing.
+TEST(Penetration, SidesThatLieInEachOtherDoNotHoldBodies) {
+  // A row of columns between a plane and the cut.
+  const auto comb = [](double back, double tip, double root, int first) {
+    Mesh body;
+    for (int i = 0; i < 6; ++i) {
+      const double x = i % 2 == first ? tip : root;
+      for (const double z : {0.0, 1.0})
+        for (const double y : {1.0 * i, i + 1.0}) {
+          body.positions.push_back({back, y, z});
+          body.positions.push_back({x, y, z});
+        }
+    }
+    const auto quad = [&](std::uint32_t p, std::uint32_t q, std::uint32_t r, std::uint32_t s) {
+      body.triangles.push_back({p, q, r});
+      body.triangles.push_back({p, r, s});
+    };
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      const std::uint32_t v = 8 * i;  // corners: bit 0 at the front, bit 1 at the end, bit 2 on top
+      quad(v, v + 2, v + 3, v + 1);
+      quad(v + 4, v + 5, v + 7, v + 6);
+      quad(v, v + 4, v + 6, v + 2);
+      quad(v + 1, v + 3, v + 7, v + 5);
+      if (i == 0) quad(v, v + 1, v + 5, v + 4);
+      const std::uint32_t w = v + 8;
+      if (i == 5) {
+        quad(v + 2, v + 6, v + 7, v + 3);
+        continue;
+      }
+      quad(v + 2, v + 6, w + 4, w);  // without area
+      quad(v + 2, w, w + 1, v + 3);
+      quad(v + 3, w + 1, w + 5, v + 7);
+      quad(v + 7, w + 5, w + 4, v + 6);
+    }
+    return body;
+  };
+  const Mesh a = comb(0, 2.5, 1.5, 0), b = insideOut(comb(4, 1.5, 2.5, 1));
+  expectApart(a, b);
+  const Penetration p = Bodies(moved(a, {0.0625, 0, 0}), b).penetration();
+  ASSERT_TRUE(p.intersecting);
+  EXPECT_NEAR(p.depth, 0.0625, 1e-9);
+  EXPECT_FALSE(
+      Bodies(moved(moved(a, {0.0625, 0, 0}), p.depth * p.direction), b).penetration().intersecting);
+}
+
+/// Extruded bodies with one profile: their caps are fans, of which each triangle touches each.
+TEST(Penetration, EqualProfilesAreDecidedWhereTheyLieInEachOther) {
+  const auto gear = [](double bottom, double top) {
+    constexpr std::uint32_t kTeeth = 96;
+    Mesh body;
+    for (const double z : {bottom, top})
+      for (std::uint32_t i = 0; i < kTeeth; ++i) {
+        const double r = i % 4 < 2 ? 1.25 : 0.875, angle = 2 * M_PI * i / kTeeth;
+        body.positions.push_back({r * std::cos(angle), r * std::sin(angle), z});
+      }
+    body.positions.push_back({0, 0, bottom});
+    body.positions.push_back({0, 0, top});
+    for (std::uint32_t i = 0; i < kTeeth; ++i) {
+      const std::uint32_t j = (i + 1) % kTeeth;
+      body.triangles.push_back({i, j, j + kTeeth});
+      body.triangles.push_back({i, j + kTeeth, i + kTeeth});
+      body.triangles.push_back({2 * kTeeth, j, i});
+      body.triangles.push_back({2 * kTeeth + 1, i + kTeeth, j + kTeeth});
+    }
+    return body;
+  };
+  expectApart(gear(0, 1), gear(1, 2));
+  EXPECT_NEAR(Bodies(gear(0, 1), gear(0.9375, 2)).penetration().depth, 0.0625, 1e-9);
+  EXPECT_NEAR(Bodies(gear(0, 1), gear(0, 1)).penetration().depth, 1.0, 1e-9);
+}
+
+/// A closed surface without volume has no inside, wherever it is.
+TEST(Penetration, WhatHasNoVolumeIntersectsNothing) {
+  const Mesh unit = cube(0, 1);
+  const Mesh flat = boxMesh({-1, -1, 0.5}, {2, 2, 0.5}),
+             inner = boxMesh({0.25, 0.25, 0.5}, {0.75, 0.75, 0.5}),
+             needle = boxMesh({0.5, 0.5, -1}, {0.5, 0.5, 2}),
+             point = boxMesh({0.5, 0.5, 0.5}, {0.5, 0.5, 0.5});
+  const Mesh sheet{
+      {{-1, -1, 0.25}, {2, -1, 0.5}, {2, 2, 0.25}, {-1, 2, 0.75}, {0.5, 0.5, 0.4}, {0.5, 0.5, 0.4}},
+      {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
+  for (const Mesh& none : {flat, inner, needle, point, sheet}) {
+    expectApart(none, unit);
+    expectApart(unit, none);
+    // Beside a body with a volume it does not count.
+    const Mesh both = joined(moved(unit, {3, 0, 0}), none);
+    expectApart(both, unit);
+    const Penetration p = Bodies(both, moved(unit, {3.75, 0, 0})).penetration();
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_NEAR(p.depth, 0.25, 1e-9);
+  }
+}
+
 TEST(Penetration, ScalesWithTheBodies) {
   const Mesh a = cube(0, 1), b = moved(sphere(6, 8, {0, 0, 0}, 1.0), {1.4, 0.6, 0.5});
   const Penetration one = Bodies(a, b).penetration();
