@@ -121,7 +121,7 @@ void AttachedProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
   countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);
   describeAsShape(record.a->body.mesh, contents);
-  contents.step.endGaps.clear();
+  contents.step.endRows.clear();
 }
 
 }  // namespace palpate

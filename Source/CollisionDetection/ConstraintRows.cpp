@@ -48,56 +48,75 @@ using Contents = CollisionData::Contents;
 using Sides = std::array<std::size_t, 4>;
 constexpr Sides kVertexOfFirst{0, 1, 1, 1}, kVertexOfSecond{1, 0, 0, 0}, kEdges{0, 0, 1, 1};
 
-/// What each row of a contact with vertices on both sides says at the step's end at least, in the
-/// order of the rows.
-class EndGaps {
+/// A contact's row: linearised at its time, or, with `end`, at the step's end.
+struct Linearised {
+  Stencil stencil;
+  Sides sides;
+  Vector3d normal;
+  const Contents::Step::EndRow* end;
+};
+
+/// Makes the rows of contacts with vertices on both sides, in their order.
+class Linearisation {
  public:
-  explicit EndGaps(const Contents* contents)
-      : m_gaps(contents ? std::span<const double>(contents->step.endGaps)
-                        : std::span<const double>()) {}
-  double next() {
-    return m_next < m_gaps.size() ? m_gaps[m_next++] : -std::numeric_limits<double>::infinity();
+  explicit Linearisation(const Contents* contents) {
+    if (contents) m_endRows = contents->step.endRows;
+  }
+  /// smooth: null if the pair has no smooth normals.
+  Linearised next(const auto& contact, const Sides& sides, const Vector3d* smooth) {
+    const std::uint32_t number = m_next++;
+    if (m_endRows.empty() || m_endRows.front().contact != number)
+      return {stencil(contact), sides, smooth ? *smooth : contact.normal, nullptr};
+    const Contents::Step::EndRow& row = m_endRows.front();
+    m_endRows = m_endRows.subspan(1);
+    return {row.stencil, sides, smooth ? *smooth : row.normal, &row};
   }
 
  private:
-  const std::span<const double> m_gaps;
-  std::size_t m_next = 0;
+  std::span<const Contents::Step::EndRow> m_endRows;
+  std::uint32_t m_next = 0;
 };
 
+/// Calls f(contact, smooth normal or null) for a list.
+template <class F>
+void forEachWithSmooth(const auto& list, std::span<const Vector3d> smooth, F&& f) {
+  for (std::size_t i = 0; i < list.size(); ++i) f(list[i], smooth.empty() ? nullptr : &smooth[i]);
+}
+
 /// Appends the rows of all lists. first: the solver's numbers of vertex 0 of both sides.
-/// of(contact, normal, stencil, sides): the offset of a contact with vertices on both sides.
+/// of(contact, row): the offset of a Linearised row of a contact with vertices on both sides.
 /// ofShape(contact, normal): of one with a shape. If these throw, no row is added.
 template <class Of, class OfShape>
 void addRows(const CollisionData& contacts, const std::array<std::uint32_t, 2>& first,
              std::size_t sideOfElements, std::vector<ConstraintRow>& rows, Of&& of,
              OfShape&& ofShape) {
   const std::size_t initialSize = rows.size();
-  // Calls f(contact, normal) with the smooth normals if there are any.
-  const auto forEach = [](const auto& list, std::span<const Vector3d> smooth, auto&& f) {
-    for (std::size_t i = 0; i < list.size(); ++i)
-      f(list[i], smooth.empty() ? list[i].normal : smooth[i]);
-  };
+  Linearisation linearisation(Contents::in(contacts));
   const auto add = [&](const Sides& sides) {
-    return [&](const auto& contact, const Vector3d& normal) {
-      const Stencil s = stencil(contact);
-      ConstraintRow row{s.vertices, s.weights, normal, of(contact, normal, s, sides)};
-      for (std::size_t i = 0; i < 4; ++i) row.vertices[i] += first[sides[i]];
+    return [&](const auto& contact, const Vector3d* smooth) {
+      const Linearised own = linearisation.next(contact, sides, smooth);
+      ConstraintRow row{own.stencil.vertices, own.stencil.weights, own.normal, of(contact, own)};
+      for (std::size_t i = 0; i < 4; ++i) row.vertices[i] += first[own.sides[i]];
       rows.push_back(row);
     };
   };
   try {
-    forEach(contacts.vertexTriangle(), contacts.smoothVertexTriangle(), add(kVertexOfFirst));
-    forEach(contacts.triangleVertex(), contacts.smoothTriangleVertex(), add(kVertexOfSecond));
-    forEach(contacts.edgeEdge(), contacts.smoothEdgeEdge(), add(kEdges));
-    forEach(contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const auto& normal) {
-      const auto& [i, j, k] = contact.vertices;
-      const double offset = ofShape(contact, normal);
-      const std::uint32_t number = first[sideOfElements];
-      rows.push_back({{number + i, number + j, number + k, number + i},
-                      {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                      normal,
-                      offset});
-    });
+    forEachWithSmooth(contacts.vertexTriangle(), contacts.smoothVertexTriangle(),
+                      add(kVertexOfFirst));
+    forEachWithSmooth(contacts.triangleVertex(), contacts.smoothTriangleVertex(),
+                      add(kVertexOfSecond));
+    forEachWithSmooth(contacts.edgeEdge(), contacts.smoothEdgeEdge(), add(kEdges));
+    forEachWithSmooth(
+        contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const Vector3d* smooth) {
+          const Vector3d& normal = smooth ? *smooth : contact.normal;
+          const auto& [i, j, k] = contact.vertices;
+          const double offset = ofShape(contact, normal);
+          const std::uint32_t number = first[sideOfElements];
+          rows.push_back({{number + i, number + j, number + k, number + i},
+                          {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
+                          normal,
+                          offset});
+        });
   } catch (...) {
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
     throw;
@@ -113,6 +132,14 @@ Vector3d sumOf(const Stencil& stencil, const Sides& sides, double time, At&& at)
     sum += stencil.weights[i] * ((1 - time) * before + time * now);
   }
   return sum;
+}
+
+/// The offset of a row. at(side, vertex): the positions before and now.
+template <class At>
+double offsetOf(const auto& contact, const Linearised& row, At&& at) {
+  const double time = row.end ? 1.0 : contact.timeOfImpact;
+  return row.normal.dot(sumOf(row.stencil, row.sides, time, at)) -
+         (row.end ? row.end->gap : contact.distance);
 }
 
 /// body: the motion of the shape, or of the field's body.
@@ -139,21 +166,15 @@ bool isInStep(const PairRecord& record) {
 /// The offsets of rows with the positions of a pair's step. isInStep().
 class StepOffsets {
  public:
-  StepOffsets(const PairRecord& record, const Contents& contents)
-      : m_sides{record.a, record.b},
-        m_body(motionOf(*m_sides[contents.step.elementsOfSecond ? 0 : 1])),
-        m_endGaps(&contents) {}
+  StepOffsets(const PairRecord& record, bool elementsOfSecond)
+      : m_sides{record.a, record.b}, m_body(motionOf(*m_sides[elementsOfSecond ? 0 : 1])) {}
 
-  double operator()(const auto& contact, const Vector3d& normal, const Stencil& stencil,
-                    const Sides& sides) {
-    const auto at = [&](std::size_t side, std::uint32_t vertex) {
+  double operator()(const auto& contact, const Linearised& row) const {
+    return offsetOf(contact, row, [&](std::size_t side, std::uint32_t vertex) {
       const Geometry& geometry = *m_sides[side];
       return std::pair<Vector3d, Vector3d>(geometry.body.mesh.before[vertex],
                                            geometry.step.detected()[vertex]);
-    };
-    const double offset =
-        normal.dot(sumOf(stencil, sides, contact.timeOfImpact, at)) - contact.distance;
-    return std::min(offset, normal.dot(sumOf(stencil, sides, 1.0, at)) - m_endGaps.next());
+    });
   }
   double operator()(const ShapeContact& contact, const Vector3d& normal) const {
     return offsetOf(contact, normal, m_body);
@@ -166,7 +187,6 @@ class StepOffsets {
 
   std::array<const Geometry*, 2> m_sides;
   RigidMotion m_body;
-  EndGaps m_endGaps;
 };
 
 /// Throws unless the offset of a row is a sum of radii, which is the law of contacts.
@@ -191,24 +211,23 @@ void keepOffsets(Contents& contents) {
   const PairRecord* const record = std::exchange(contents.step.record, nullptr);
   if (!record || !isInStep(*record)) return;
   const StandardFloatingPoint standard;
-  StepOffsets offsets(*record, contents);
+  const StepOffsets offsets(*record, contents.step.elementsOfSecond);
   CountedVector<double>& kept = contents.step.offsets;
   kept.clear();
   kept.reserve(sizeOf(contents));
-  const auto keep = [&](const auto& list, const auto& smooth, auto&& of) {
-    for (std::size_t i = 0; i < list.size(); ++i)
-      kept.push_back(of(list[i], smooth.empty() ? list[i].normal : smooth[i]));
-  };
-  const auto with = [&](const Sides& sides) {
-    return [&](const auto& contact, const Vector3d& normal) {
-      return offsets(contact, normal, stencil(contact), sides);
-    };
+  Linearisation linearisation(&contents);
+  const auto keep = [&](const auto& list, const auto& smooth, const Sides& sides) {
+    forEachWithSmooth(list, smooth, [&](const auto& contact, const Vector3d* normal) {
+      kept.push_back(offsets(contact, linearisation.next(contact, sides, normal)));
+    });
   };
   const Contents::Smooth& smooth = contents.smooth;
-  keep(contents.vertexTriangle, smooth.vertexTriangle, with(kVertexOfFirst));
-  keep(contents.triangleVertex, smooth.triangleVertex, with(kVertexOfSecond));
-  keep(contents.edgeEdge, smooth.edgeEdge, with(kEdges));
-  keep(contents.shape, smooth.shape, offsets);
+  keep(contents.vertexTriangle, smooth.vertexTriangle, kVertexOfFirst);
+  keep(contents.triangleVertex, smooth.triangleVertex, kVertexOfSecond);
+  keep(contents.edgeEdge, smooth.edgeEdge, kEdges);
+  forEachWithSmooth(contents.shape, smooth.shape, [&](const auto& contact, const Vector3d* normal) {
+    kept.push_back(offsets(contact, normal ? *normal : contact.normal));
+  });
   contents.step.hasOffsets = true;
 }
 
@@ -234,11 +253,8 @@ void CollisionData::appendRows(std::vector<ConstraintRow>& rows, std::uint32_t f
                     " is over: call it, or copy the CollisionData, after the detection and before "
                     "advance()",
                 step.record->pair.a);
-  StepOffsets offsets(*step.record, read());
-  const auto ofShape = [&](const ShapeContact& contact, const Vector3d& normal) {
-    return offsets(contact, normal);
-  };
-  addRows(*this, first, sideOfElements, rows, offsets, ofShape);
+  const StepOffsets offsets(*step.record, step.elementsOfSecond);
+  addRows(*this, first, sideOfElements, rows, offsets, offsets);
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
@@ -256,25 +272,23 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                 {}, vertex);
   };
   const Contents* const contents = Contents::in(contacts);
-  EndGaps endGaps(contents);
-  const auto of = [&](const auto& contact, const Vector3d& normal, const Stencil& s,
-                      const Sides& sides) {
+  const auto at = [&](std::size_t side, std::uint32_t vertex) {
+    require(*both[side], vertex);
+    return std::pair<const Vector3d&, const Vector3d&>(both[side]->before[vertex],
+                                                       both[side]->now[vertex]);
+  };
+  const auto of = [&](const auto& contact, const Linearised& row) {
+    const Sides& sides = row.sides;
+    const Linearised atTime{stencil(contact), sides, contact.normal, nullptr};
     double largest = 0.0, moved = 0.0;
-    const auto at = [&](std::size_t side, std::uint32_t vertex) {
-      require(*both[side], vertex);
-      return std::pair<const Vector3d&, const Vector3d&>(both[side]->before[vertex],
-                                                         both[side]->now[vertex]);
-    };
-    const Vector3d sum = sumOf(s, sides, contact.timeOfImpact, at);
     for (std::size_t i = 0; i < 4; ++i) {
-      const auto& [before, now] = at(sides[i], s.vertices[i]);
+      const auto& [before, now] = at(sides[i], atTime.stencil.vertices[i]);
       largest = std::max({largest, before.cwiseAbs().maxCoeff(), now.cwiseAbs().maxCoeff()});
-      moved += std::abs(s.weights[i]) * (now - before).cwiseAbs().sum();
+      moved += std::abs(atTime.stencil.weights[i]) * (now - before).cwiseAbs().sum();
     }
-    checkOffset(contents->step, contents->errorBound, contact.normal.dot(sum) - contact.distance,
-                largest, moved, s.vertices[0]);
-    return std::min(normal.dot(sum) - contact.distance,
-                    normal.dot(sumOf(s, sides, 1.0, at)) - endGaps.next());
+    checkOffset(contents->step, contents->errorBound, offsetOf(contact, atTime, at), largest, moved,
+                atTime.stencil.vertices[0]);
+    return offsetOf(contact, row, at);
   };
   const auto isEmpty = [](const SolverVertices& side) {
     return side.before.empty() && side.now.empty();

@@ -132,12 +132,12 @@ class ExcludedImpacts {
   }
 
   /// Calls f(side) for each side whose element another impact may hold for this one, or whose
-  /// element this impact may hold for others, until it returns true.
+  /// element this impact may hold for others, until it returns true. A vertex comes first.
   template <class F>
   bool anyHeldSide(const SidedImpact& c, F&& f) const {
-    if (m_haveFaces) return f(0) || f(1);
-    if (c.vertexSide < 2) return f(c.vertexSide);
-    return f(m_pair.a.topology.hasFaces() ? 1 : 0);
+    const std::size_t first =
+        c.vertexSide < 2 ? c.vertexSide : m_pair.a.topology.hasFaces() && !m_haveFaces;
+    return f(first) || (m_haveFaces && f(1 - first));
   }
 
   /// The element of an excluded impact that others may hold, and what is known about it.

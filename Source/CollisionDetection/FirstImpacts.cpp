@@ -1,12 +1,12 @@
 #include "CollisionDetection/FirstImpacts.h"
 
 #include "CollisionDetection/ExcludedImpacts.h"
+#include "NarrowPhase/Proximity.h"
 #include "Math/ClosestPoint.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
 #include <cstddef>
-#include <limits>
 #include <numeric>
 #include <tuple>
 #include <type_traits>
@@ -29,6 +29,8 @@ std::uint64_t featureKey(const Segment& edge, EdgeFeature feature) {
 ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
   return swap ? ImpactFeatures{second, first} : ImpactFeatures{first, second};
 }
+
+constexpr std::uint32_t kNoRow = 0xffffffffu;
 
 SidedImpact sidedOf(const VertexTriangleContact& c, std::uint32_t list) { return {c, list == 1}; }
 SidedImpact sidedOf(const EdgeEdgeContact& c, std::uint32_t) { return SidedImpact(c); }
@@ -148,35 +150,37 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
         });
         return gap;
       };
-      return anyHolder(c, side, [&](std::uint32_t number) {
-        const Holder& holder = m_holders[number];
-        if (!held.isBeside(m_planes[number]) ||
-            !held.isReplacedBy(impactOf(number), holder.side, m_planes[number], lowestGap))
-          return false;
-        drop({list, i}, {holder.list, holder.index});
-        return true;
-      });
+      return anyHolder(c, side,
+                       [&](std::uint32_t number) {
+                         const Holder& holder = m_holders[number];
+                         if (!held.isBeside(m_planes[number]) ||
+                             !held.isReplacedBy(impactOf(number), holder.side, m_planes[number],
+                                                lowestGap))
+                           return false;
+                         m_dropped[list][i] = 1;
+                         m_standIns.push_back({{list, i}, {holder.list, holder.index}});
+                         return true;
+                       }) &&
+             c.vertexSide < 2;  // of two edges, both are held
     });
   });
 }
 
-void FirstImpacts::drop(Place dropped, Place standIn) {
-  m_dropped[dropped.list][dropped.index] = 1;
-  m_standIns[dropped.list][dropped.index] = standIn;
-}
-
 namespace {
 
-double distanceAtEnd(const MeshPair& meshes, const VertexTriangleContact& c, bool swapped) {
+/// The contact of an impact's features at the step's end.
+VertexTriangleContact atEnd(const MeshPair& meshes, const VertexTriangleContact& c, bool swapped) {
   const Positions &own = (swapped ? meshes.b : meshes.a).now,
                   &other = (swapped ? meshes.a : meshes.b).now;
   const auto& [p, q, r] = c.vertices;
-  return finiteVertexTriangleDistance(own[c.vertex], other[p], other[q], other[r]).distance;
+  return contactOf(c.vertex, c.triangle, c.vertices,
+                   finiteVertexTriangleDistance(own[c.vertex], other[p], other[q], other[r]));
 }
-double distanceAtEnd(const MeshPair& meshes, const EdgeEdgeContact& c, bool) {
+EdgeEdgeContact atEnd(const MeshPair& meshes, const EdgeEdgeContact& c, bool) {
   const Positions &a = meshes.a.now, &b = meshes.b.now;
-  return finiteEdgeEdgeDistance(a[c.edgeA[0]], a[c.edgeA[1]], b[c.edgeB[0]], b[c.edgeB[1]])
-      .distance;
+  return contactOf(
+      c.edgeA, c.edgeB,
+      finiteEdgeEdgeDistance(a[c.edgeA[0]], a[c.edgeA[1]], b[c.edgeB[0]], b[c.edgeB[1]]));
 }
 
 /// How far the closest points move apart along the normal until the step's end.
@@ -194,12 +198,9 @@ double separationUntilEnd(const MeshPair& meshes, const Contact& c, bool swapped
 
 }  // namespace
 
-/// Gaps of -infinity say nothing: those of contacts at the end, of features that may meet, and of
-/// impacts whose row asks for no more than their own features.
-void FirstImpacts::findEndGaps(const MeshPair& meshes, double end, const MetVertices& met,
+void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const MetVertices& met,
                                const OrderScratch& ordered,
                                const CollisionData::Contents& contents) {
-  constexpr double kNothing = -std::numeric_limits<double>::infinity();
   const double radii = meshes.a.largestRadius + meshes.b.largestRadius;
   TimeCheck check(ordered.deadline, 64);
   const auto mayMeet = [&](const SidedImpact& impact) {
@@ -208,30 +209,63 @@ void FirstImpacts::findEndGaps(const MeshPair& meshes, double end, const MetVert
         if (std::binary_search(met[side].begin(), met[side].end(), v)) return true;
     return false;
   };
+  m_endRows.clear();
+  m_nearest.clear();
+  m_listOfRows.clear();
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
-    m_endGaps[list].assign(contacts.size(), kNothing);
+    m_endRowOf[list].assign(contacts.size(), kNoRow);
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       const auto& c = contacts[i];
       if (m_dropped[list][i] || !isImpact(c, list, i, end, ordered)) continue;
       check();
       if (mayMeet(sidedOf(c, list))) continue;
-      const double gap = distanceAtEnd(meshes, c, list == 1) - radii;
-      if (meshes.settings.smoothNormals ||
-          c.distance + separationUntilEnd(meshes, c, list == 1) < gap)
-        m_endGaps[list][i] = gap;
+      const double gap = atEnd(meshes, c, list == 1).distance - radii;
+      if (!meshes.settings.smoothNormals &&
+          !(c.distance + separationUntilEnd(meshes, c, list == 1) < gap))
+        continue;
+      m_endRowOf[list][i] = static_cast<std::uint32_t>(m_endRows.size());
+      m_endRows.push_back({0, stencil(c), c.normal, gap});
+      m_listOfRows.push_back(list);
+      m_nearest.push_back({list, i});
     }
   });
-  forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
-    for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-      if (!m_dropped[list][i]) continue;
-      check();
-      Place kept{list, i};
-      while (m_dropped[kept.list][kept.index]) kept = m_standIns[kept.list][kept.index];
-      double& gap = m_endGaps[kept.list][kept.index];
-      if (gap != kNothing)
-        gap = std::min(gap, distanceAtEnd(meshes, contacts[i], list == 1) - radii);
-    }
-  });
+  if (m_endRows.empty()) return;
+  const auto withContact = [&](const Place& place, auto&& f) {
+    forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+      if (list == place.list) f(contacts[place.index], list);
+    });
+  };
+  for (const auto& [dropped, standIn] : m_standIns) {
+    check();
+    // An impact that stands for others is dropped only for another one with its features.
+    const Place kept = m_dropped[standIn.list][standIn.index]
+                           ? m_sameFeatures[standIn.list][standIn.index]
+                           : standIn;
+    PALPATE_ASSERT(!m_dropped[kept.list][kept.index]);
+    const std::uint32_t row = m_endRowOf[kept.list][kept.index];
+    if (row == kNoRow) continue;
+    withContact(dropped, [&](const auto& c, std::uint32_t list) {
+      const double gap = atEnd(meshes, c, list == 1).distance - radii;
+      if (!(gap < m_endRows[row].gap)) return;
+      m_endRows[row].gap = gap;
+      m_nearest[row] = dropped;
+    });
+  }
+  const ExcludedImpacts rule(meshes);
+  for (std::size_t row = 0; row < m_endRows.size(); ++row) {
+    check();
+    withContact(m_nearest[row], [&](const auto& impact, std::uint32_t list) {
+      Stencil& own = m_endRows[row].stencil;
+      const auto c = atEnd(meshes, impact, list == 1);
+      const Stencil its = stencil(c);
+      const bool isOfSame =
+          list == m_listOfRows[row] &&
+          (list < 2 ? its.vertices[0] == own.vertices[0] : its.vertices == own.vertices);
+      if (!isOfSame || rule.isExcluded(sidedOf(c, list))) return;
+      own = its;
+      m_endRows[row].normal = c.normal;
+    });
+  }
 }
 
 void FirstImpacts::keep(const MeshPair& meshes, double end, const MetVertices& met,
@@ -240,8 +274,9 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const MetVertices& m
     PALPATE_ASSERT(ordered.preferred[list].empty() ||
                    ordered.preferred[list].size() == contacts.size());
     m_dropped[list].assign(contacts.size(), 0);
-    m_standIns[list].resize(contacts.size());
+    m_sameFeatures[list].resize(contacts.size());
   });
+  m_standIns.clear();
   dropExcluded(meshes, end, ordered, contents);
   m_entries.clear();
   TimeCheck check(ordered.deadline, 256);
@@ -263,22 +298,35 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const MetVertices& m
               return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
                      std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
             });
+  Place first{};
+  if (!m_entries.empty()) first = {m_entries[0].list, m_entries[0].index};
   for (std::size_t i = 1; i < m_entries.size(); ++i) {
     check();
-    const Entry &entry = m_entries[i], &last = m_entries[i - 1];
-    if (entry.features == last.features) drop({entry.list, entry.index}, {last.list, last.index});
+    const Entry& entry = m_entries[i];
+    if (entry.features != m_entries[i - 1].features) {
+      first = {entry.list, entry.index};
+      continue;
+    }
+    m_dropped[entry.list][entry.index] = 1;
+    m_sameFeatures[entry.list][entry.index] = first;
+    m_standIns.push_back({{entry.list, entry.index}, first});
   }
-  CountedVector<double>& endGaps = contents.step.endGaps;
-  endGaps.clear();
+  auto& endRows = contents.step.endRows;
+  endRows.clear();
   const bool moves = meshes.step.motion > 0.0;
-  if (moves) findEndGaps(meshes, end, met, ordered, contents);
+  if (moves) findEndRows(meshes, end, met, ordered, contents);
+  std::uint32_t number = 0;
   forEachImpactList(contents, [&](auto& contacts, std::uint32_t list) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       check();
       if (m_dropped[list][i]) continue;
       contacts[kept++] = contacts[i];
-      if (moves) endGaps.push_back(m_endGaps[list][i]);
+      if (moves && m_endRowOf[list][i] != kNoRow) {
+        endRows.push_back(m_endRows[m_endRowOf[list][i]]);
+        endRows.back().contact = number;
+      }
+      ++number;
     }
     contacts.resize(kept);
   });

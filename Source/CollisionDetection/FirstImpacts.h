@@ -2,6 +2,7 @@
 
 #include <palpate/CollisionData.h>
 
+#include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/Order.h"
 #include "Math/NormalCone.h"
 #include "Core/Buffer.h"
@@ -42,13 +43,13 @@ void forEachImpactList(Lists&& lists, F&& f) {
 ///          changes nothing.
 /// Cost     n log n in the number of contacts with shared features.
 ///
-/// Also finds what the rows of the impacts say at the step's end at least
-/// (CollisionData::Contents::Step::endGaps). A row is linearised at its time, and may ask for more
-/// than the features need at the end: where they slide past an edge, the row of the plane behind it
-/// knows nothing of the edge. An impact that stays stands for itself and for the dropped impacts
-/// that it replaces. If none of these features' vertices may have met others in the step, its
-/// features kept their sides, and their least distance at the step's end is what its row says at
-/// least.
+/// Also finds rows of impacts at the step's end (CollisionData::Contents::Step::endRows). A row is
+/// linearised at its time, and may ask for more than the features need at the end: where they slide
+/// past an edge, the row of the plane behind it knows nothing of the edge. An impact that stays
+/// stands for itself and for the dropped impacts that it replaces. If no vertex of it may have met
+/// the other mesh in the step, its features kept their sides. If its row asks for more than they
+/// need, the row at the end has the gap of the nearest pair for which it stands. It is that pair's,
+/// if it is one of the same vertex or edges and no element excludes its normal at the end.
 class FirstImpacts {
  public:
   /// Call after orderContacts() has filled the contents with this scratch. Contacts from its
@@ -67,10 +68,12 @@ class FirstImpacts {
   struct Place {
     std::uint32_t list, index;
   };
+  struct StandIn {
+    Place dropped, kept;
+  };
   void dropExcluded(const MeshPair&, double end, const OrderScratch&,
                     const CollisionData::Contents&);
-  void drop(Place dropped, Place standIn);
-  void findEndGaps(const MeshPair&, double end, const MetVertices&, const OrderScratch&,
+  void findEndRows(const MeshPair&, double end, const MetVertices&, const OrderScratch&,
                    const CollisionData::Contents&);
 
   /// An impact that is not excluded, and the side of the element that it holds.
@@ -83,8 +86,13 @@ class FirstImpacts {
   Buffer<TangentPlane> m_planes;                  ///< of m_holders
   Buffer<std::uint32_t> m_starts;                 ///< of each vertex, in m_holders
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index
-  std::array<Buffer<Place>, 3> m_standIns;        ///< of dropped contacts, by list and index
-  std::array<Buffer<double>, 3> m_endGaps;        ///< L: by list and index
+  /// By list and index, of contacts that are dropped for another one with their features: that one.
+  std::array<Buffer<Place>, 3> m_sameFeatures;
+  Buffer<StandIn> m_standIns;                       ///< of all dropped contacts
+  std::array<Buffer<std::uint32_t>, 3> m_endRowOf;  ///< by list and index: in m_endRows
+  Buffer<CollisionData::Contents::Step::EndRow> m_endRows;
+  Buffer<Place> m_nearest;             ///< of m_endRows: the pair with this gap
+  Buffer<std::uint32_t> m_listOfRows;  ///< of m_endRows
 };
 
 }  // namespace palpate

@@ -100,7 +100,7 @@ void describeExact(CollisionData::Contents& contents) {
   validity.nearThreshold.clear();
   validity.unreliableSign.clear();
   validity.proxyDepth = contents.errorBound = 0.0;
-  contents.step.endGaps.clear();
+  contents.step.endRows.clear();
 }
 
 std::size_t sizeOf(const CollisionData::Contents& contents) {

@@ -192,7 +192,7 @@ void PairRecord::followSides() {
   sides->follow(meshes(), contents.crossings);
   const bool anyAtEnd = contents.validity.atEnd > 0;
   sides->apply(meshes(), contents);
-  if (sides->changesContacts()) contents.step.endGaps.clear();
+  if (sides->changesContacts()) contents.step.endRows.clear();
   std::size_t atImpact = 0;
   forEachTimed(contents, [&](const auto& contacts) {
     for (const auto& contact : contacts) atImpact += !anyAtEnd || contact.timeOfImpact < 1.0;

@@ -164,6 +164,13 @@ void checkIds(const ArchiveReader& file, const Contents& c, const PairStates& st
   }
   for (const auto& x : c.edgeEdge)
     for (int i = 0; i < 2; ++i) need(x.edgeA[i], a.vertexCount), need(x.edgeB[i], b.vertexCount);
+  for (const auto& row : c.step.endRows)
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t ofVertex = c.vertexTriangle.size(),
+                        ofEither = ofVertex + c.triangleVertex.size();
+      const bool isOfA = row.contact < ofVertex ? i == 0 : row.contact < ofEither ? i > 0 : i < 2;
+      need(row.stencil.vertices[i], isOfA ? a.vertexCount : b.vertexCount);
+    }
   for (const auto& x : c.intersectingTriangles)
     need(x.a, a.elementCount), need(x.b, b.elementCount);
   for (const auto& x : c.shape) {
@@ -200,10 +207,12 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
   all(ContactKind::EdgeEdge, c.edgeEdge, c.tracked.edgeEdge);
   all(ContactKind::Shape, c.shape, c.tracked.shape);
   all(ContactKind::ShapeShape, c.shapeShape, c.tracked.shapeShape);
-  file.need(c.step.endGaps.empty() || c.step.endGaps.size() == c.vertexTriangle.size() +
-                                                                   c.triangleVertex.size() +
-                                                                   c.edgeEdge.size(),
-            "a list of gaps is too short or too long");
+  const std::size_t between = c.vertexTriangle.size() + c.triangleVertex.size() + c.edgeEdge.size();
+  std::size_t next = 0;
+  for (const auto& row : c.step.endRows) {
+    file.need(row.contact >= next && row.contact < between, "a row belongs to no contact");
+    next = row.contact + std::size_t{1};
+  }
   beside(c.smooth.vertexTriangle, c.vertexTriangle);
   beside(c.smooth.triangleVertex, c.triangleVertex);
   beside(c.smooth.edgeEdge, c.edgeEdge);
@@ -232,7 +241,13 @@ void describeContents(File& file, Contents& c) {
   lists(29, c.crossings, c.rememberedSides);
   fieldOf(file, t.elementsOfSecond);
   fieldOf(file, c.step.elementsOfSecond);
-  itemsOf(file, c.step.endGaps, sizeof(double), [&](double& gap) { file.real(gap); });
+  itemsOf(file, c.step.endRows, 84, [&](Contents::Step::EndRow& row) {
+    file.integer(row.contact);
+    fieldOf(file, row.stencil.vertices);
+    for (double& weight : row.stencil.weights) file.real(weight);
+    fieldOf(file, row.normal);
+    file.real(row.gap);
+  });
   for (auto& list : c.tags)
     itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
   auto& s = c.smooth;

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 
@@ -49,9 +50,14 @@ struct CollisionData::Contents : CountedObject {
     /// Of a copy: the offset of each row, if the step was not over.
     bool hasOffsets = false;
     CountedVector<double> offsets{};
-    /// L: per contact of vertexTriangle, triangleVertex and edgeEdge, what its row says at the
-    /// step's end at least (FirstImpacts). Empty: nothing.
-    CountedVector<double> endGaps{};
+    /// The row of an impact at the step's end (FirstImpacts).
+    struct EndRow {
+      std::uint32_t contact = 0;  ///< its number in vertexTriangle, triangleVertex and edgeEdge
+      Stencil stencil{};          ///< its vertices are on the sides of those of the contact's
+      Eigen::Vector3d normal{};   ///< unit, not smooth
+      double gap = 0.0;           ///< L: at the step's end
+    };
+    CountedVector<EndRow> endRows{};  ///< ascending; of other contacts the row is at their time
   } step{};
 
   /// Null if `data` has none.

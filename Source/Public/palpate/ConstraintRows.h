@@ -19,11 +19,14 @@ namespace palpate {
 /// Normal   the smooth one of a pair with PairSettings::smoothNormals, else the contact's.
 /// Offset   the sum of the radii at the closest points, within rounding. With a shape normal . p
 ///          plus the element's radius; p is the shape's touched point, where it is at the step's
-///          end. With Contacts::Distinct, two geometries with vertices and a timeOfImpact before
-///          the end it may be less: the gap at `now` is then the least distance at `now` of the
-///          features for which the contact stands. Their vertices meet nothing in the step.
-/// Laws     (1) at timeOfImpact the gap is the contact's distance, or more where the offset is less;
-///          less normal . d if a shape moves on by d until the step's end.
+///          end.
+/// End      with Contacts::Distinct a row that would ask for more at the step's end than the
+///          features need, or that is smooth, is linearised there instead, unless the features may
+///          have met in the step (Docs/HowTo/Solvers.md). Weights, normal and offset may be others
+///          than the contact's, and the gap at `now` is the least distance of the features for
+///          which the contact stands.
+/// Laws     (1) at timeOfImpact the gap is the contact's distance; less normal . d if a shape moves
+///          on by d until the step's end. Not of a row at the step's end.
 ///          (2) the gap's gradient at vertex i is weights[i] normal. It is also the distance's,
 ///          unless radii differ along an element, the centres coincide, or normals are smooth.
 ///          (3) a step along this row alone, by inverse masses, to a gap g > 0 gives the signed
@@ -48,7 +51,8 @@ struct SolverVertices {
   std::span<const Eigen::Vector3d> before, now;  ///< L, in the world, one per vertex
 };
 
-/// Appends a row for each contact of (a, b), linearised at its timeOfImpact, in linear time.
+/// Appends a row for each contact of (a, b), linearised at its timeOfImpact or, where ConstraintRow
+/// says so, at the step's end, in linear time.
 /// CollisionData::appendRows() does it with the positions that the OctreeBasedCD has.
 /// body     the motion of the pair's shape or field's body, which turns by less than 90 degrees in
 ///          the step. By default the shape rests from timeOfImpact on.
@@ -89,6 +93,7 @@ struct ContactSide {
 /// Laws     (1) point - opposite = distance normal, within the contact's error.
 ///          (2) normal . relativeDisplacement is the row's gap at `now` less that at `before`,
 ///          within rounding, for two geometries with vertices; also with a tangent and offset 0.
+///          Not of a row at the step's end.
 struct ContactMotion {
   Eigen::Vector3d point;     ///< on the surface of the first side, at the contact's time
   Eigen::Vector3d opposite;  ///< the same on the other side
