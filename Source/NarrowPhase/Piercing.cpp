@@ -498,7 +498,9 @@ void KnownSides::findBeside(const MeshPair& pair, bool atStart,
       for (const VertexTriangleContact& c : *list)
         if ((c.timeOfImpact < 1.0) == atStart && sidesOf(known, ofB, c.vertex).empty() &&
             liesBelow(surface, featureOf(surface.topology, c.triangle, c.feature), c.normal,
-                      c.timeOfImpact))
+                      c.timeOfImpact) &&
+            (atStart ||
+             sideOf(cornersOf(c.vertices, surface.now), (ofB ? pair.b : pair.a).now[c.vertex]) < 0))
           beside.push_back({ofB, c.vertex, c.triangle, -c.normal, false, false});
     }
   if (beside.empty()) return;
@@ -570,8 +572,17 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
       opinion = ask(m_atStart, vertices, ofB, contact.normal);
       if (drops && opinion.isRepresented && !represents(contact, ofB)) return true;
     }
-    if (!opinion.isKnown)
-      opinion = ask(isImpact ? m_besideAtStart : m_besideAtEnd, vertices, ofB, contact.normal);
+    if (!opinion.isKnown) {
+      Buffer<Side>& beside = isImpact ? m_besideAtStart : m_besideAtEnd;
+      if constexpr (requires { contact.vertex; }) {
+        const auto sides = sidesOf(beside, ofB[0], contact.vertex);
+        if (std::any_of(sides.begin(), sides.end(),
+                        [&](const Side& side) { return side.triangle == contact.triangle; }))
+          opinion.agreement = -1.0;
+      } else {
+        opinion = ask(beside, vertices, ofB, contact.normal);
+      }
+    }
     if (opinion.agreement < 0.0) {
       contact.normal = -contact.normal;
       contact.distance = -contact.distance;

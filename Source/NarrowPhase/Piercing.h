@@ -119,7 +119,8 @@ class PiercingContacts {
 ///          vertices that leave do not disagree.
 ///          (3) Of vertices whose edges cross nothing: each that is next to one of (1) or (2), or
 ///          to another one of these, and whose own contact is below the surface, is behind as
-///          well. Contacts at the end, or impacts, that are on the wrong side are turned.
+///          well. This contact, at the end or an impact, is turned, and those of its edges are
+///          that are on the wrong side.
 class KnownSides {
  public:
   /// atEnd, atStart: Intersection's contacts. Ends at the deadline of atStart.
