@@ -55,8 +55,9 @@ struct TrackedContact {
 
 /// A vertex passed through a triangle, or an edge through an edge, within the step, decided
 /// exactly: the signed volume of their vertices changed its sign when the features had a common
-/// point. At the step's ends a volume of 0 counts as positive, so that no passage of several steps
-/// is lost.
+/// point. A touch is no passage, also at edges and vertices of surfaces and at the step's ends:
+/// what lies on a surface is in front of it, and touching edges are displaced by an infinitesimal
+/// amount, each towards its own side (Docs/Algorithms/Passages.md).
 struct Crossing {
   ContactKind kind = ContactKind::VertexTriangle;
   std::array<std::uint32_t, 4> ids{};  ///< those of ContactKey
