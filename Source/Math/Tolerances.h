@@ -265,7 +265,7 @@ constexpr double kOppositeSquare = 0x1p-80;
 /// Beyond it the normal is no more than rounding. Any value will do.
 constexpr double kAxesError = 0x1p-20;
 
-// ---- Penetration of bodies (Math/TranslationExit.cpp, Queries/BodyPenetration.cpp) ----
+// ---- Penetration of bodies (Queries/BodyPenetration.cpp, TranslationSweep.cpp) ----
 
 /// Weight: how far beyond a feature's end two features may touch. It is far above the rounding of
 /// weights, and only says where a search continues; exact tests decide where it ends.

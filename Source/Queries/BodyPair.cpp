@@ -180,18 +180,6 @@ bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   return number != 0;
 }
 
-std::optional<RayHit> BodyPair::hitOf(const PartVertex& part, const Vector3d& direction) const {
-  checkTime(deadline());
-  const Vector3d& p = vertices(part.ofA).positions[part.vertex];
-  const Ray ray{p, part.ofA ? direction : Vector3d(-direction)};
-  constexpr double kLargest = std::numeric_limits<double>::max();
-  RayHits hits(geometry(!part.ofA), {ray.origin, ray.direction, 0.0, kLargest},
-               m_engine == Engine::BruteForce, m_scratch.met);
-  const std::optional<RayHit> first = hits.first(kLargest);
-  m_scratch.stack.exactDecisions += hits.exactDecisions();
-  return first;
-}
-
 std::optional<BodyPair::Exit> BodyPair::lastExitOf(const PartVertex& vertex,
                                                    const Vector3d& direction, double begin,
                                                    double end) const {

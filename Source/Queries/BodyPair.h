@@ -92,8 +92,6 @@ class BodyPair {
   Eigen::Vector3d position(const PartVertex& at, const Eigen::Vector3d& shift) const {
     return at.ofA ? moved(at.vertex, shift) : m_scratch.b.positions[at.vertex];
   }
-  /// Where a vertex of a meets b along a direction; a vertex of b meets a against it.
-  std::optional<RayHit> hitOf(const PartVertex&, const Eigen::Vector3d& direction) const;
   /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
   /// surface last. Both are L, from where it is. Looks at no deadline.
   struct Exit {

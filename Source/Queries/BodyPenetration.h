@@ -51,12 +51,14 @@ Penetration apart(GeometryId a, GeometryId b);
 
 /// The translation of a that separates two closed meshes (SpatialQueries::penetration()).
 ///
-/// Method   A translation along one direction is decided by steps: where the surfaces meet, or a
-///          part of one is inside the other body, it goes on until the last pair of triangles that
-///          meets comes apart. The directions are those that separate the convex hulls, normals of
-///          faces that meet or are inside, and a set around the sphere. Rays from inside vertices
-///          bound the depth of each from below. From the best ones the search goes on to the
-///          shortest translation that satisfies all contacts at which translations ended.
+/// Method   The directions are those that separate the convex hulls, normals of faces that meet or
+///          are inside, and a set around the sphere. Rays from inside vertices bound the depth of
+///          each from below. Along a direction TranslationSweep proposes where surfaces no longer
+///          cross, and OverlapTest decides whether the bodies are apart there. From the best
+///          directions the search goes on to the shortest translation that satisfies all contacts
+///          at which translations ended. If nothing separates the bodies, a leaves the hull of b.
+/// Cost     linear in the triangles: all sweeps together have kOperationsPerTriangle for each, or
+///          four times as many until something separates the bodies. Each test costs what it finds.
 Penetration penetrationOf(const Body& a, const Body& b, Engine, PenetrationScratch&,
                           const PenetrationEffort& = kThorough);
 /// The same of bodies with triangles. The pair must use scratch.pair and effort.moved. Where its
