@@ -178,19 +178,21 @@ class NearestInFront {
   }
 
   /// Goes on to the feature with the shortest way out.
-  /// scratch.near: holds all triangles in box(way) of the present one's way.
-  void shorten(double way, std::span<const PiercingContacts::Behind> crossings,
+  /// find(box, out): the triangles in a box, and maybe others.
+  template <class Find>
+  void shorten(std::span<const PiercingContacts::Behind> crossings, Find&& find,
                PiercingContacts::Scratch& scratch) {
     scratch.nearer.clear();
     scratch.reached.clear();
+    double way = wayOut(crossings);
     const double reach = kWayReach * way;
+    find(box(way), scratch.near);
     way *= 1.0 - kWaySlack;
-    std::erase_if(scratch.near, [&](std::uint32_t t) {
-      if (!m_mesh.topology.isEnabled(t) || m_pair.excludesVertex(m_vertex, t)) return true;
+    for (const std::uint32_t t : scratch.near) {
+      if (!m_mesh.topology.isEnabled(t)) continue;
       const double distance = measure(t).distance;
       if (distance < way && isAllowed(t)) scratch.nearer.push_back({distance, t});
-      return !(distance <= reach);
-    });
+    }
     auto best = std::pair(m_triangle, m_nearest);
     auto& nearer = scratch.nearer;
     std::make_heap(nearer.begin(), nearer.end(), std::greater<>());
@@ -199,9 +201,8 @@ class NearestInFront {
       std::pop_heap(nearer.begin(), end, std::greater<>());
       m_triangle = std::prev(end)->triangle;
       m_nearest = measure(m_triangle);
-      if (goesOn()) continue;
       const double other = wayOut(crossings);
-      if (!(other < way) || !isReached(m_triangle, crossings, scratch)) continue;
+      if (!(other < way) || goesOn() || !isReached(reach, find, crossings, scratch)) continue;
       way = (1.0 - kWaySlack) * other;
       best = {m_triangle, m_nearest};
     }
@@ -209,10 +210,6 @@ class NearestInFront {
     walk();
   }
 
-  Eigen::AlignedBox3d box(double way) const {
-    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(kWayReach * way);
-    return {m_position - reach, m_position + reach};
-  }
   std::uint32_t triangle() const { return m_triangle; }
   Corners corners() const { return m_mesh.corners(m_triangle); }
   bool exact() const { return m_nearest.exact; }
@@ -235,8 +232,14 @@ class NearestInFront {
     }
     return {};
   }
-  /// Whether triangles of scratch.near lead to this one from those that the edges cross.
-  bool isReached(std::uint32_t triangle, std::span<const PiercingContacts::Behind> crossings,
+  Eigen::AlignedBox3d box(double distance) const {
+    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(distance);
+    return {m_position - reach, m_position + reach};
+  }
+  /// Whether triangles that are at most so far away lead to the present one from those that the
+  /// edges cross.
+  template <class Find>
+  bool isReached(double distance, Find&& find, std::span<const PiercingContacts::Behind> crossings,
                  PiercingContacts::Scratch& scratch) const {
     auto& [near, nearer, reached, next] = scratch;
     const auto reach = [&](std::uint32_t t) {
@@ -246,6 +249,11 @@ class NearestInFront {
       if (!std::exchange(isKnown, 1)) next.push_back(t);
     };
     if (reached.empty()) {
+      find(box(distance), near);
+      std::erase_if(near, [&](std::uint32_t t) {
+        return !m_mesh.topology.isEnabled(t) || m_pair.excludesVertex(m_vertex, t) ||
+               !(measure(t).distance <= distance);
+      });
       std::sort(near.begin(), near.end());
       reached.assign(near.size(), 0);
       next.clear();
@@ -257,7 +265,7 @@ class NearestInFront {
           for (const std::uint32_t t : m_mesh.topology.vertexTriangles[corner]) reach(t);
       }
     }
-    const auto place = std::lower_bound(near.begin(), near.end(), triangle);
+    const auto place = std::lower_bound(near.begin(), near.end(), m_triangle);
     return reached[static_cast<std::size_t>(place - near.begin())] != 0;
   }
   bool goesOn() const {
@@ -348,16 +356,13 @@ void PiercingContacts::addDepths(const MeshPair& pair, const TrianglesInBox& nea
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
       nearest.enter(first->triangle);
     nearest.walk();
-    const double way = nearest.wayOut({begin, first});
-    Buffer<std::uint32_t>& triangles = m_scratch.near;
-    triangles.clear();
-    if (near) {
-      near(!ofB, atStart, nearest.box(way), triangles);
-    } else {
+    const auto findIn = [&](const Eigen::AlignedBox3d& box, Buffer<std::uint32_t>& triangles) {
+      triangles.clear();
+      if (near) return near(!ofB, atStart, box, triangles);
       triangles.resize((ofB ? pair.a : pair.b).topology.elements.size());
       std::iota(triangles.begin(), triangles.end(), 0u);
-    }
-    nearest.shorten(way, {begin, first}, m_scratch);
+    };
+    nearest.shorten({begin, first}, findIn, m_scratch);
     out.exactDecisions += nearest.exact();
     if (!atStart) {
       if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;
