@@ -205,7 +205,8 @@ class PALPATE_EXPORT SpatialQueries {
   ///          plane: no translation is shorter by 2^-36 M. Other depths are upper bounds.
   /// Errors   NotClosed, with the first edge, for what has no inside; UnsupportedMethod for two
   ///          planes.
-  /// Cost     some hundred rays and ten searches of intersections: some ms for 3,000 triangles.
+  /// Cost     linear in the triangles and the pairs that touch: up to some 100 operations for each
+  ///          triangle. 2 to 16 ms for 3,000 triangles, 30 ms among 300 layers.
   Penetration penetration(GeometryId a, GeometryId b) const;
   /// Whether two surfaces pierce each other in two of their elements; else they only touch there,
   /// or are apart. It is the decision by which Auto and Validity tell resting contact from
