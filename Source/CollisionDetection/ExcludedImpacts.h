@@ -152,15 +152,16 @@ class ExcludedImpacts {
     bool isBeside(const TangentPlane& plane) const {
       return m_rule.isIn(plane, 1 - m_side, m_impact.elements[1 - m_side]);
     }
-    /// The other conditions, for an impact that is not excluded. It holds an element on `side`,
-    /// which is that of the held element unless a mesh collides with itself. plane: planeOf(s,
-    /// side). lowestGap(plane): the least gap of such impacts that hold parts of the held element
-    /// and have this plane.
+    /// The other conditions, for an impact that is not excluded. It holds the held element or a
+    /// part of it, on `side`, which is that of the held element unless a mesh collides with itself.
+    /// plane: planeOf(s, side). lowestGap(plane): the least gap of such impacts that hold parts of
+    /// the held element and have this plane.
     template <class LowestGap>
     bool isReplacedBy(const SidedImpact& s, std::size_t side, TangentPlane plane,
                       LowestGap&& lowestGap) {
       const ImpactElement &own = s.elements[side], &closest = m_impact.closest[m_side];
-      if (!m_rule.isInTime(s, m_impact) || !own.isIn(element())) return false;
+      PALPATE_ASSERT(own.isIn(element()));
+      if (!m_rule.isInTime(s, m_impact)) return false;
       if (element().size == 1) return true;
       plane.gap = lowestGap(plane);
       if (!m_rule.isInFront(plane, m_side, element())) return false;

@@ -60,8 +60,8 @@ std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact& c, bool self
   return inOrder(a, b, self && b < a);
 }
 
-/// Drops excluded impacts for which others stand. These are looked up by the first vertex of the
-/// element that they hold.
+/// Drops excluded impacts for which others stand. These are looked up by the first vertex and the
+/// size of the element that they hold.
 void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderScratch& ordered,
                                 const CollisionData::Contents& contents) {
   const ExcludedImpacts rule(meshes);
@@ -93,35 +93,39 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
       if (m_dropped[list][i]) return;
       const SidedImpact impact = sided(list, i);
       rule.anyHeldSide(impact, [&](std::size_t side) {
-        f(numberOf(side, impact.elements[side].ids[0]), impact, Holder{list, i, side});
+        const ImpactElement& element = impact.elements[side];
+        f(3 * numberOf(side, element.ids[0]) + element.size - 1, Holder{list, i, side});
         return false;
       });
     });
   };
-  // A counting sort: m_starts[n + 1] becomes the end of the holders at vertex n.
-  m_starts.assign(meshes.a.now.size() + meshes.b.now.size() + 2, 0);
+  // A counting sort: m_starts[n + 1] becomes the end of the holders with key n.
+  m_starts.assign(3 * (meshes.a.now.size() + meshes.b.now.size()) + 2, 0);
   std::size_t holders = 0;
-  forEachHolder([&](std::size_t n, const SidedImpact&, const Holder&) {
+  forEachHolder([&](std::size_t n, const Holder&) {
     ++m_starts[n + 2];
     ++holders;
   });
   std::partial_sum(m_starts.begin(), m_starts.end(), m_starts.begin());
   m_holders.resize(holders);
-  forEachHolder([&](std::size_t n, const SidedImpact&, const Holder& holder) {
-    m_holders[m_starts[n + 1]++] = holder;
-  });
+  forEachHolder(
+      [&](std::size_t n, const Holder& holder) { m_holders[m_starts[n + 1]++] = holder; });
   m_planes.clear();
+  m_held.clear();
   for (const Holder& holder : m_holders) {
     check();
-    m_planes.push_back(rule.planeOf(sided(holder.list, holder.index), holder.side));
+    const SidedImpact impact = sided(holder.list, holder.index);
+    m_held.push_back(impact.elements[holder.side]);
+    m_planes.push_back(rule.planeOf(impact, holder.side));
   }
   // Calls f(number) for the holders of parts of an impact's element, until it returns true. Begins
   // at the closest vertex: an impact of it mostly stands for this one.
   const auto anyHolder = [&](const SidedImpact& c, std::size_t side, auto&& f) {
     const auto anyAt = [&](std::uint32_t vertex) {
-      const std::size_t n = numberOf(side, vertex);
-      for (std::uint32_t i = m_starts[n]; i < m_starts[n + 1]; ++i)
-        if (f(i)) return true;
+      const ImpactElement& element = c.elements[side];
+      const std::size_t n = 3 * numberOf(side, vertex);
+      for (std::uint32_t i = m_starts[n]; i < m_starts[n + element.size]; ++i)
+        if (m_held[i].isIn(element) && f(i)) return true;
       return false;
     };
     const std::uint32_t first = c.closest[side].ids[0];
@@ -143,9 +147,7 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
         double gap = plane.gap;
         anyHolder(c, side, [&](std::uint32_t other) {
           const TangentPlane& its = m_planes[other];
-          if (its.gap < gap && plane.isSameAs(its) &&
-              impactOf(other).elements[m_holders[other].side].isIn(held.element()))
-            gap = its.gap;
+          if (its.gap < gap && plane.isSameAs(its)) gap = its.gap;
           return false;
         });
         return gap;

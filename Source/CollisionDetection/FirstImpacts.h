@@ -2,6 +2,7 @@
 
 #include <palpate/CollisionData.h>
 
+#include "CollisionDetection/ExcludedImpacts.h"
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/Order.h"
 #include "Math/NormalCone.h"
@@ -82,7 +83,8 @@ class FirstImpacts {
     std::size_t side;
   };
   Buffer<Entry> m_entries;
-  Buffer<Holder> m_holders;                       ///< by the first vertex of the element
+  Buffer<Holder> m_holders;                       ///< by the first vertex and size of the element
+  Buffer<ImpactElement> m_held;                   ///< the elements of m_holders
   Buffer<TangentPlane> m_planes;                  ///< of m_holders
   Buffer<std::uint32_t> m_starts;                 ///< of each vertex, in m_holders
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index

@@ -7,7 +7,6 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/StepCheck.h"
-#include "Queries/ElementsNearShape.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 #include "Core/Stopwatch.h"
@@ -309,21 +308,6 @@ void MeshWork::runByBruteForce(JobScratch& scratch) const {
   scratch.nearby = true;
 }
 
-/// By brute force: empty, which means all.
-static TrianglesInBox trianglesIn(const PairRecord& record, Engine engine) {
-  if (engine == Engine::BruteForce) return {};
-  return [&record](bool ofB, bool atStart, const Eigen::AlignedBox3d& box,
-                   Buffer<std::uint32_t>& out) {
-    const Geometry& of = *(ofB ? record.b : record.a);
-    const MotionRange& moved = of.motion.range();
-    // At the end, those that meet the box at the start are in the box and their motion.
-    findElementsNear(
-        of.body,
-        atStart ? Eigen::AlignedBox3d(box.min() + moved.lower, box.max() + moved.upper) : box,
-        false, out);
-  };
-}
-
 void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   PALPATE_ASSERT(jobs.empty() || m_record->plan.kind == PairKind::Meshes);
   PairRecord& record = *m_record;
@@ -335,8 +319,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   StepFacts& facts = results.facts();
   const bool byIntersection = record.plan.method == Method::Intersection;
   auto& atEnd = byIntersection ? found : intersections;
-  const TrianglesInBox near = trianglesIn(record, join.engine);
-  piercingContacts.find(record.meshes(), near, atEnd, pierced);
+  piercingContacts.find(record.meshes(), atEnd, pierced);
   atEnd.push_back(&pierced);
   for (const auto* buffers : {&found, &intersections})
     for (const ContactBuffers* each : *buffers) facts.add(each->facts);
@@ -353,7 +336,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   record.sidesAreKnown = facts.startsPiercing() && record.plan.runsIntersection;
   if (record.sidesAreKnown) {
     leaving.clear();
-    piercingContacts.findAtStart(record.meshes(), near, intersections, leaving);
+    piercingContacts.findAtStart(record.meshes(), intersections, leaving);
     knownSides.apply(record.meshes(), intersections, leaving, found);
     preferred = intersections.size();
     found.insert(found.begin(), intersections.begin(), intersections.end());

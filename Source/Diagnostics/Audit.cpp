@@ -123,7 +123,7 @@ void addListed(const MeshPair& meshes, const Coverage& coverage, const Collision
     if (pair.a < countA && pair.b < countB && !coverage.coversTriangles(pair))
       addIntersection(meshes, pair, contacts);
   ContactBuffers* const found[] = {&contacts};
-  PiercingContacts().find(meshes, {}, found, pierced);
+  PiercingContacts().find(meshes, found, pierced);
 }
 
 /// Auto, in a step that begins in intersection: whether a contact may be left out because the sides

@@ -324,7 +324,7 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
   if (lists.trianglesOfA.size() + ofA.disabled.size() < ofA.count()) return;
   ContactBuffers pierced;
   ContactBuffers* const found[] = {&out};
-  PiercingContacts().find(pair, {}, found, pierced);
+  PiercingContacts().find(pair, found, pierced);
   out.crossings.clear();
   out.pierced.clear();
   append(pierced.vertexTriangle, out.vertexTriangle);

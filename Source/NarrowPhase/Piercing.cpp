@@ -12,6 +12,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <iterator>
 #include <numeric>
@@ -178,23 +179,15 @@ class NearestInFront {
   }
 
   /// Goes on to the feature with the shortest way out.
-  /// find(box, out): the triangles in a box, and maybe others.
-  template <class Find>
-  void shorten(std::span<const PiercingContacts::Behind> crossings, Find&& find,
+  void shorten(std::span<const PiercingContacts::Behind> crossings,
                PiercingContacts::Scratch& scratch) {
-    scratch.nearer.clear();
-    scratch.reached.clear();
     double way = wayOut(crossings);
     const double reach = kWayReach * way;
-    find(box(way), scratch.near);
     way *= 1.0 - kWaySlack;
-    for (const std::uint32_t t : scratch.near) {
-      if (!m_mesh.topology.isEnabled(t)) continue;
-      const double distance = measure(t).distance;
-      if (distance < way && isAllowed(t)) scratch.nearer.push_back({distance, t});
-    }
-    auto best = std::pair(m_triangle, m_nearest);
+    findNearer(way, reach, crossings, scratch);
     auto& nearer = scratch.nearer;
+    auto best = std::pair(m_triangle, m_nearest);
+    bool isBetter = false;
     std::make_heap(nearer.begin(), nearer.end(), std::greater<>());
     // No way is shorter than the distance.
     for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < way; --end) {
@@ -202,12 +195,13 @@ class NearestInFront {
       m_triangle = std::prev(end)->triangle;
       m_nearest = measure(m_triangle);
       const double other = wayOut(crossings);
-      if (!(other < way) || goesOn() || !isReached(reach, find, crossings, scratch)) continue;
+      if (!(other < way) || goesOn()) continue;
       way = (1.0 - kWaySlack) * other;
       best = {m_triangle, m_nearest};
+      isBetter = true;
     }
     std::tie(m_triangle, m_nearest) = best;
-    walk();
+    if (isBetter) walk();
   }
 
   std::uint32_t triangle() const { return m_triangle; }
@@ -232,41 +226,52 @@ class NearestInFront {
     }
     return {};
   }
-  Eigen::AlignedBox3d box(double distance) const {
-    const Eigen::Vector3d reach = Eigen::Vector3d::Constant(distance);
-    return {m_position - reach, m_position + reach};
-  }
-  /// Whether triangles that are at most so far away lead to the present one from those that the
-  /// edges cross.
-  template <class Find>
-  bool isReached(double distance, Find&& find, std::span<const PiercingContacts::Behind> crossings,
-                 PiercingContacts::Scratch& scratch) const {
-    auto& [near, nearer, reached, next] = scratch;
-    const auto reach = [&](std::uint32_t t) {
-      const auto place = std::lower_bound(near.begin(), near.end(), t);
-      if (place == near.end() || *place != t) return;
-      std::uint8_t& isKnown = reached[static_cast<std::size_t>(place - near.begin())];
-      if (!std::exchange(isKnown, 1)) next.push_back(t);
-    };
-    if (reached.empty()) {
-      find(box(distance), near);
-      std::erase_if(near, [&](std::uint32_t t) {
-        return !m_mesh.topology.isEnabled(t) || m_pair.excludesVertex(m_vertex, t) ||
-               !(measure(t).distance <= distance);
-      });
-      std::sort(near.begin(), near.end());
-      reached.assign(near.size(), 0);
-      next.clear();
-      for (const auto& crossing : crossings) reach(crossing.triangle);
-      while (!next.empty()) {
-        const Triangle& corners = m_mesh.topology.elements[next.back()];
-        next.pop_back();
-        for (const std::uint32_t corner : corners)
-          for (const std::uint32_t t : m_mesh.topology.vertexTriangles[corner]) reach(t);
-      }
+  /// Of the triangles that others at most `distance` away connect with one that the edges cross,
+  /// those that are nearer than `way` and behind which the vertex is.
+  void findNearer(double way, double distance, std::span<const PiercingContacts::Behind> crossings,
+                  PiercingContacts::Scratch& scratch) const {
+    auto& [nearer, reached, seen, turn] = scratch;
+    if (seen.size() < m_mesh.topology.elements.size())
+      seen.resize(m_mesh.topology.elements.size(), 0u);
+    if (++turn == 0) {
+      std::fill(seen.begin(), seen.end(), 0u);
+      turn = 1;
     }
-    const auto place = std::lower_bound(near.begin(), near.end(), m_triangle);
-    return reached[static_cast<std::size_t>(place - near.begin())] != 0;
+    nearer.clear();
+    reached.clear();
+    const auto reach = [&](std::uint32_t t) {
+      if (std::exchange(seen[t], turn) == turn || !m_mesh.topology.isEnabled(t)) return;
+      const auto [least, most] = bounds(t);
+      if (least > distance || m_pair.excludesVertex(m_vertex, t)) return;
+      if (most > distance || (least < way && planeIsNearer(t, way))) {
+        const double found = measure(t).distance;
+        if (!(found <= distance)) return;
+        if (found < way && isAllowed(t)) nearer.push_back({found, t});
+      }
+      reached.push_back(t);
+    };
+    for (const auto& crossing : crossings) reach(crossing.triangle);
+    for (std::size_t i = 0; i < reached.size(); ++i)
+      for (const std::uint32_t corner : m_mesh.topology.elements[reached[i]])
+        for (const std::uint32_t t : m_mesh.topology.vertexTriangles[corner]) reach(t);
+  }
+  /// Bounds of the distance to a triangle: that to its box, less rounding, and that to a corner.
+  std::pair<double, double> bounds(std::uint32_t triangle) const {
+    const auto [a, b, c] = m_mesh.corners(triangle);
+    const Eigen::Array3d lower = a.array().min(b.array()).min(c.array()),
+                         upper = a.array().max(b.array()).max(c.array()), at = m_position.array();
+    const double most = std::min({(a - m_position).squaredNorm(), (b - m_position).squaredNorm(),
+                                  (c - m_position).squaredNorm()});
+    return {(1.0 - 0x1p-40) * (lower - at).max(at - upper).max(0.0).matrix().norm(),
+            std::sqrt(most)};
+  }
+  /// Whether the triangle's plane may be nearer. A triangle that is nearly a line has no plane.
+  bool planeIsNearer(std::uint32_t triangle, double distance) const {
+    const auto [a, b, c] = m_mesh.corners(triangle);
+    const Eigen::Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
+    const double length = normal.norm();
+    return !(length >= 0x1p-20 * ab.norm() * ac.norm()) ||
+           (1.0 - 0x1p-20) * std::abs(normal.dot(m_position - a)) < distance * length;
   }
   bool goesOn() const {
     const auto around = holders(feature());
@@ -323,11 +328,11 @@ void PiercingContacts::collect(std::span<ContactBuffers* const> found,
   m_crossings.erase(std::unique(m_crossings.begin(), m_crossings.end()), m_crossings.end());
 }
 
-void PiercingContacts::find(const MeshPair& pair, const TrianglesInBox& near,
-                            std::span<ContactBuffers* const> found, ContactBuffers& out) {
+void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
+                            ContactBuffers& out) {
   collect(found, &ContactBuffers::crossings, out.deadline);
   findBehind(pair, false, out);
-  addDepths(pair, near, false, out);
+  addDepths(pair, false, out);
   TimeCheck check(out.deadline, 32);
   for (const ContactBuffers* buffers : found)
     for (const PiercedPair& pierced : buffers->pierced) {
@@ -337,15 +342,14 @@ void PiercingContacts::find(const MeshPair& pair, const TrianglesInBox& near,
     }
 }
 
-void PiercingContacts::findAtStart(const MeshPair& pair, const TrianglesInBox& near,
-                                   std::span<ContactBuffers* const> found, ContactBuffers& out) {
+void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
+                                   ContactBuffers& out) {
   collect(found, &ContactBuffers::crossingsAtStart, out.deadline);
   findBehind(pair, true, out);
-  addDepths(pair, near, true, out);
+  addDepths(pair, true, out);
 }
 
-void PiercingContacts::addDepths(const MeshPair& pair, const TrianglesInBox& near, bool atStart,
-                                 ContactBuffers& out) {
+void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
   StepCheck check(pair, out);
   for (auto first = m_behind.begin(); first != m_behind.end();) {
     const bool ofB = first->ofB;
@@ -356,13 +360,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, const TrianglesInBox& nea
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
       nearest.enter(first->triangle);
     nearest.walk();
-    const auto findIn = [&](const Eigen::AlignedBox3d& box, Buffer<std::uint32_t>& triangles) {
-      triangles.clear();
-      if (near) return near(!ofB, atStart, box, triangles);
-      triangles.resize((ofB ? pair.a : pair.b).topology.elements.size());
-      std::iota(triangles.begin(), triangles.end(), 0u);
-    };
-    nearest.shorten({begin, first}, findIn, m_scratch);
+    nearest.shorten({begin, first}, m_scratch);
     out.exactDecisions += nearest.exact();
     if (!atStart) {
       if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;

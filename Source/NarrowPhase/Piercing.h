@@ -20,11 +20,6 @@ namespace palpate {
 void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const TriangleIntersection&,
                      Buffer<EdgeCrossing>& out);
 
-/// Appends the triangles of a mesh of the pair that a box meets at the step's start or end, and
-/// maybe others. Empty: all triangles are meant.
-using TrianglesInBox = std::function<void(bool ofB, bool atStart, const Eigen::AlignedBox3d&,
-                                          Buffer<std::uint32_t>& out)>;
-
 /// The contacts of triangles that pierce each other, without touching features. They depend on all
 /// crossings of a pair of meshes, and are therefore found after the last batch.
 ///
@@ -57,16 +52,14 @@ using TrianglesInBox = std::function<void(bool ofB, bool atStart, const Eigen::A
 ///          crossed, their contact stands for the pair; if it is a vertex behind the
 ///          other surface, this vertex' contact.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
-/// Cost     n log n in the crossings; a vertex behind measures the triangles in a box around it
-///          that is 1.5 times as large as its first way.
+/// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
+///          most 1.5 times its first way from it. Scratch memory of 4 bytes for each triangle.
 class PiercingContacts {
  public:
   /// Appends all contacts at the step's end.
-  void find(const MeshPair&, const TrianglesInBox&, std::span<ContactBuffers* const> found,
-            ContactBuffers& out);
+  void find(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
   /// Appends the contacts of vertices that are behind a surface at the step's start, unfiltered.
-  void findAtStart(const MeshPair&, const TrianglesInBox&, std::span<ContactBuffers* const> found,
-                   ContactBuffers& out);
+  void findAtStart(const MeshPair&, std::span<ContactBuffers* const> found, ContactBuffers& out);
 
   /// A vertex behind a triangle that one of its edges crosses. ofB: of MeshPair::b.
   struct Behind {
@@ -82,17 +75,17 @@ class PiercingContacts {
   };
   /// Of one vertex.
   struct Scratch {
-    Buffer<std::uint32_t> near;
     Buffer<Near> nearer;
-    Buffer<std::uint8_t> reached;  ///< as `near`, which is sorted then; empty: not known
-    Buffer<std::uint32_t> next;
+    Buffer<std::uint32_t> reached;
+    Buffer<std::uint32_t> seen;  ///< for each triangle the last turn in which it was seen
+    std::uint32_t turn = 0;
   };
 
  private:
   void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list,
                const Deadline*);
   void findBehind(const MeshPair&, bool atStart, ContactBuffers& out);
-  void addDepths(const MeshPair&, const TrianglesInBox&, bool atStart, ContactBuffers& out);
+  void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
   std::span<const EdgeCrossing> crossingsOf(bool ofB, std::uint32_t edge) const;

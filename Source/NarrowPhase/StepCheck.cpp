@@ -66,17 +66,20 @@ static bool isSeparating(const ImpactQuery& query, double time, const Vector3d& 
 template <Kind kind>
 static bool mayMeet(const ImpactQuery& query, double time, const Vector3d& difference, double radii,
                     double timeTolerance) {
+  const auto separates = [&](const Vector3d& normal) {
+    return isSeparating<kind>(query, 1.0, normal, radii) &&
+           isSeparating<kind>(query, time, normal, radii);
+  };
+  const Vector3d u = stableUnit(difference);
+  if (separates(u)) return false;
   const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].now; };
   Vector3d atEnd;
   if constexpr (kind == Kind::VertexTriangle)
     atEnd = finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).difference;
   else
     atEnd = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).difference;
-  const Vector3d u = stableUnit(difference), v = stableUnit(atEnd);
-  for (const Vector3d& normal : {Vector3d(u + v), v, u})
-    if (isSeparating<kind>(query, time, normal, radii) &&
-        isSeparating<kind>(query, 1.0, normal, radii))
-      return false;
+  const Vector3d v = stableUnit(atEnd);
+  if (separates(u + v) || separates(v)) return false;
   TimeOfImpactSettings settings;
   settings.minimumDistance = radii;
   settings.timeTolerance = timeTolerance;
@@ -94,14 +97,19 @@ void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t first
   if (time == 0.0)
     gap = std::min(gap, distance - (m_pair.a.largestRadius + m_pair.b.largestRadius) - rounding);
   const double radii = m_pair.a.largestRadius + m_pair.b.largestRadius;
+  const bool findsMeetings = m_pair.reportsDistinct();
+  if (clearance == 0.0 && !step.reportsImpacts && !findsMeetings) return;
   double left = (1.0 - time) * step.motion + rounding;
-  if (m_pair.reportsDistinct() && distance <= left + radii &&
+  const bool isNear = distance <= left;
+  double own = left;  // a bound for these features
+  if (isNear || (findsMeetings && distance <= left + radii))
+    own = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
+  if (findsMeetings && distance <= own + radii &&
       mayMeet<kind>(features.query(firstId, secondId), time, difference, radii,
                     m_pair.settings.continuous.timeTolerance))
     recordVertices(features, firstId, secondId, m_out.facts.metA, m_out.facts.metB);
   if (clearance == 0.0 && !step.reportsImpacts) return;
-  if (distance <= left)
-    left = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
+  if (isNear) left = own;
   clearance = std::min(clearance, std::max(0.0, distance - left));
   if (step.reportsImpacts && distance <= left)
     recordVertices(features, firstId, secondId, m_out.facts.verticesA, m_out.facts.verticesB);
