@@ -79,7 +79,8 @@ else
 fi
 # Without --all: the tests of modules and packages. `cmake --preset release` alone makes this build complete again.
 modules=(-DPALPATE_BUILD_EXAMPLES=OFF "-DPALPATE_TEST_FOLDERS=C;Consumer;Exact;Fcl;Frame;Golden;Python;Regression;Unit;Vtk")
-((all)) && modules=()
+tested=modules
+((all)) && modules=() tested=release
 build release "${modules[@]}"
 if ((all)); then
   # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
@@ -95,7 +96,7 @@ fi
 table() { printf '%-22s %-7s %7s %9s\n' stage result seconds "CPU time"; printf '%s\n' "${report[@]}"; }
 table
 echo "--- release: test, after $SECONDS s"
-ctest --preset release --parallel "$tests" || failed=1
+ctest --preset "$tested" --parallel "$tests" || failed=1
 ((failed)) || exit 0
 
 # What failed, last, as logs are read from their end.
