@@ -50,6 +50,7 @@ Substitutes::Substitutes(const Claims& said) {
   if (!said.distinct) return;
   for (const Claim& claim : said.claims) {
     if (!(claim.time < 1)) continue;
+    m_impacts.push_back(&claim);
     const auto [entry, isNew] = m_byHeld.try_emplace(claim.held, &claim);
     if (!isNew && claim.time < entry->second->time) entry->second = &claim;
   }
@@ -71,6 +72,40 @@ const Claim* Substitutes::find(const FeaturePair& pair, const Incidence& a,
       if (found != m_byHeld.end() && (!first || found->second->time < first->time))
         first = found->second;
     }
+  return first;
+}
+
+/// The vertices of a pair's features on both sides, sorted.
+static std::array<std::vector<std::uint32_t>, 2> verticesOf(const FeaturePair& pair,
+                                                            const Incidence& a,
+                                                            const Incidence& b) {
+  using Kind = FeaturePair::Kind;
+  const auto& [i, j, k, l] = pair.ids;
+  const auto cornersOf = [](const Incidence& mesh, std::uint32_t triangle) {
+    const Triangle& corners = mesh.corners(triangle);
+    return std::vector<std::uint32_t>(corners.begin(), corners.end());
+  };
+  std::array<std::vector<std::uint32_t>, 2> vertices;
+  if (pair.kind == Kind::VertexTriangle) vertices = {std::vector{i}, cornersOf(b, j)};
+  if (pair.kind == Kind::TriangleVertex) vertices = {cornersOf(a, i), std::vector{j}};
+  if (pair.kind == Kind::EdgeEdge) vertices = {std::vector{i, j}, std::vector{k, l}};
+  for (auto& side : vertices) std::sort(side.begin(), side.end());
+  return vertices;
+}
+
+const Claim* Substitutes::findBeside(const FeaturePair& pair, const Incidence& a,
+                                     const Incidence& b,
+                                     const std::function<bool(const Claim&)>& stands) const {
+  const auto sought = verticesOf(pair, a, b);
+  const Claim* first = nullptr;
+  for (const Claim* claim : m_impacts) {
+    if ((first && claim->time >= first->time) || !stands(*claim)) continue;
+    const auto its = verticesOf(claim->features, a, b);
+    for (std::size_t side = 0; side < 2; ++side)
+      if (!its[side].empty() && std::includes(sought[side].begin(), sought[side].end(),
+                                              its[side].begin(), its[side].end()))
+        first = claim;
+  }
   return first;
 }
 

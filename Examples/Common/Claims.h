@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -68,9 +69,15 @@ class Substitutes {
   /// The first claim in time whose closest features belong to these elements, or null. It
   /// represents an impact that is not earlier.
   const Claim* find(const FeaturePair&, const Incidence& a, const Incidence& b) const;
+  /// The first claim in time about a vertex, an edge or a triangle of these features, or a part of
+  /// it, on one side, for which `stands` holds; or null. By the second rule of Contacts::Distinct
+  /// it may represent an impact that is not earlier.
+  const Claim* findBeside(const FeaturePair&, const Incidence& a, const Incidence& b,
+                          const std::function<bool(const Claim&)>& stands) const;
 
  private:
   std::map<std::array<Held, 2>, const Claim*> m_byHeld;
+  std::vector<const Claim*> m_impacts;
 };
 
 void sortUnique(std::vector<ElementPair>&);

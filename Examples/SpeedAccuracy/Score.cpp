@@ -40,8 +40,15 @@ const Claim* claimOf(const FeaturePair& features, const std::optional<Impact>& i
   if (claim != claims.end()) return &claim->second;
   const Claim* substitute = substitutes.find(features, a, b);
   constexpr double kTimeError = 1e-12;  // of the reference and of rounding
-  return substitute && impact && substitute->time > impact->time + kTimeError ? nullptr
-                                                                              : substitute;
+  const auto isInTime = [&](const Claim* other, double late) {
+    return other && !(impact && other->time > impact->time + late);
+  };
+  if (isInTime(substitute, kTimeError)) return substitute;
+  if (!impact) return nullptr;
+  // One with a triangle's interior may be late by timeTolerance.
+  substitute = substitutes.findBeside(
+      features, a, b, [&](const Claim& other) { return other.normal.dot(impact->normal) >= 0; });
+  return isInTime(substitute, ContinuousSettings{}.timeTolerance) ? substitute : nullptr;
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
+#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
@@ -230,7 +231,9 @@ class NearestInFront {
   /// those that are nearer than `way` and behind which the vertex is.
   void findNearer(double way, double distance, std::span<const PiercingContacts::Behind> crossings,
                   PiercingContacts::Scratch& scratch) const {
-    auto& [nearer, reached, seen, turn] = scratch;
+    Buffer<PiercingContacts::Near>& nearer = scratch.nearer;
+    Buffer<std::uint32_t>&reached = scratch.reached, &seen = scratch.seen;
+    std::uint32_t& turn = scratch.turn;
     if (seen.size() < m_mesh.topology.elements.size())
       seen.resize(m_mesh.topology.elements.size(), 0u);
     if (++turn == 0) {
@@ -260,18 +263,18 @@ class NearestInFront {
     const auto [a, b, c] = m_mesh.corners(triangle);
     const Eigen::Array3d lower = a.array().min(b.array()).min(c.array()),
                          upper = a.array().max(b.array()).max(c.array()), at = m_position.array();
-    const double most = std::min({(a - m_position).squaredNorm(), (b - m_position).squaredNorm(),
-                                  (c - m_position).squaredNorm()});
-    return {(1.0 - 0x1p-40) * (lower - at).max(at - upper).max(0.0).matrix().norm(),
-            std::sqrt(most)};
+    const double most = std::min(
+        {stableLength(a - m_position), stableLength(b - m_position), stableLength(c - m_position)});
+    const Eigen::Vector3d beyond = (lower - at).max(at - upper).max(0.0);
+    return {(1.0 - 0x1p-40) * stableLength(beyond), most};
   }
   /// Whether the triangle's plane may be nearer. A triangle that is nearly a line has no plane.
   bool planeIsNearer(std::uint32_t triangle, double distance) const {
     const auto [a, b, c] = m_mesh.corners(triangle);
-    const Eigen::Vector3d ab = b - a, ac = c - a, normal = ab.cross(ac);
-    const double length = normal.norm();
-    return !(length >= 0x1p-20 * ab.norm() * ac.norm()) ||
-           (1.0 - 0x1p-20) * std::abs(normal.dot(m_position - a)) < distance * length;
+    const Eigen::Vector3d normal = stableUnit(b - a).cross(stableUnit(c - a));
+    const double sine = normal.norm();
+    return !(sine >= 0x1p-20) ||
+           (1.0 - 0x1p-20) * std::abs(normal.dot(m_position - a)) < distance * sine;
   }
   bool goesOn() const {
     const auto around = holders(feature());

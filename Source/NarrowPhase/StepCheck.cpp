@@ -61,29 +61,45 @@ static bool isSeparating(const ImpactQuery& query, double time, const Vector3d& 
   return true;
 }
 
-/// Whether features may come within their radii after a time of the step. They do not if one plane
-/// separates them at that time and at the step's end: the vertices move in straight lines.
+/// From the second feature to the first, at their closest points at a time of the step.
 template <Kind kind>
-static bool mayMeet(const ImpactQuery& query, double time, const Vector3d& difference, double radii,
-                    double timeTolerance) {
-  const auto separates = [&](const Vector3d& normal) {
-    return isSeparating<kind>(query, 1.0, normal, radii) &&
-           isSeparating<kind>(query, time, normal, radii);
+static Vector3d differenceAt(const ImpactQuery& query, double time) {
+  const auto at = [&](int i) -> Vector3d {
+    return (1.0 - time) * query.vertices[i].before + time * query.vertices[i].now;
   };
-  const Vector3d u = stableUnit(difference);
-  if (separates(u)) return false;
-  const auto at = [&](int i) -> const Vector3d& { return query.vertices[i].now; };
-  Vector3d atEnd;
   if constexpr (kind == Kind::VertexTriangle)
-    atEnd = finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).difference;
+    return finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).difference;
   else
-    atEnd = finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).difference;
-  const Vector3d v = stableUnit(atEnd);
-  if (separates(u + v) || separates(v)) return false;
-  TimeOfImpactSettings settings;
-  settings.minimumDistance = radii;
-  settings.timeTolerance = timeTolerance;
-  return findImpact(query, settings).impact;
+    return finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).difference;
+}
+
+/// Whether features may come within their radii between two times of the step. They do not if one
+/// plane separates them at both: the vertices move in straight lines. The interval is halved a few
+/// times. first, last: unit, between the closest points at both times.
+template <Kind kind>
+static bool mayMeet(const ImpactQuery& query, double begin, double end, const Vector3d& first,
+                    const Vector3d& last, double radii, int halvings) {
+  for (const Vector3d& normal : {Vector3d(first + last), last, first})
+    if (isSeparating<kind>(query, end, normal, radii) &&
+        isSeparating<kind>(query, begin, normal, radii))
+      return false;
+  if (halvings == 0) return true;
+  const double middle = 0.5 * (begin + end);
+  const Vector3d between = stableUnit(differenceAt<kind>(query, middle));
+  return mayMeet<kind>(query, begin, middle, first, between, radii, halvings - 1) ||
+         mayMeet<kind>(query, middle, end, between, last, radii, halvings - 1);
+}
+
+/// Whether features may come within their radii after a time of the step.
+template <Kind kind>
+static bool mayMeet(const ImpactQuery& query, double time, const Vector3d& difference,
+                    double radii) {
+  const Vector3d first = stableUnit(difference);
+  if (isSeparating<kind>(query, 1.0, first, radii) && isSeparating<kind>(query, time, first, radii))
+    return false;
+  constexpr int kHalvings = 3;
+  return mayMeet<kind>(query, time, 1.0, first, stableUnit(differenceAt<kind>(query, 1.0)), radii,
+                       kHalvings);
 }
 
 template <Kind kind>
@@ -105,8 +121,7 @@ void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t first
   if (isNear || (findsMeetings && distance <= left + radii))
     own = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
   if (findsMeetings && distance <= own + radii &&
-      mayMeet<kind>(features.query(firstId, secondId), time, difference, radii,
-                    m_pair.settings.continuous.timeTolerance))
+      mayMeet<kind>(features.query(firstId, secondId), time, difference, radii))
     recordVertices(features, firstId, secondId, m_out.facts.metA, m_out.facts.metB);
   if (clearance == 0.0 && !step.reportsImpacts) return;
   if (isNear) left = own;

@@ -77,9 +77,16 @@ bool reports(const Claims& claims, const FeaturePair& features) {
 bool reports(const Claims& claims, const Touch& touch) {
   if (reports(claims, touch.features)) return true;
   const accuracy::Incidence one({{0, 1, 2}});
-  const Claim* substitute = accuracy::Substitutes(claims).find(touch.features, one, one);
-  return substitute && !touch.isBefore(substitute->time) &&
-         !touch.isWrongSide(substitute->normal, substitute->time);
+  const accuracy::Substitutes substitutes(claims);
+  const auto stands = [&](const Claim& claim, double late) {
+    return !touch.isBefore(claim.time - late) && !touch.isWrongSide(claim.normal, claim.time);
+  };
+  const Claim* substitute = substitutes.find(touch.features, one, one);
+  if (substitute && stands(*substitute, 0.0)) return true;
+  // One with a triangle's interior may be late by timeTolerance.
+  return substitutes.findBeside(touch.features, one, one, [&](const Claim& claim) {
+    return stands(claim, ContinuousSettings{}.timeTolerance);
+  });
 }
 
 /// Compares the normal with the side that the features came from. A claim about triangles is wrong

@@ -170,6 +170,7 @@ TEST_F(CMisuse, ContactsOverTime) {
                    PALPATE_INVALID_ARGUMENT, "kind is " + std::to_string(kind));
   palpate_pair_settings pair;
   ASSERT_EQ(palpate_init_pair_settings(&pair, sizeof pair), PALPATE_OK);
+  pair.method = PALPATE_METHOD_INTERSECTION;
   pair.report_crossings = 7;  // counts as 1
   EXPECT_REFUSED(palpate_set_pair_settings(m_cd, m_a, m_b, &pair), PALPATE_UNSUPPORTED_METHOD,
                  "reportCrossings");

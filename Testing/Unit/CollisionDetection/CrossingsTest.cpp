@@ -282,8 +282,10 @@ TEST(Crossings, OfAPointAreTheChangesOfInsideAndOutside) {
     if (run % 3 == 1) shape << 2, 1, 0, -1, 2, 1, 0, 1, 3;
     if (deforms) shape = 4 * Eigen::Matrix3d::Identity();
     Positions places(80);
-    for (Vector3d& p : places)
-      p = 0.5 * whole(6) + Vector3d::Constant(2.5 + 0.5 * static_cast<double>(random() % 2));
+    for (Vector3d& p : places) {
+      const Vector3d middle = Vector3d::Constant(random() % 2 != 0 ? 3.0 : 2.5);
+      p = 0.5 * whole(6) + middle;
+    }
     Vector3d origin = Vector3d::Zero();
     const auto placed = [&](const Positions& positions) {
       Positions all;
@@ -383,6 +385,11 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
   const auto whole = [&](int least, int most) {
     return least + static_cast<int>(random() % static_cast<unsigned>(most - least + 1));
   };
+  const auto wholePoint = [&](int least, int most) {
+    Vector3d point;
+    for (double& x : point) x = whole(least, most);
+    return point;
+  };
   std::size_t touching = 0;
   for (int run = 0; run < casesOf(90, 18); ++run) {
     const double size = 2.0 * whole(1, 3);
@@ -391,7 +398,7 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
     if (run % 3 == 2) {
       body = {GeometryType::Lines, {}, {}, {}, {0.0}};
       for (std::uint32_t i = 0; i < 4; ++i) {
-        body.positions.push_back(size * Vector3d(whole(0, 1), whole(0, 1), whole(0, 1)));
+        body.positions.push_back(size * wholePoint(0, 1));
         if (i > 0) body.segments.push_back({i - 1, i});
       }
     }
@@ -404,7 +411,8 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
         body.positions[i] = shape * (positions[i] + at);
     };
     for (Vector3d& p : table.positions) p = shape * p;
-    Vector3d at(whole(-4, 4), whole(-4, 4), 4);
+    Vector3d at = wholePoint(-4, 4);
+    at.z() = 4;
     place(at);
     OctreeBasedCD collisions;
     GeometryId a = body.addTo(collisions), b = table.addTo(collisions);
@@ -413,7 +421,7 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
     collisions.addCollisionPair(a, b, {.method = Method::Continuous, .reportCrossings = true});
     collisions.advance();
     for (int step = 0; step < 40; ++step) {
-      Vector3d next = at + Vector3d(whole(-3, 3), whole(-3, 3), whole(-3, 3));
+      Vector3d next = at + wholePoint(-3, 3);
       if (random() % 3 != 0) {  // along a side
         const int axis = whole(0, 2);
         next[axis] = at[axis];

@@ -343,6 +343,14 @@ class Query {
     return all;
   }
 
+  /// Whether a passage is through an edge or a vertex of one of the features.
+  bool isAtBorder(const Passage& passage) const {
+    const Features features = featuresOf(m_edges, m_vertices);
+    Real time = passage.time;
+    return std::any_of(features.notNegative.begin(), features.notNegative.end(),
+                       [&](const Polynomial& p) { return time.sign(p) == 0; });
+  }
+
   /// For (v, a, b, c): det(a - v, b - v, c - v).
   const Polynomial& coplanarity() const { return m_coplanarity; }
 
