@@ -214,7 +214,8 @@ CubeSolid cubeSolid(Random& random) {
     x = std::clamp(x + (random() % 2 != 0 ? 1 : -1), 0, CubeSolid::kSize - 1);
   }
   std::map<std::array<int, 3>, std::uint32_t> ids;
-  auto& [positions, triangles] = solid.surface;
+  Positions& positions = solid.surface.positions;
+  std::vector<Triangle>& triangles = solid.surface.triangles;
   const auto idOf = [&](const std::array<int, 3>& p) {
     const auto [place, isNew] = ids.try_emplace(p, static_cast<std::uint32_t>(positions.size()));
     if (isNew) positions.push_back(Vector3d(p[0], p[1], p[2]));
