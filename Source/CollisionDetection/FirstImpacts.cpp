@@ -237,8 +237,9 @@ void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const MetVert
       if (list == place.list) f(contacts[place.index], list);
     });
   };
-  for (const auto& [dropped, standIn] : m_standIns) {
+  for (const StandIn& each : m_standIns) {
     check();
+    const Place &dropped = each.dropped, &standIn = each.kept;
     // An impact that stands for others is dropped only for another one with its features.
     const Place kept = m_dropped[standIn.list][standIn.index]
                            ? m_sameFeatures[standIn.list][standIn.index]
