@@ -144,7 +144,7 @@ TEST(AutoPassages, AreThoseOfContinuous) {
   EXPECT_GT(counts.crossings, leastOf(1000, 200));
   EXPECT_GT(counts.sides, leastOf(300, 60));
   EXPECT_GT(counts.asPlain, leastOf(100, 20));
-  EXPECT_GT(counts.asContinuous, leastOf(8, 2));
+  EXPECT_GE(counts.asContinuous, leastOf(9, 3));
   EXPECT_GT(counts.methods[Method::Continuous], leastOf(50, 10));
   EXPECT_GT(counts.methods[Method::Proximity], leastOf(20, 4));
   EXPECT_GT(counts.methods[Method::Intersection], 0u);
