@@ -74,7 +74,7 @@ if ((all)); then
   echo "Everything that CI runs comes: one hour to one and a half on two cores. Each stage says when it begins and how long it took."
   stage packages CMake/packages.sh build python test matrix docs || exit 1
 else
-  echo "Packages, the release library with its tests, and their run come: a quarter of an hour on two idle cores."
+  echo "Packages, the release library with its tests, and their run come: 15 to 25 minutes on two idle cores."
   stage packages CMake/packages.sh build python test || exit 1
 fi
 # Without --all: the tests of modules and packages. `cmake --preset release` alone makes this build complete again.

@@ -94,18 +94,13 @@ inline Quadratic cross(const Linear& l, const Linear& r) {
   return {crossComponent(l, r, 0), crossComponent(l, r, 1), crossComponent(l, r, 2)};
 }
 
-inline Form<3> dot(const Quadratic& l, const Linear& r) {
-  Form<3> sum;
+/// With a vector that moves linearly or quadratically.
+template <std::size_t N>
+std::array<Integer, N + 2> dot(const Quadratic& l, const std::array<std::array<Integer, N>, 3>& r) {
+  std::array<Integer, N + 2> sum;
   for (std::size_t k = 0; k < 3; ++k)
     for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 2; ++j) sum[i + j] += l[k][i] * r[k][j];
-  return sum;
-}
-inline Form<4> dot(const Quadratic& l, const Quadratic& r) {
-  Form<4> sum;
-  for (std::size_t k = 0; k < 3; ++k)
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j) sum[i + j] += l[k][i] * r[k][j];
+      for (std::size_t j = 0; j < N; ++j) sum[i + j] += l[k][i] * r[k][j];
   return sum;
 }
 

@@ -57,7 +57,7 @@ struct TrackedContact {
 /// exactly: the signed volume of their vertices changed its sign when the features had a common
 /// point. A touch is no passage, also at edges and vertices of surfaces and at the step's ends:
 /// what lies on a surface is in front of it, and touching edges are displaced by an infinitesimal
-/// amount, each towards its own side (Docs/Algorithms/Passages.md).
+/// amount, each towards its own side (Docs/Algorithms/Passages.md, with its limits).
 struct Crossing {
   ContactKind kind = ContactKind::VertexTriangle;
   std::array<std::uint32_t, 4> ids{};  ///< those of ContactKey
