@@ -37,7 +37,7 @@ class BuildByCMake(build_ext):
                 ]
                 options += [
                     f"-DPALPATE_{part}=OFF"
-                    for part in ("WITH_VTK", "WITH_FCL", "BUILD_TESTING", "BUILD_EXAMPLES")
+                    for part in ("WITH_C", "WITH_VTK", "WITH_FCL", "BUILD_TESTING", "BUILD_EXAMPLES")
                 ]
                 options += shlex.split(os.environ.get("PALPATE_CMAKE_ARGS", ""))
                 ninja = ["-G", "Ninja"] if shutil.which("ninja") else []

@@ -1,17 +1,18 @@
 #!/bin/bash
-# CMake/packages.sh SET...: installs the Debian packages of the named sets (demo, build, python, test, matrix, docs, figures,
-# benchmark, coverage, package, windows), as root or through sudo. Returns at once when all are there. Otherwise it says first
-# how many packages come, of what size. Where it cannot install all of them it installs none, and says why in one line.
+# CMake/packages.sh SET...: installs the Debian packages of the named sets (core, demo, build, python, test, matrix, docs,
+# figures, benchmark, coverage, package, windows), as root or through sudo. Returns at once when all are there. Otherwise it
+# says first how many packages come, of what size. Where it cannot install all of them it installs none, and says why in
+# one line.
+# CMake/packages.sh --missing SET...: installs nothing; fails when all are there.
 set -euo pipefail
 
-build="cmake ninja-build g++ pkg-config libeigen3-dev libtbb-dev libhwy-dev libgmp-dev libmeshoptimizer-dev
-  libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
+# What the library alone needs.
+core="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev"
+build="$core libtbb-dev libmeshoptimizer-dev libvtk9-dev libfcl-dev libccd-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
 # All that CMake/demo.sh needs.
-demo="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libvtk9-dev libcli11-dev nlohmann-json3-dev
-  xvfb xauth libgl1-mesa-dri"
+demo="$core libvtk9-dev libcli11-dev nlohmann-json3-dev xvfb xauth libgl1-mesa-dri"
 # All that pip needs to build the Python package, and SciPy for rows().
-python="cmake ninja-build g++ pkg-config libeigen3-dev libhwy-dev libgmp-dev libmeshoptimizer-dev python3-dev
-  pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel"
+python="$core libmeshoptimizer-dev python3-dev pybind11-dev python3-numpy python3-scipy python3-pip python3-venv python3-setuptools python3-wheel"
 # What CMake/test.sh needs besides.
 test="python3 python3-pytest python3-mypy mypy python3-distributed libgtest-dev libcgal-dev libmpfr-dev python3-vtk9
   python3-matplotlib"
@@ -26,7 +27,7 @@ benchmark="python3 libbenchmark-dev libembree-dev libbullet-dev libcgal-dev libn
   libopenvdb-dev"
 coverage="python3 gcovr"
 
-sets="demo build python test matrix docs figures benchmark coverage package windows"
+sets="core demo build python test matrix docs figures benchmark coverage package windows"
 page="Docs/CMakeOptions.md#dependencies says what each part needs"
 spareMegabytes=500  # stay free on the disk
 
@@ -55,6 +56,11 @@ requireTools() {
   requireVersion cmake 3.25 ""
 }
 
+onlyAsks=0
+if [[ ${1-} == --missing ]]; then
+  onlyAsks=1
+  shift
+fi
 packages=
 for set in "$@"; do
   [[ " $sets " == *" $set "* ]] || fail "there is no set $set; the sets are: $sets"
@@ -65,6 +71,7 @@ for package in $packages; do
   state=$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $state == installed || " ${missing[*]-} " == *" $package "* ]] || missing+=("$package")
 done
+((!onlyAsks)) || exit $((${#missing[@]} == 0))
 if [[ ${#missing[@]} -eq 0 ]]; then
   requireTools
   exit 0

@@ -72,16 +72,25 @@ setarch --addr-no-randomize true 2>/dev/null && fixedAddresses=(setarch --addr-n
 
 if ((all)); then
   echo "Everything that CI runs comes: one hour to one and a half on two cores. Each stage says when it begins and how long it took."
-  stage packages CMake/packages.sh build python test matrix docs || exit 1
+  sets=(build python test matrix docs)
 else
   echo "Packages, the release library with its tests, and their run come: 15 to 25 minutes on two idle cores."
-  stage packages CMake/packages.sh build python test || exit 1
+  sets=(build python test)
 fi
+# On a new machine the packages are installed while the library is built.
+if [[ ! -e build/release ]] && CMake/packages.sh --missing "${sets[@]}"; then
+  stage "packages: compiler" CMake/packages.sh core || exit 1
+  CMake/packages.sh "${sets[@]}" &
+  stage "library: configure" cmake --preset release -DPALPATE_WITH_{VTK,FCL,PYTHON}=OFF -DPALPATE_BUILD_{TESTING,EXAMPLES}=OFF &&
+    stage "library: build" cmake --build --preset release --parallel "$jobs" -- -k 0
+  wait || true
+fi
+stage packages CMake/packages.sh "${sets[@]}" || exit 1
 # Without --all: the tests of modules and packages. `cmake --preset release` alone makes this build complete again.
 modules=(-DPALPATE_BUILD_EXAMPLES=OFF "-DPALPATE_TEST_FOLDERS=C;Consumer;Exact;Fcl;Frame;Golden;Python;Regression;Unit;Vtk")
 tested=modules
 ((all)) && modules=() tested=release
-build release "${modules[@]}"
+build release -UPALPATE_WITH_{VTK,FCL,PYTHON} -UPALPATE_BUILD_TESTING "${modules[@]}"
 if ((all)); then
   # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
   configuration scalar -DBUILD_SHARED_LIBS=OFF

@@ -84,7 +84,7 @@ class InexactTransformations : public ::testing::TestWithParam<MethodCase> {
                         std::back_inserter(gained));
     m_same += own.size() - lost.size();
     m_different += lost.size() + gained.size();
-    const std::size_t step = shareOfCases(31);
+    const std::size_t step = shareOfCases(127);
     for (std::size_t i = 0; i < lost.size(); i += step) check(lost[i], true);
     for (std::size_t i = 0; i < gained.size(); i += step) check(gained[i], false);
   }
