@@ -160,6 +160,9 @@ TABLES = {
                       s.endswith((" 1 %, band 3 %", " 0.1 %, band 0.3 %"))),
     "spatial": spatial,
     "types": types,
+    "options": metrics("options", "1 thread"),
+    "free-motion": metrics("free motion", "1 thread", columns=["Continuous ms", "with free motion ms"]),
+    "kept": metrics("kept pairs", "1 / 2 threads", columns=["searched ms", "kept ms"]),
     "simplify": metrics("simplify", "1 thread"),
     "inside": metrics("inside", "1 / 2 threads", scenes=lambda s: s != "around"),
 }

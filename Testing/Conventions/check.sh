@@ -264,6 +264,24 @@ checkSubjects() {
   done < <(git log --no-merges --format='%h %s' "$start..HEAD")
 }
 
+# All figures of the tables in Docs are of one commit, and at most MOST later ones changed Source. A tree without
+# history, or with a part of it, is not checked. Argument: MOST.
+checkFigures() {
+  local figures=Docs/Data/Performance.csv most=$1 commits commit changes
+  commits=$(tail -n +2 $figures | sed 's/.*,//' | sort -u)
+  [[ $(wc -l <<<"$commits") -eq 1 && $commits =~ ^[0-9a-f]+$ ]] || {
+    fault "$figures: the figures are not of one commit: $(tr '\n' ' ' <<<"$commits")"
+    return
+  }
+  commit=$(git rev-parse --quiet --verify "$commits^{commit}" 2>/dev/null) || {
+    echo "skipped: there is no history with the commit $commits"
+    exit 77
+  }
+  changes=$(git rev-list --count "$commit..HEAD" -- Source)
+  ((changes <= most)) ||
+    fault "$figures: since its commit $commits $changes commits changed Source, more than $most: run CMake/benchmark.sh"
+}
+
 # Each source file has a header of its name, beside it or public, or its first line says of which header it is a part.
 checkParts() {
   local file name header

@@ -160,6 +160,20 @@ if git -C "$tree" init -q 2>/dev/null; then
   commit "$long"
   expect fails Subjects "$start"
   [[ $(bash "$check" Subjects "$tree" 0000000) == skipped* ]] || { echo "Subjects does not skip"; missed=1; }
+
+  planted="old figures"
+  figures=$tree/Docs/Data/Performance.csv
+  mkdir -p "${figures%/*}"
+  printf 'table,commit\nrace,%s\n' "$start" >"$figures"
+  expect holds Figures 0
+  git -C "$tree" add -f Source
+  commit "Source: change"
+  expect holds Figures 1
+  expect fails Figures 0
+  printf 'race,%s-dirty\n' "$start" >>"$figures"
+  expect fails Figures 1
+  printf 'table,commit\nrace,0000000\n' >"$figures"
+  [[ $(bash "$check" Figures "$tree" 0) == skipped* ]] || { echo "Figures does not skip"; missed=1; }
   rm -rf "$tree/.git"
 fi
 
