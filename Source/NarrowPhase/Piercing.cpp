@@ -119,9 +119,10 @@ int timesOfLeaving(const TriangleMesh& surface, bool atStart,
   return sum;
 }
 
-/// Of the first way: how far triangles are from the vertex that connect features with those that
-/// its edges cross. Around a right angle they are up to the root of 2; any larger value will do.
-constexpr double kWayReach = 1.5;
+/// Of the first exit distance: how far the boxes of triangles are from the vertex that connect
+/// features with those that its edges cross. Around a right angle they are up to the root of 2; any
+/// larger value will do.
+constexpr double kExitReach = 1.5;
 
 /// Searches the feature of a surface that is nearest to a vertex behind it.
 class NearestInFront {
@@ -135,6 +136,7 @@ class NearestInFront {
 
   /// Begins at a triangle behind which the vertex is, or goes on to it if it is nearer.
   bool enter(std::uint32_t triangle) {
+    if (m_isKnown && triangle == m_triangle) return false;
     const VertexTriangleDistance found = measure(triangle);
     if (m_isKnown && !(found.distance < m_nearest.distance)) return false;
     m_isKnown = true;
@@ -160,44 +162,26 @@ class NearestInFront {
     }
   }
 
-  /// L: how far the vertex, and the places where its edges cross the surface, must move along the
-  /// contact's normal to be in front of the plane through the closest point.
-  double wayOut(std::span<const PiercingContacts::Behind> crossings) const {
-    const VertexTriangleContact at = contact();
-    double furthest = 0.0;
-    for (const auto& [ofB, vertex, triangle, edge] : crossings) {
-      const Segment& ends = m_own.topology.edges[edge];
-      const Eigen::Vector3d along = m_own.at[ends[ends[0] == vertex]] - m_position;
-      const auto [a, b, c] = m_mesh.corners(triangle);
-      const Eigen::Vector3d normal = windingNormal(a, b, c);
-      const double below = normal.dot(a - m_position), change = normal.dot(along);
-      // 0 or NaN where rounding hides the crossing: the vertex alone counts.
-      const double weight = below / change;
-      if (weight >= 0.0 && weight <= 1.0)
-        furthest = std::max(furthest, -weight * at.normal.dot(along));
-    }
-    return furthest - at.distance;
-  }
-
-  /// Goes on to the feature with the shortest way out.
+  /// Goes on to the feature with the shortest exit distance. crossings: of the vertex' edges.
   void shorten(std::span<const PiercingContacts::Behind> crossings,
                PiercingContacts::Scratch& scratch) {
-    double way = wayOut(crossings);
-    const double reach = kWayReach * way;
-    way *= 1.0 - kWaySlack;
-    findNearer(way, reach, crossings, scratch);
+    findCrossings(crossings, scratch.crossings);
+    double exit = exitDistance(scratch.crossings);
+    const double reach = kExitReach * exit;
+    exit *= 1.0 - kExitDistanceSlack;
+    findNearer(exit, reach, crossings, scratch);
     auto& nearer = scratch.nearer;
     auto best = std::pair(m_triangle, m_nearest);
     bool isBetter = false;
     std::make_heap(nearer.begin(), nearer.end(), std::greater<>());
-    // No way is shorter than the distance.
-    for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < way; --end) {
+    // No exit distance is shorter than the distance.
+    for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < exit; --end) {
       std::pop_heap(nearer.begin(), end, std::greater<>());
       m_triangle = std::prev(end)->triangle;
       m_nearest = measure(m_triangle);
-      const double other = wayOut(crossings);
-      if (!(other < way) || goesOn()) continue;
-      way = (1.0 - kWaySlack) * other;
+      const double other = exitDistance(scratch.crossings);
+      if (!(other < exit) || goesOn()) continue;
+      exit = (1.0 - kExitDistanceSlack) * other;
       best = {m_triangle, m_nearest};
       isBetter = true;
     }
@@ -227,54 +211,84 @@ class NearestInFront {
     }
     return {};
   }
-  /// Of the triangles that others at most `distance` away connect with one that the edges cross,
-  /// those that are nearer than `way` and behind which the vertex is.
-  void findNearer(double way, double distance, std::span<const PiercingContacts::Behind> crossings,
+  /// From the vertex to where its edges cross the surface.
+  void findCrossings(std::span<const PiercingContacts::Behind> crossings,
+                     Buffer<Eigen::Vector3d>& found) const {
+    found.clear();
+    for (const auto& [ofB, vertex, triangle, edge] : crossings) {
+      const Segment& ends = m_own.topology.edges[edge];
+      const Eigen::Vector3d along = m_own.at[ends[ends[0] == vertex]] - m_position;
+      const auto [a, b, c] = m_mesh.corners(triangle);
+      const Eigen::Vector3d normal = windingNormal(a, b, c);
+      const double weight = normal.dot(a - m_position) / normal.dot(along);
+      // 0 or NaN where rounding hides the crossing: the vertex alone counts.
+      if (weight >= 0.0 && weight <= 1.0) found.push_back(weight * along);
+    }
+  }
+  /// L: how far the vertex, and the places where its edges cross the surface, must move along the
+  /// contact's normal to be in front of the plane through the closest point.
+  double exitDistance(std::span<const Eigen::Vector3d> crossings) const {
+    const VertexTriangleContact at = contact();
+    double furthest = 0.0;
+    for (const Eigen::Vector3d& crossing : crossings)
+      furthest = std::max(furthest, -at.normal.dot(crossing));
+    return furthest - at.distance;
+  }
+  /// Of the triangles that others, with boxes at most `distance` away, connect with one that the
+  /// edges cross, those that are nearer than `exit` and behind which the vertex is.
+  void findNearer(double exit, double distance, std::span<const PiercingContacts::Behind> crossings,
                   PiercingContacts::Scratch& scratch) const {
+    const MeshTopology& topology = m_mesh.topology;
     Buffer<PiercingContacts::Near>& nearer = scratch.nearer;
-    Buffer<std::uint32_t>&reached = scratch.reached, &seen = scratch.seen;
+    Buffer<std::uint32_t>&reached = scratch.reached, &triangleTurns = scratch.triangleTurns,
+    &vertexTurns = scratch.vertexTurns;
     std::uint32_t& turn = scratch.turn;
-    if (seen.size() < m_mesh.topology.elements.size())
-      seen.resize(m_mesh.topology.elements.size(), 0u);
+    const auto makeRoom = [](Buffer<std::uint32_t>& turns, std::size_t size) {
+      if (turns.size() < size) turns.resize(size, 0u);
+    };
+    makeRoom(triangleTurns, topology.elements.size());
+    makeRoom(vertexTurns, topology.vertexCount);
     if (++turn == 0) {
-      std::fill(seen.begin(), seen.end(), 0u);
+      std::fill(triangleTurns.begin(), triangleTurns.end(), 0u);
+      std::fill(vertexTurns.begin(), vertexTurns.end(), 0u);
       turn = 1;
     }
     nearer.clear();
     reached.clear();
+    // Without squares, all that is connected is measured.
+    const double reachSquare = distance * distance, exitSquare = exit * exit;
+    const bool squaresHold = std::isnormal(exitSquare) && std::isfinite(reachSquare);
     const auto reach = [&](std::uint32_t t) {
-      if (std::exchange(seen[t], turn) == turn || !m_mesh.topology.isEnabled(t)) return;
-      const auto [least, most] = bounds(t);
-      if (least > distance || m_pair.excludesVertex(m_vertex, t)) return;
-      if (most > distance || (least < way && planeIsNearer(t, way))) {
-        const double found = measure(t).distance;
-        if (!(found <= distance)) return;
-        if (found < way && isAllowed(t)) nearer.push_back({found, t});
-      }
-      reached.push_back(t);
+      if (std::exchange(triangleTurns[t], turn) == turn || !topology.isEnabled(t)) return;
+      const Corners corners = m_mesh.corners(t);
+      const double least = squaredDistanceToBox(corners);
+      if ((squaresHold && least > reachSquare) || m_pair.excludesVertex(m_vertex, t)) return;
+      for (const std::uint32_t corner : topology.elements[t])
+        if (std::exchange(vertexTurns[corner], turn) != turn) reached.push_back(corner);
+      if (squaresHold && (least >= exitSquare || isOutOfReach(corners, exitSquare))) return;
+      const double found = measure(t).distance;
+      if (found < exit && isAllowed(t)) nearer.push_back({found, t});
     };
     for (const auto& crossing : crossings) reach(crossing.triangle);
     for (std::size_t i = 0; i < reached.size(); ++i)
-      for (const std::uint32_t corner : m_mesh.topology.elements[reached[i]])
-        for (const std::uint32_t t : m_mesh.topology.vertexTriangles[corner]) reach(t);
+      for (const std::uint32_t t : topology.vertexTriangles[reached[i]]) reach(t);
   }
-  /// Bounds of the distance to a triangle: that to its box, less rounding, and that to a corner.
-  std::pair<double, double> bounds(std::uint32_t triangle) const {
-    const auto [a, b, c] = m_mesh.corners(triangle);
-    const Eigen::Array3d lower = a.array().min(b.array()).min(c.array()),
-                         upper = a.array().max(b.array()).max(c.array()), at = m_position.array();
-    const double most = std::min(
-        {stableLength(a - m_position), stableLength(b - m_position), stableLength(c - m_position)});
-    const Eigen::Vector3d beyond = (lower - at).max(at - upper).max(0.0);
-    return {(1.0 - 0x1p-40) * stableLength(beyond), most};
+  /// To the triangle's box, less rounding.
+  double squaredDistanceToBox(const Corners& triangle) const {
+    const auto& [a, b, c] = triangle;
+    const Eigen::Vector3d lower = a.cwiseMin(b).cwiseMin(c), upper = a.cwiseMax(b).cwiseMax(c);
+    return (1.0 - 0x1p-40) *
+           (lower - m_position).cwiseMax(m_position - upper).cwiseMax(0.0).squaredNorm();
   }
-  /// Whether the triangle's plane may be nearer. A triangle that is nearly a line has no plane.
-  bool planeIsNearer(std::uint32_t triangle, double distance) const {
-    const auto [a, b, c] = m_mesh.corners(triangle);
-    const Eigen::Vector3d normal = stableUnit(b - a).cross(stableUnit(c - a));
-    const double sine = normal.norm();
-    return !(sine >= 0x1p-20) ||
-           (1.0 - 0x1p-20) * std::abs(normal.dot(m_position - a)) < distance * sine;
+  /// Whether the triangle's plane is further away, or the vertex certainly in front of it. A
+  /// triangle that is nearly a line has no plane.
+  bool isOutOfReach(const Corners& triangle, double distanceSquared) const {
+    const auto& [a, b, c] = triangle;
+    const Eigen::Vector3d u = b - a, v = c - a, normal = u.cross(v), from = m_position - a;
+    const double square = normal.squaredNorm(), height = normal.dot(from);
+    if (!(square > 0x1p-40 * u.squaredNorm() * v.squaredNorm())) return false;
+    if (height > 0.0) return height * height > 0x1p-40 * square * from.squaredNorm();
+    return (1.0 - 0x1p-20) * height * height >= distanceSquared * square;
   }
   bool goesOn() const {
     const auto around = holders(feature());
@@ -361,7 +375,8 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
     NearestInFront nearest(pair, ofB, atStart, vertex);
     const auto begin = first;
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
-      nearest.enter(first->triangle);
+      if (first == begin || first->triangle != std::prev(first)->triangle)
+        nearest.enter(first->triangle);
     nearest.walk();
     nearest.shorten({begin, first}, m_scratch);
     out.exactDecisions += nearest.exact();

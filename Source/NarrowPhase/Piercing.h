@@ -38,13 +38,14 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          enters only triangles behind which the vertex is. The contact names the lowest of these
 ///          that hold the closest feature. If the feature is an edge or a vertex, the normal leads
 ///          from the vertex to the closest point.
-/// Way      of a feature: how far the vertex and the places where such edges cross the surface must
-///          move along the normal to be in front of the plane through the closest point. The wall
-///          of a blunt tool may be the nearest feature, but the way out leads through its end. Of
-///          this feature and all others from which the search goes no further, the one with the
-///          shortest way has the contact; of those that differ by rounding, the first one, and then
-///          the nearest. Triangles at most 1.5 times the first way from the vertex must connect the
-///          feature with one that such an edge crosses: another sheet is no way out of this one.
+/// Exit     distance of a feature: how far the vertex and the places where such edges cross the
+///          surface must move along the normal to be in front of the plane through the closest
+///          point. The wall of a blunt tool may be the nearest feature, but the tool's end has the
+///          shorter exit distance. Of this feature and all others from which the search goes no
+///          further, the one with the shortest exit distance has the contact; of those that differ
+///          by rounding, the first one, and then the nearest. Triangles whose boxes are at most 1.5
+///          times the first exit distance from the vertex must connect the feature with one that
+///          such an edge crosses: the vertex does not leave through another sheet.
 /// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
 ///          one of the crossing edges is behind: that end's contact then stands for the pair.
 /// Below    an edge that enters the surface through one triangle and leaves it through another one
@@ -53,7 +54,8 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          other surface, this vertex' contact.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
-///          most 1.5 times its first way from it. Scratch memory of 4 bytes for each triangle.
+///          most 1.5 times its first exit distance from it. Scratch memory of 4 bytes for each
+///          triangle and vertex.
 class PiercingContacts {
  public:
   /// Appends all contacts at the step's end.
@@ -75,9 +77,11 @@ class PiercingContacts {
   };
   /// Of one vertex.
   struct Scratch {
+    Buffer<Eigen::Vector3d> crossings;  ///< L: from the vertex to where its edges cross
     Buffer<Near> nearer;
-    Buffer<std::uint32_t> reached;
-    Buffer<std::uint32_t> seen;  ///< for each triangle the last turn in which it was seen
+    Buffer<std::uint32_t> reached;  ///< vertices of the surface
+    /// For each triangle and vertex of the surface the last turn in which it was reached.
+    Buffer<std::uint32_t> triangleTurns, vertexTurns;
     std::uint32_t turn = 0;
   };
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 // A blunt tool a little way in a coarse sheet or slab. Its walls are far from the sheet's vertices,
-// and are no way out.
+// and are not where the vertices leave it.
 namespace palpate::testing {
 namespace {
 

@@ -161,7 +161,7 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
   EXPECT_GE(ofBodies, 12);
 }
 
-/// The feature that leaves last has a contact, wherever rounding puts its way out: turned bodies
+/// The feature that leaves last has a contact, wherever rounding puts its exit: turned bodies
 /// and turned positions, which differ by rounding, have contacts of the same depth.
 TEST(BodyContacts, TheDeepestFeatureHasAContact) {
   Random random(41);

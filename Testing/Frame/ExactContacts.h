@@ -380,8 +380,8 @@ class ExactContacts {
 
   /// How far the vertex and these crossings must move towards the closest point, until all are in
   /// front of it. difference: from there to the vertex.
-  static mpf_class wayOut(const oracle::Vector& difference,
-                          const std::vector<oracle::Vector>& crossings) {
+  static mpf_class exitDistance(const oracle::Vector& difference,
+                                const std::vector<oracle::Vector>& crossings) {
     Rational furthest = 0;
     for (const oracle::Vector& x : crossings)
       furthest = std::max(furthest, oracle::dot(difference, x));
@@ -389,8 +389,21 @@ class ExactContacts {
     return length + mpf_class(furthest, 400) / length;
   }
 
+  static Rational squareToBox(const Vector3d& p, const Moving& others, std::uint32_t t) {
+    const auto& [a, b, c] = others.triangles()[t];
+    Rational square = 0;
+    for (int i = 0; i < 3; ++i) {
+      const auto [lower, upper] = std::minmax({others[a][i], others[b][i], others[c][i]});
+      const Rational beyond = p[i] < lower   ? Rational(lower) - Rational(p[i])
+                              : p[i] > upper ? Rational(p[i]) - Rational(upper)
+                                             : Rational(0);
+      square += beyond * beyond;
+    }
+    return square;
+  }
+
   /// Of the feature in a triangle and all from which no neighbour is nearer, the one with the
-  /// shortest way out; in its lowest triangle.
+  /// shortest exit distance; in its lowest triangle.
   std::uint32_t shortest(const Vector3d& p, std::uint32_t vertex, const Moving& others,
                          std::uint32_t triangle, const std::set<std::uint32_t>& starts,
                          const std::vector<oracle::Vector>& crossings) const {
@@ -398,21 +411,21 @@ class ExactContacts {
     const auto mayHold = [&](std::uint32_t t) {
       return !(m_self && holds(others.triangles()[t], vertex)) && side(others, t, p) < 0;
     };
-    const auto wayTo = [&](std::uint32_t t) {
+    const auto exitAt = [&](std::uint32_t t) {
       const Triangle& corners = others.triangles()[t];
       const oracle::Closest found =
           oracle::vertexTriangle(p, others[corners[0]], others[corners[1]], others[corners[2]]);
-      return wayOut(found.difference, crossings);
+      return exitDistance(found.difference, crossings);
     };
     std::vector<Place> places;
     for (std::uint32_t t = 0; t < count; ++t)
       if (mayHold(t)) places.push_back(place(p, others, t));
     // Which triangles connect with those that the edges cross.
-    const mpf_class reach = wayTo(triangle) * 1.5;
+    const mpf_class reach = exitAt(triangle) * 1.5;
     std::set<std::uint32_t> inReach, reached;
     for (std::uint32_t t = 0; t < count; ++t)
       if (!(m_self && holds(others.triangles()[t], vertex)) &&
-          oracle::root(place(p, others, t).square) <= reach)
+          oracle::root(squareToBox(p, others, t)) <= reach)
         inReach.insert(t);
     for (const std::uint32_t t : starts)
       if (inReach.contains(t)) reached.insert(t);
@@ -436,12 +449,13 @@ class ExactContacts {
     };
     std::stable_sort(places.begin(), places.end(),
                      [](const Place& l, const Place& r) { return l.square < r.square; });
-    mpf_class way = wayTo(triangle);
+    mpf_class exit = exitAt(triangle);
     std::set<std::uint32_t> best = place(p, others, triangle).feature;
     for (const Place& at : places)
-      if (const mpf_class other = wayTo(at.triangle);
-          other < way * (1.0 - kWaySlack) && isLocal(at) && reached.contains(at.triangle)) {
-        way = other;
+      if (const mpf_class other = exitAt(at.triangle); other < exit * (1.0 - kExitDistanceSlack) &&
+                                                       isLocal(at) &&
+                                                       reached.contains(at.triangle)) {
+        exit = other;
         best = at.feature;
       }
     for (std::uint32_t t = 0; t < count; ++t)

@@ -32,8 +32,9 @@ struct ConstraintRow;
 //          has one contact of negative distance: with the nearest feature around the triangles
 //          that its edges pierce, in the lowest triangle of that feature behind which it is. In
 //          the interior its normal is the winding normal, else on that side along the line through
-//          the closest points. Another local minimum of the distance has the contact if it is a
-//          shorter way out also for the places where these edges pierce: the end of a blunt tool.
+//          the closest points. Another local minimum of the distance has the contact if the
+//          vertex and the places where these edges pierce leave there by a shorter distance: at the
+//          end of a blunt tool.
 // Touch    at distance 0, or for an impact without a thickness, the normal can separate the
 //          surfaces, as far as such a normal exists: that of a triangle at either feature, else
 //          the cross product of two edges there, else where features came from. The step,

@@ -170,7 +170,7 @@ TEST(Piercing, ABluntToolLeavesThroughItsEnd) {
   EXPECT_GE(inside, 20u);
 }
 
-/// The far side of a thin bar is nearer to the tip. It is no way out for the needle's sides.
+/// The far side of a thin bar is nearer to the tip. The needle's sides do not leave there.
 TEST(Piercing, ATipDeepInABarLeavesTheWayItCame) {
   for (const double depth : {0.3, 0.7, 0.95}) {
     const TriangleMesh bar = cuboid({-5, -5, -1}, {5, 5, 0});

@@ -272,7 +272,7 @@ TEST(Penetration, LayersAreLeftByTheShortWay) {
   EXPECT_FALSE(Bodies(moved(ball, p.depth * p.direction), plates).penetration().intersecting);
 }
 
-/// Two stacks of plates that reach into each other: one plate's thickness is the way out, not one
+/// Two stacks of plates that reach into each other: one plate's thickness separates them, not one
 /// body's size.
 TEST(Penetration, StacksOfPlatesShiftByOnePlate) {
   for (const double shift : {0.02, 0.5}) {
