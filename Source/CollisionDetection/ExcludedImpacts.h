@@ -131,6 +131,12 @@ class ExcludedImpacts {
     return isExcludedOn(0, c) || isExcludedOn(1, c);
   }
 
+  /// Condition (1) for an impact with this time and distance.
+  bool isInTime(bool isOfFace, double time, double distance, const SidedImpact& c) const {
+    return isOfFace ? time <= c.time + m_pair.settings.continuous.timeTolerance
+                    : std::tie(time, distance) < std::tie(c.time, c.distance);
+  }
+
   /// Calls f(side) for each side whose element another impact may hold for this one, or whose
   /// element this impact may hold for others, until it returns true. A vertex comes first.
   template <class F>
@@ -148,20 +154,17 @@ class ExcludedImpacts {
 
     const ImpactElement& element() const { return m_impact.elements[m_side]; }
 
-    /// Condition (2), of which the others are tested only if it holds.
+    /// Condition (2).
     bool isBeside(const TangentPlane& plane) const {
       return m_rule.isIn(plane, 1 - m_side, m_impact.elements[1 - m_side]);
     }
-    /// The other conditions, for an impact that is not excluded. It holds the held element or a
-    /// part of it, on `side`, which is that of the held element unless a mesh collides with itself.
-    /// plane: planeOf(s, side). lowestGap(plane): the least gap of such impacts that hold parts of
-    /// the held element and have this plane.
+    /// Conditions (3) and (4), for an impact that is not excluded and holds `own`, which is the
+    /// held element or a part of it. plane: its planeOf(). lowestGap(plane): the least gap of such
+    /// impacts that hold parts of the held element and have this plane.
     template <class LowestGap>
-    bool isReplacedBy(const SidedImpact& s, std::size_t side, TangentPlane plane,
-                      LowestGap&& lowestGap) {
-      const ImpactElement &own = s.elements[side], &closest = m_impact.closest[m_side];
+    bool isReplacedBy(const ImpactElement& own, TangentPlane plane, LowestGap&& lowestGap) {
+      const ImpactElement& closest = m_impact.closest[m_side];
       PALPATE_ASSERT(own.isIn(element()));
-      if (!m_rule.isInTime(s, m_impact)) return false;
       if (element().size == 1) return true;
       plane.gap = lowestGap(plane);
       if (!m_rule.isInFront(plane, m_side, element())) return false;
@@ -229,10 +232,6 @@ class ExcludedImpacts {
         length = std::max(length, stableLength(mesh.now[held[i]] - mesh.now[held[j]]));
     return hasRidge(meshOf(1 - side), c.closest[1 - side].feature(), c.upTo(side), length,
                     m_pair.settings.thickness);
-  }
-  bool isInTime(const SidedImpact& s, const SidedImpact& c) const {
-    return s.isOfFace ? s.time <= c.time + m_pair.settings.continuous.timeTolerance
-                      : std::tie(s.time, s.distance) < std::tie(c.time, c.distance);
   }
   bool isIn(const TangentPlane& plane, std::size_t side, const ImpactElement& element) const {
     const TriangleMesh& mesh = meshOf(side);

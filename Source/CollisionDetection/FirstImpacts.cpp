@@ -1,11 +1,14 @@
 #include "CollisionDetection/FirstImpacts.h"
 
 #include "CollisionDetection/ExcludedImpacts.h"
+#include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Proximity.h"
 #include "Math/ClosestPoint.h"
+#include "Math/MeetingAfter.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <numeric>
 #include <tuple>
@@ -30,7 +33,9 @@ ImpactFeatures inOrder(std::uint64_t first, std::uint64_t second, bool swap) {
   return swap ? ImpactFeatures{second, first} : ImpactFeatures{first, second};
 }
 
-constexpr std::uint32_t kNoRow = 0xffffffffu;
+constexpr std::uint32_t kNoRow = 0xffffffffu, kNoPlane = 0xffffffffu;
+/// Of a vertex: whether it may have met the other mesh.
+enum : std::uint8_t { kUnknown, kAsked, kMet };
 
 SidedImpact sidedOf(const VertexTriangleContact& c, std::uint32_t list) { return {c, list == 1}; }
 SidedImpact sidedOf(const EdgeEdgeContact& c, std::uint32_t) { return SidedImpact(c); }
@@ -84,9 +89,12 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
     excluded += m_dropped[list][i] = rule.isExcluded(sided(list, i));
   });
   if (excluded == 0) return;
+  std::size_t stay = 0;
+  forEachImpact([&](std::uint32_t list, std::uint32_t i) { stay += !m_dropped[list][i]; });
   // A mesh with itself has each of its elements on both sides.
-  const auto numberOf = [&](std::size_t side, std::uint32_t vertex) {
-    return side == 1 && !meshes.self() ? meshes.a.now.size() + vertex : vertex;
+  const std::size_t buckets = std::bit_ceil(stay + 1);
+  const auto bucketOf = [&](std::size_t side, std::uint32_t vertex) {
+    return (side == 1 && !meshes.self() ? vertex + buckets / 2 : vertex) & (buckets - 1);
   };
   const auto forEachHolder = [&](auto&& f) {
     forEachImpact([&](std::uint32_t list, std::uint32_t i) {
@@ -94,13 +102,15 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
       const SidedImpact impact = sided(list, i);
       rule.anyHeldSide(impact, [&](std::size_t side) {
         const ImpactElement& element = impact.elements[side];
-        f(3 * numberOf(side, element.ids[0]) + element.size - 1, Holder{list, i, side});
+        f(3 * bucketOf(side, element.ids[0]) + element.size - 1,
+          Holder{list, i, static_cast<std::uint32_t>(side), impact.isOfFace, impact.time,
+                 impact.distance, element, kNoPlane});
         return false;
       });
     });
   };
   // A counting sort: m_starts[n + 1] becomes the end of the holders with key n.
-  m_starts.assign(3 * (meshes.a.now.size() + meshes.b.now.size()) + 2, 0);
+  m_starts.assign(3 * buckets + 2, 0);
   std::size_t holders = 0;
   forEachHolder([&](std::size_t n, const Holder&) {
     ++m_starts[n + 2];
@@ -111,26 +121,30 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
   forEachHolder(
       [&](std::size_t n, const Holder& holder) { m_holders[m_starts[n + 1]++] = holder; });
   m_planes.clear();
-  m_held.clear();
-  for (const Holder& holder : m_holders) {
-    check();
-    const SidedImpact impact = sided(holder.list, holder.index);
-    m_held.push_back(impact.elements[holder.side]);
-    m_planes.push_back(rule.planeOf(impact, holder.side));
-  }
-  // Calls f(number) for the holders of parts of an impact's element, until it returns true. Begins
-  // at the closest vertex: an impact of it mostly stands for this one.
-  const auto anyHolder = [&](const SidedImpact& c, std::size_t side, auto&& f) {
+  const auto planeOf = [&](Holder& holder) {
+    if (holder.plane == kNoPlane) {
+      holder.plane = static_cast<std::uint32_t>(m_planes.size());
+      m_planes.push_back(rule.planeOf(sided(holder.list, holder.index), holder.side));
+    }
+    return m_planes[holder.plane];
+  };
+  // Calls f(holder) for the holders of parts of an impact's element that `isAsked`, until it
+  // returns true. Begins at the closest vertex: an impact of it mostly stands for this one.
+  const auto anyHolder = [&](const SidedImpact& c, std::size_t side, auto&& isAsked, auto&& f) {
+    const ImpactElement& element = c.elements[side];
     const auto anyAt = [&](std::uint32_t vertex) {
-      const ImpactElement& element = c.elements[side];
-      const std::size_t n = 3 * numberOf(side, vertex);
-      for (std::uint32_t i = m_starts[n]; i < m_starts[n + element.size]; ++i)
-        if (m_held[i].isIn(element) && f(i)) return true;
+      const std::size_t n = 3 * bucketOf(side, vertex);
+      for (std::uint32_t i = m_starts[n]; i < m_starts[n + element.size]; ++i) {
+        Holder& holder = m_holders[i];
+        if (holder.element.ids[0] == vertex && (meshes.self() || holder.side == side) &&
+            isAsked(holder) && holder.element.isIn(element) && f(holder))
+          return true;
+      }
       return false;
     };
     const std::uint32_t first = c.closest[side].ids[0];
     if (anyAt(first)) return true;
-    const auto vertices = c.elements[side].vertices();
+    const auto vertices = element.vertices();
     return std::any_of(vertices.begin(), vertices.end(),
                        [&](std::uint32_t vertex) { return vertex != first && anyAt(vertex); });
   };
@@ -140,29 +154,29 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
     m_dropped[list][i] = 0;
     rule.anyHeldSide(c, [&](std::size_t side) {
       ExcludedImpacts::Held held(rule, c, side);
-      const auto impactOf = [&](std::uint32_t number) {
-        return sided(m_holders[number].list, m_holders[number].index);
-      };
       const auto lowestGap = [&](const TangentPlane& plane) {
         double gap = plane.gap;
-        anyHolder(c, side, [&](std::uint32_t other) {
-          const TangentPlane& its = m_planes[other];
+        const auto isLower = [&](Holder& other) {
+          const TangentPlane its = planeOf(other);
           if (its.gap < gap && plane.isSameAs(its)) gap = its.gap;
           return false;
-        });
+        };
+        anyHolder(
+            c, side, [](const Holder&) { return true; }, isLower);
         return gap;
       };
-      return anyHolder(c, side,
-                       [&](std::uint32_t number) {
-                         const Holder& holder = m_holders[number];
-                         if (!held.isBeside(m_planes[number]) ||
-                             !held.isReplacedBy(impactOf(number), holder.side, m_planes[number],
-                                                lowestGap))
-                           return false;
-                         m_dropped[list][i] = 1;
-                         m_standIns.push_back({{list, i}, {holder.list, holder.index}});
-                         return true;
-                       }) &&
+      const auto isInTime = [&](const Holder& holder) {
+        return rule.isInTime(holder.isOfFace, holder.time, holder.distance, c);
+      };
+      const auto stands = [&](Holder& holder) {
+        const TangentPlane plane = planeOf(holder);
+        if (!held.isBeside(plane) || !held.isReplacedBy(holder.element, plane, lowestGap))
+          return false;
+        m_dropped[list][i] = 1;
+        m_standIns.push_back({{list, i}, {holder.list, holder.index}});
+        return true;
+      };
+      return anyHolder(c, side, isInTime, stands) &&
              c.vertexSide < 2;  // of two edges, both are held
     });
   });
@@ -185,9 +199,28 @@ EdgeEdgeContact atEnd(const MeshPair& meshes, const EdgeEdgeContact& c, bool) {
       finiteEdgeEdgeDistance(a[c.edgeA[0]], a[c.edgeA[1]], b[c.edgeB[0]], b[c.edgeB[1]]));
 }
 
-/// How far the closest points move apart along the normal until the step's end.
+ImpactQuery queryOf(const MeshPair& meshes, const VertexTriangleContact& c, bool swapped) {
+  const Features<ImpactQuery::Kind::VertexTriangle> features{swapped ? meshes.b : meshes.a,
+                                                             swapped ? meshes.a : meshes.b};
+  return features.query(c.vertex, c.triangle);
+}
+ImpactQuery queryOf(const MeshPair& meshes, const EdgeEdgeContact& c, bool) {
+  const auto step = [](const TriangleMesh& mesh, std::uint32_t v) {
+    return ImpactQuery::Step{mesh.before[v], mesh.now[v]};
+  };
+  const auto& [p, q] = c.edgeA;
+  const auto& [r, s] = c.edgeB;
+  return {ImpactQuery::Kind::EdgeEdge,
+          {step(meshes.a, p), step(meshes.a, q), step(meshes.b, r), step(meshes.b, s)}};
+}
+
+/// How an impact's closest points move until the step's end, relative to each other.
+struct RestOfStep {
+  double along;   ///< L: apart, along the normal
+  double square;  ///< L²
+};
 template <class Contact>
-double separationUntilEnd(const MeshPair& meshes, const Contact& c, bool swapped) {
+RestOfStep restOfStep(const MeshPair& meshes, const Contact& c, bool swapped) {
   const Stencil s = stencil(c);
   constexpr std::size_t kFirst = std::is_same_v<Contact, EdgeEdgeContact> ? 2 : 1;
   Eigen::Vector3d moved = Eigen::Vector3d::Zero();
@@ -195,48 +228,102 @@ double separationUntilEnd(const MeshPair& meshes, const Contact& c, bool swapped
     const TriangleMesh& mesh = (i < kFirst) != swapped ? meshes.a : meshes.b;
     moved += s.weights[i] * (mesh.now[s.vertices[i]] - mesh.before[s.vertices[i]]);
   }
-  return (1.0 - c.timeOfImpact) * c.normal.dot(moved);
+  const double time = 1.0 - c.timeOfImpact;
+  return {time * c.normal.dot(moved), time * time * moved.squaredNorm()};
+}
+
+/// Whether an impact's features may meet in the rest of the step. They do if the closest points
+/// pass each other, rather along the normal than across it.
+template <class Contact>
+bool mayMeet(const MeshPair& meshes, const Contact& c, bool swapped, const RestOfStep& rest) {
+  const double radii = meshes.a.largestRadius + meshes.b.largestRadius;
+  if (rest.along <= -(c.distance + radii) && 2.0 * rest.along * rest.along >= rest.square)
+    return true;
+  return mayMeetAfter(queryOf(meshes, c, swapped), c.timeOfImpact, c.normal, c.distance + radii,
+                      radii);
 }
 
 }  // namespace
 
-void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const MetVertices& met,
-                               const OrderScratch& ordered,
+void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const OrderScratch& ordered,
                                const CollisionData::Contents& contents) {
   const double radii = meshes.a.largestRadius + meshes.b.largestRadius;
   TimeCheck check(ordered.deadline, 64);
-  const auto mayMeet = [&](const SidedImpact& impact) {
-    for (std::size_t side = 0; side < 2; ++side)
-      for (const std::uint32_t v : impact.elements[side].vertices())
-        if (std::binary_search(met[side].begin(), met[side].end(), v)) return true;
-    return false;
+  // Calls f(state) for the vertices of an impact, and returns whether any call did.
+  const auto anyVertex = [&](const auto& c, std::uint32_t list, auto&& f) {
+    const bool swapped = list == 1;
+    bool any = false;
+    const auto visit = [&](bool ofB, const auto& vertices) {
+      for (const std::uint32_t v : vertices) any |= f(m_met[ofB && !meshes.self()][v]);
+    };
+    if constexpr (requires { c.vertex; }) {
+      visit(swapped, std::array{c.vertex});
+      visit(!swapped, c.vertices);
+    } else {
+      visit(false, c.edgeA);
+      visit(true, c.edgeB);
+    }
+    return any;
   };
-  m_endRows.clear();
-  m_nearest.clear();
-  m_listOfRows.clear();
+  const std::array<std::size_t, 2> sizes{meshes.a.now.size(), meshes.b.now.size()};
+  for (std::size_t side = 0; side < 2; ++side)
+    if (m_isMarked)  // a deadline ended the last call
+      m_met[side].assign(sizes[side], kUnknown);
+    else if (m_met[side].size() < sizes[side])
+      m_met[side].resize(sizes[side], kUnknown);
+  m_isMarked = true;
+  m_candidates.clear();
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     m_endRowOf[list].assign(contacts.size(), kNoRow);
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       const auto& c = contacts[i];
       if (m_dropped[list][i] || !isImpact(c, list, i, end, ordered)) continue;
       check();
-      if (mayMeet(sidedOf(c, list))) continue;
+      const RestOfStep rest = restOfStep(meshes, c, list == 1);
+      if (mayMeet(meshes, c, list == 1, rest)) continue;
       const double gap = atEnd(meshes, c, list == 1).distance - radii;
-      if (!meshes.settings.smoothNormals &&
-          !(c.distance + separationUntilEnd(meshes, c, list == 1) < gap))
-        continue;
-      m_endRowOf[list][i] = static_cast<std::uint32_t>(m_endRows.size());
-      m_endRows.push_back({0, stencil(c), c.normal, gap});
-      m_listOfRows.push_back(list);
-      m_nearest.push_back({list, i});
+      if (!meshes.settings.smoothNormals && !(c.distance + rest.along < gap)) continue;
+      m_candidates.push_back({{list, i}, gap});
+      anyVertex(c, list, [](std::uint8_t& met) { return met = kAsked; });
     }
   });
-  if (m_endRows.empty()) return;
+  m_endRows.clear();
+  m_nearest.clear();
+  m_listOfRows.clear();
+  m_isMarked = !m_candidates.empty();
+  if (!m_isMarked) return;
+  forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
+    for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+      const auto& c = contacts[i];
+      if (!isImpact(c, list, i, end, ordered)) continue;
+      check();
+      if (anyVertex(c, list, [](std::uint8_t met) { return met == kAsked; }) &&
+          mayMeet(meshes, c, list == 1, restOfStep(meshes, c, list == 1)))
+        anyVertex(c, list, [](std::uint8_t& met) {
+          if (met == kAsked) met = kMet;
+          return false;
+        });
+    }
+  });
   const auto withContact = [&](const Place& place, auto&& f) {
     forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
       if (list == place.list) f(contacts[place.index], list);
     });
   };
+  for (const Candidate& candidate : m_candidates)
+    withContact(candidate.place, [&](const auto& c, std::uint32_t list) {
+      if (anyVertex(c, list, [](std::uint8_t met) { return met == kMet; })) return;
+      m_endRowOf[list][candidate.place.index] = static_cast<std::uint32_t>(m_endRows.size());
+      m_endRows.push_back({0, stencil(c), c.normal, candidate.gap});
+      m_listOfRows.push_back(list);
+      m_nearest.push_back(candidate.place);
+    });
+  for (const Candidate& candidate : m_candidates)
+    withContact(candidate.place, [&](const auto& c, std::uint32_t list) {
+      anyVertex(c, list, [](std::uint8_t& met) { return met = kUnknown; });
+    });
+  m_isMarked = false;
+  if (m_endRows.empty()) return;
   for (const StandIn& each : m_standIns) {
     check();
     const Place &dropped = each.dropped, &standIn = each.kept;
@@ -271,8 +358,8 @@ void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const MetVert
   }
 }
 
-void FirstImpacts::keep(const MeshPair& meshes, double end, const MetVertices& met,
-                        const OrderScratch& ordered, CollisionData::Contents& contents) {
+void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& ordered,
+                        CollisionData::Contents& contents) {
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     PALPATE_ASSERT(ordered.preferred[list].empty() ||
                    ordered.preferred[list].size() == contacts.size());
@@ -317,7 +404,7 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const MetVertices& m
   auto& endRows = contents.step.endRows;
   endRows.clear();
   const bool moves = meshes.step.motion > 0.0;
-  if (moves) findEndRows(meshes, end, met, ordered, contents);
+  if (moves) findEndRows(meshes, end, ordered, contents);
   std::uint32_t number = 0;
   forEachImpactList(contents, [&](auto& contacts, std::uint32_t list) {
     std::size_t kept = 0;

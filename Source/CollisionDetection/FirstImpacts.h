@@ -11,7 +11,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 
 namespace palpate {
 
@@ -24,9 +23,6 @@ namespace palpate {
 using ImpactFeatures = std::array<std::uint64_t, 2>;
 std::optional<ImpactFeatures> sharedFeatures(const VertexTriangleContact&, bool swapped, bool self);
 std::optional<ImpactFeatures> sharedFeatures(const EdgeEdgeContact&, bool self);
-
-/// Sorted vertices of features that may meet in the step, by the side of the pair.
-using MetVertices = std::array<std::span<const std::uint32_t>, 2>;
 
 /// Calls f(list, number) for the three lists of contacts between meshes.
 template <class Lists, class F>
@@ -57,8 +53,7 @@ class FirstImpacts {
   /// preferred buffers are kept, and so are contacts with a time of impact of at least `end`. No
   /// contact is dropped because of one of these. Drops ExcludedImpacts first: they stand for no
   /// other.
-  void keep(const MeshPair&, double end, const MetVertices&, const OrderScratch&,
-            CollisionData::Contents&);
+  void keep(const MeshPair&, double end, const OrderScratch&, CollisionData::Contents&);
 
  private:
   struct Entry {
@@ -72,27 +67,39 @@ class FirstImpacts {
   struct StandIn {
     Place dropped, kept;
   };
+  /// An impact that stays, whose row asks for more than its features need.
+  struct Candidate {
+    Place place;
+    double gap;  ///< L: at the step's end
+  };
   void dropExcluded(const MeshPair&, double end, const OrderScratch&,
                     const CollisionData::Contents&);
-  void findEndRows(const MeshPair&, double end, const MetVertices&, const OrderScratch&,
+  void findEndRows(const MeshPair&, double end, const OrderScratch&,
                    const CollisionData::Contents&);
 
   /// An impact that is not excluded, and the side of the element that it holds.
   struct Holder {
-    std::uint32_t list, index;
-    std::size_t side;
+    std::uint32_t list, index, side;
+    bool isOfFace;
+    double time, distance;
+    ImpactElement element;
+    std::uint32_t plane;  ///< of m_planes; kNoPlane: not needed yet
   };
   Buffer<Entry> m_entries;
-  Buffer<Holder> m_holders;                       ///< by the first vertex and size of the element
-  Buffer<ImpactElement> m_held;                   ///< the elements of m_holders
-  Buffer<TangentPlane> m_planes;                  ///< of m_holders
-  Buffer<std::uint32_t> m_starts;                 ///< of each vertex, in m_holders
+  Buffer<Holder> m_holders;                       ///< by the bucket of the element's first vertex
+  Buffer<TangentPlane> m_planes;                  ///< of some m_holders
+  Buffer<std::uint32_t> m_starts;                 ///< of each bucket and size, in m_holders
   std::array<Buffer<std::uint8_t>, 3> m_dropped;  ///< by list and index
   /// By list and index, of contacts that are dropped for another one with their features: that one.
   std::array<Buffer<Place>, 3> m_sameFeatures;
   Buffer<StandIn> m_standIns;                       ///< of all dropped contacts
   std::array<Buffer<std::uint32_t>, 3> m_endRowOf;  ///< by list and index: in m_endRows
   Buffer<CollisionData::Contents::Step::EndRow> m_endRows;
+  Buffer<Candidate> m_candidates;
+  /// By side and vertex: whether the vertex of a candidate may have met the other mesh. Between
+  /// calls all are unknown.
+  std::array<Buffer<std::uint8_t>, 2> m_met;
+  bool m_isMarked = false;             ///< not all are
   Buffer<Place> m_nearest;             ///< of m_endRows: the pair with this gap
   Buffer<std::uint32_t> m_listOfRows;  ///< of m_endRows
 };

@@ -42,8 +42,6 @@ void PairResults::sortFacts(const PairRecord& record) {
   const TriangleMesh &a = record.a->body.mesh, &b = record.b->body.mesh;
   sortUnique(m_facts.verticesA, a.now.size(), m_flags);
   sortUnique(m_facts.verticesB, b.now.size(), m_flags);
-  sortUnique(m_facts.metA, a.now.size(), m_flags);
-  sortUnique(m_facts.metB, b.now.size(), m_flags);
   sortUnique(m_facts.degenerateA, a.topology.elements.size(), m_flags);
   sortUnique(m_facts.degenerateB, b.topology.elements.size(), m_flags);
 }
@@ -69,8 +67,7 @@ void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& stati
 void PairResults::keepFirstImpacts(PairRecord& record, double end) {
   const MeshPair pair = record.meshes();
   if (!pair.reportsDistinct()) return;
-  const MetVertices met{m_facts.metA, pair.self() ? m_facts.metA : m_facts.metB};
-  m_firstImpacts.keep(pair, end, met, m_orderScratch, CollisionData::Contents::of(record.next));
+  m_firstImpacts.keep(pair, end, m_orderScratch, CollisionData::Contents::of(record.next));
 }
 
 void keepDistinct(const PairRecord& record, DistinctContacts& distinct,

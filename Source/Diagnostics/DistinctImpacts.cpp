@@ -49,8 +49,9 @@ class ExcludedByBruteForce {
       };
       ExcludedImpacts::Held held(m_rule, c, side);
       return std::any_of(holders.begin(), holders.end(), [&](const Holder& s) {
-        return held.isBeside(planeOf(s)) &&
-               held.isReplacedBy(s.impact, s.side, planeOf(s), lowestGap);
+        return m_rule.isInTime(s.impact.isOfFace, s.impact.time, s.impact.distance, c) &&
+               held.isBeside(planeOf(s)) &&
+               held.isReplacedBy(s.impact.elements[s.side], planeOf(s), lowestGap);
       });
     });
   }

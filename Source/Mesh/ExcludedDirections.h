@@ -15,20 +15,31 @@ namespace palpate {
 inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
                               const Eigen::Vector3d& direction, double time) {
   const std::uint32_t p = feature[0], q = feature[1];
+  const MeshTopology& topology = mesh.topology;
   const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
     return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
   };
-  const Eigen::Vector3d start = at(p), end = p == q ? start : at(q);
-  const auto leadsTo = [&](std::uint32_t corner) {
-    if (corner == p || corner == q) return false;
-    return p == q ? leadsTowards(direction, start, at(corner))
-                  : leadsInto(direction, start, end, at(corner));
-  };
-  const auto around = mesh.topology.vertexTriangles[p];
+  const auto around = topology.vertexTriangles[p];
+  const Eigen::Vector3d start = at(p);
+  if (p != q) {
+    const Eigen::Vector3d end = at(q);
+    return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+      const Triangle& corners = topology.elements[triangle];
+      return std::find(corners.begin(), corners.end(), q) != corners.end() &&
+             std::any_of(corners.begin(), corners.end(), [&](std::uint32_t corner) {
+               return corner != p && corner != q && leadsInto(direction, start, end, at(corner));
+             });
+    });
+  }
+  // Of a closed star, each edge from p leads to the next corner of one triangle.
+  const bool isClosed = topology.hasClosedStar[p] != 0;
   return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
-    const Triangle& corners = mesh.topology.elements[triangle];
-    return std::find(corners.begin(), corners.end(), q) != corners.end() &&
-           std::any_of(corners.begin(), corners.end(), leadsTo);
+    const Triangle& corners = topology.elements[triangle];
+    const auto leadsTo = [&](std::uint32_t corner) {
+      return corner != p && leadsTowards(direction, start, at(corner));
+    };
+    if (isClosed) return leadsTo(corners[p == corners[0] ? 1 : p == corners[1] ? 2 : 0]);
+    return std::any_of(corners.begin(), corners.end(), leadsTo);
   });
 }
 

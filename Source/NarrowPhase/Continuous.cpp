@@ -151,9 +151,7 @@ class ContactFinder {
     };
     if (m_pair.settings.continuous.earliestTimeOnly) m_out.facts.clearance = 0.0;
     const auto isSuppressed = [&](const auto& closest, const Vector3d& direction, bool rejected) {
-      if (store)
-        m_check.recordImpact(features, firstId, secondId, time, closest.distance,
-                             closest.difference);
+      if (store) m_check.recordImpact(features, firstId, secondId, time, closest.distance);
       return rejected || ((m_pair.a.outerSideOnly || m_pair.b.outerSideOnly) &&
                           pointsInward(m_pair, closestFeatures, direction, time));
     };

@@ -15,8 +15,7 @@ void StepFacts::clear() {
   gapAtStart = std::numeric_limits<double>::infinity();
   atStart = Meeting::Apart;
   sideUnknown = false;
-  for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB, &metA, &metB})
-    list->clear();
+  for (auto* list : {&verticesA, &verticesB, &degenerateA, &degenerateB}) list->clear();
 }
 
 void StepFacts::add(const StepFacts& other) {
@@ -25,7 +24,7 @@ void StepFacts::add(const StepFacts& other) {
   atStart = std::max(atStart, other.atStart);
   sideUnknown |= other.sideUnknown;
   for (auto list : {&StepFacts::verticesA, &StepFacts::verticesB, &StepFacts::degenerateA,
-                    &StepFacts::degenerateB, &StepFacts::metA, &StepFacts::metB})
+                    &StepFacts::degenerateB})
     (this->*list).insert((this->*list).end(), (other.*list).begin(), (other.*list).end());
 }
 

@@ -122,7 +122,6 @@ struct StepFacts {
   bool startsPiercing() const { return atStart == Meeting::Piercing; }
   Buffer<std::uint32_t> verticesA, verticesB;      ///< of features that may have touched
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
-  Buffer<std::uint32_t> metA, metB;  ///< Distinct: vertices of features that may meet in the step
   void clear();
   void add(const StepFacts&);
   /// Adds what was found about a shape. atStart: with Continuous.

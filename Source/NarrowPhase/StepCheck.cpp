@@ -2,11 +2,12 @@
 
 #include "Math/ClosestPoint.h"
 #include "Math/MotionBound.h"
-#include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
 #include <Eigen/Geometry>
+
+#include <algorithm>
 
 namespace palpate {
 
@@ -29,105 +30,35 @@ bool StepCheck::addImpactIfTouched(const Features<kind>& features, std::uint32_t
   if (m_pair.step.reportsImpacts)
     return addImpact(m_pair, features, firstId, secondId, swapped, m_out);
   m_out.facts.clearance = 0.0;
-  recordVertices(features, firstId, secondId, m_out.facts.verticesA, m_out.facts.verticesB);
+  recordVertices(features, firstId, secondId);
   return false;
 }
 
 template <Kind kind>
 void StepCheck::recordVertices(const Features<kind>& features, std::uint32_t firstId,
-                               std::uint32_t secondId, Buffer<std::uint32_t>& listA,
-                               Buffer<std::uint32_t>& listB) {
+                               std::uint32_t secondId) {
   const auto vertices = features.vertices(firstId, secondId);
   for (int i = 0; i < 4; ++i) {
     const bool ofB = !m_pair.self() && &features.meshOf(i) == &m_pair.b;
-    (ofB ? listB : listA).push_back(vertices[i]);
+    (ofB ? m_out.facts.verticesB : m_out.facts.verticesA).push_back(vertices[i]);
   }
-}
-
-/// Whether a plane with this normal separates the features by the distance at a time of the step.
-/// The normal leads from the second feature to the first.
-template <Kind kind>
-static bool isSeparating(const ImpactQuery& query, double time, const Vector3d& normal,
-                         double distance) {
-  constexpr int kFirst = kind == Kind::VertexTriangle ? 1 : 2;
-  for (int i = 0; i < kFirst; ++i)
-    for (int j = kFirst; j < 4; ++j) {
-      const auto &p = query.vertices[i], &q = query.vertices[j];
-      const Vector3d between = (1.0 - time) * (p.before - q.before) + time * (p.now - q.now);
-      const double error = kMotionError * (between.lpNorm<1>() + (p.now - q.now).lpNorm<1>() +
-                                           (p.before - q.before).lpNorm<1>());
-      if (!(normal.dot(between) > (distance + error) * normal.norm())) return false;
-    }
-  return true;
-}
-
-/// From the second feature to the first, at their closest points at a time of the step.
-template <Kind kind>
-static Vector3d differenceAt(const ImpactQuery& query, double time) {
-  const auto at = [&](int i) -> Vector3d {
-    return (1.0 - time) * query.vertices[i].before + time * query.vertices[i].now;
-  };
-  if constexpr (kind == Kind::VertexTriangle)
-    return finiteVertexTriangleDistance(at(0), at(1), at(2), at(3)).difference;
-  else
-    return finiteEdgeEdgeDistance(at(0), at(1), at(2), at(3)).difference;
-}
-
-/// Whether features may come within their radii between two times of the step. They do not if one
-/// plane separates them at both: the vertices move in straight lines. The interval is halved a few
-/// times. first, last: unit, between the closest points at both times.
-template <Kind kind>
-static bool mayMeet(const ImpactQuery& query, double begin, double end, const Vector3d& first,
-                    const Vector3d& last, double radii, int halvings) {
-  for (const Vector3d& normal : {Vector3d(first + last), last, first})
-    if (isSeparating<kind>(query, end, normal, radii) &&
-        isSeparating<kind>(query, begin, normal, radii))
-      return false;
-  if (halvings == 0) return true;
-  const double middle = 0.5 * (begin + end);
-  const Vector3d between = stableUnit(differenceAt<kind>(query, middle));
-  return mayMeet<kind>(query, begin, middle, first, between, radii, halvings - 1) ||
-         mayMeet<kind>(query, middle, end, between, last, radii, halvings - 1);
-}
-
-/// Whether features may come within their radii after a time of the step.
-template <Kind kind>
-static bool mayMeet(const ImpactQuery& query, double time, const Vector3d& difference,
-                    double radii) {
-  const Vector3d first = stableUnit(difference);
-  if (isSeparating<kind>(query, 1.0, first, radii) && isSeparating<kind>(query, time, first, radii))
-    return false;
-  constexpr int kHalvings = 3;
-  return mayMeet<kind>(query, time, 1.0, first, stableUnit(differenceAt<kind>(query, 1.0)), radii,
-                       kHalvings);
 }
 
 template <Kind kind>
 void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t firstId,
-                             std::uint32_t secondId, double time, double distance,
-                             const Vector3d& difference) {
+                             std::uint32_t secondId, double time, double distance) {
   const StepPlan& step = m_pair.step;
   PALPATE_ASSERT(time >= 0.0 && time <= 1.0 && distance >= 0.0);
   const double rounding = step.motionWithRounding - step.motion;
   double &clearance = m_out.facts.clearance, &gap = m_out.facts.gapAtStart;
   if (time == 0.0)
     gap = std::min(gap, distance - (m_pair.a.largestRadius + m_pair.b.largestRadius) - rounding);
-  const double radii = m_pair.a.largestRadius + m_pair.b.largestRadius;
-  const bool findsMeetings = m_pair.reportsDistinct();
-  if (clearance == 0.0 && !step.reportsImpacts && !findsMeetings) return;
-  double left = (1.0 - time) * step.motion + rounding;
-  const bool isNear = distance <= left;
-  double own = left;  // a bound for these features
-  if (isNear || (findsMeetings && distance <= left + radii))
-    own = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
-  if (findsMeetings && distance <= own + radii &&
-      mayMeet<kind>(features.query(firstId, secondId), time, difference, radii))
-    recordVertices(features, firstId, secondId, m_out.facts.metA, m_out.facts.metB);
   if (clearance == 0.0 && !step.reportsImpacts) return;
-  if (isNear) left = own;
+  double left = (1.0 - time) * step.motion + rounding;
+  if (distance <= left)
+    left = (1.0 - time) * motionBound<kind>(features.query(firstId, secondId)) + rounding;
   clearance = std::min(clearance, std::max(0.0, distance - left));
-  if (step.reportsImpacts && distance <= left)
-    recordVertices(features, firstId, secondId, m_out.facts.verticesA, m_out.facts.verticesB);
+  if (step.reportsImpacts && distance <= left) recordVertices(features, firstId, secondId);
 }
 
 void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
@@ -200,9 +131,9 @@ void StepCheck::recordEdges(const Segment& p, const Segment& q) {
 }
 
 template void StepCheck::recordImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,
-                                      std::uint32_t, double, double, const Vector3d&);
+                                      std::uint32_t, double, double);
 template void StepCheck::recordImpact(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
-                                      double, double, const Vector3d&);
+                                      double, double);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::VertexTriangle>&, std::uint32_t,
                                             std::uint32_t, bool, double);
 template bool StepCheck::addImpactIfTouched(const Features<Kind::EdgeEdge>&, std::uint32_t,

@@ -56,11 +56,10 @@ class StepCheck {
                          std::uint32_t secondId) const;
 
   /// Records an impact: lowers the clearance to what the rest of the step may leave of the
-  /// distance, and at the step's start the gap. With Contacts::Distinct also the vertices of
-  /// features that may meet. difference: from the second feature's closest point to the first's.
+  /// distance, and at the step's start the gap.
   template <ImpactQuery::Kind kind>
   void recordImpact(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
-                    double time, double distance, const Eigen::Vector3d& difference);
+                    double time, double distance);
 
   /// Records the triangle of a contact if it has no area.
   void recordTriangle(std::uint32_t triangle, bool isOfB, const Eigen::Vector3d& a,
@@ -78,8 +77,7 @@ class StepCheck {
   bool mayTouchInStep(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                       double distance) const;
   template <ImpactQuery::Kind kind>
-  void recordVertices(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
-                      Buffer<std::uint32_t>& ofA, Buffer<std::uint32_t>& ofB);
+  void recordVertices(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId);
 
   const MeshPair& m_pair;
   ContactBuffers& m_out;
