@@ -90,7 +90,7 @@ stage packages CMake/packages.sh "${sets[@]}" || exit 1
 modules=(-DPALPATE_BUILD_EXAMPLES=OFF "-DPALPATE_TEST_FOLDERS=C;Consumer;Exact;Fcl;Frame;Golden;Python;Regression;Unit;Vtk")
 tested=modules
 ((all)) && modules=() tested=release
-build release -UPALPATE_WITH_{VTK,FCL,PYTHON} -UPALPATE_BUILD_TESTING "${modules[@]}"
+build release -UPALPATE_WITH_{VTK,FCL,PYTHON,SIMPLIFY} -UPALPATE_BUILD_TESTING "${modules[@]}"
 if ((all)); then
   # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
   configuration scalar -DBUILD_SHARED_LIBS=OFF
