@@ -314,6 +314,7 @@ int compare(const char* path) {
       std::printf("Golden: %zu hashes compared (%s, %d threads)\n", found.size(), simd.c_str(),
                   threads);
     }
+  if (failures != 0) std::printf("Golden: %d hashes differ; see above\n", failures);
   return failures == 0 ? 0 : 1;
 }
 
