@@ -71,7 +71,9 @@ def drawQueries(rows, folder):
     """A bar from the smallest to the largest ratio of 10 thousand, 100 thousand and a million elements, with the fastest library."""
     ratios = {}
     for scene, times in timesOf(rows, "spatial", "us").items():
-        others = {engine: time for engine, time in times.items() if engine != "Palpate"}
+        others = {engine: time for engine, time in times.items() if not engine.startswith("Palpate")}
+        if not others:
+            continue
         engine = min(others, key=others.get)
         ratios.setdefault(scene.split(" ", 1)[1].replace("minimum distance", "min. distance"), []).append((others[engine] / times["Palpate"], engine.split()[0]))
     figure, axes = prepare(list(ratios), "Spatial queries",
