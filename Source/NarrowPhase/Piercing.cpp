@@ -166,22 +166,23 @@ class NearestInFront {
   void shorten(std::span<const PiercingContacts::Behind> crossings,
                PiercingContacts::Scratch& scratch) {
     findCrossings(crossings, scratch.crossings);
-    double exit = exitDistance(scratch.crossings);
-    const double reach = kExitReach * exit;
-    exit *= 1.0 - kExitDistanceSlack;
-    findNearer(exit, reach, crossings, scratch);
+    double shortest = exitDistance(scratch.crossings);
+    const double reach = kExitReach * shortest;
+    shortest *= 1.0 - kExitDistanceSlack;
+    findNearer(shortest, reach, crossings, scratch);
     auto& nearer = scratch.nearer;
     auto best = std::pair(m_triangle, m_nearest);
     bool isBetter = false;
     std::make_heap(nearer.begin(), nearer.end(), std::greater<>());
     // No exit distance is shorter than the distance.
-    for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < exit; --end) {
+    for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < shortest;
+         --end) {
       std::pop_heap(nearer.begin(), end, std::greater<>());
       m_triangle = std::prev(end)->triangle;
       m_nearest = measure(m_triangle);
       const double other = exitDistance(scratch.crossings);
-      if (!(other < exit) || goesOn()) continue;
-      exit = (1.0 - kExitDistanceSlack) * other;
+      if (!(other < shortest) || goesOn()) continue;
+      shortest = (1.0 - kExitDistanceSlack) * other;
       best = {m_triangle, m_nearest};
       isBetter = true;
     }
@@ -235,8 +236,9 @@ class NearestInFront {
     return furthest - at.distance;
   }
   /// Of the triangles that others, with boxes at most `distance` away, connect with one that the
-  /// edges cross, those that are nearer than `exit` and behind which the vertex is.
-  void findNearer(double exit, double distance, std::span<const PiercingContacts::Behind> crossings,
+  /// edges cross, those that are nearer than `shortest` and behind which the vertex is.
+  void findNearer(double shortest, double distance,
+                  std::span<const PiercingContacts::Behind> crossings,
                   PiercingContacts::Scratch& scratch) const {
     const MeshTopology& topology = m_mesh.topology;
     Buffer<PiercingContacts::Near>& nearer = scratch.nearer;
@@ -256,8 +258,8 @@ class NearestInFront {
     nearer.clear();
     reached.clear();
     // Without squares, all that is connected is measured.
-    const double reachSquare = distance * distance, exitSquare = exit * exit;
-    const bool squaresHold = std::isnormal(exitSquare) && std::isfinite(reachSquare);
+    const double reachSquare = distance * distance, shortestSquare = shortest * shortest;
+    const bool squaresHold = std::isnormal(shortestSquare) && std::isfinite(reachSquare);
     const auto reach = [&](std::uint32_t t) {
       if (std::exchange(triangleTurns[t], turn) == turn || !topology.isEnabled(t)) return;
       const Corners corners = m_mesh.corners(t);
@@ -265,9 +267,9 @@ class NearestInFront {
       if ((squaresHold && least > reachSquare) || m_pair.excludesVertex(m_vertex, t)) return;
       for (const std::uint32_t corner : topology.elements[t])
         if (std::exchange(vertexTurns[corner], turn) != turn) reached.push_back(corner);
-      if (squaresHold && (least >= exitSquare || isOutOfReach(corners, exitSquare))) return;
+      if (squaresHold && (least >= shortestSquare || isOutOfReach(corners, shortestSquare))) return;
       const double found = measure(t).distance;
-      if (found < exit && isAllowed(t)) nearer.push_back({found, t});
+      if (found < shortest && isAllowed(t)) nearer.push_back({found, t});
     };
     for (const auto& crossing : crossings) reach(crossing.triangle);
     for (std::size_t i = 0; i < reached.size(); ++i)

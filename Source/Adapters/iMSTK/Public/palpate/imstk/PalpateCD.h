@@ -20,8 +20,7 @@ namespace palpate {
 ///          (triangle). parentId is the lowest cell of the mesh that has these vertices. Of a
 ///          shape: a PointDirection, with a PointIndexDirection for a vertex, or a CellIndex for an
 ///          edge or triangle. Two shapes: a PointDirection for each.
-/// Depth    positive where they overlap. `dir` of a side is the direction in which that side
-/// leaves.
+/// Depth    positive where they overlap. `dir` of a side is the direction in which it leaves.
 class PALPATE_EXPORT PalpateCD : public imstk::CCDAlgorithm {
  public:
   PalpateCD();
