@@ -214,13 +214,9 @@ ImpactQuery queryOf(const MeshPair& meshes, const EdgeEdgeContact& c, bool) {
           {step(meshes.a, p), step(meshes.a, q), step(meshes.b, r), step(meshes.b, s)}};
 }
 
-/// How an impact's closest points move until the step's end, relative to each other.
-struct RestOfStep {
-  double along;   ///< L: apart, along the normal
-  double square;  ///< L²
-};
+/// How far the closest points move apart along the normal until the step's end.
 template <class Contact>
-RestOfStep restOfStep(const MeshPair& meshes, const Contact& c, bool swapped) {
+double separationUntilEnd(const MeshPair& meshes, const Contact& c, bool swapped) {
   const Stencil s = stencil(c);
   constexpr std::size_t kFirst = std::is_same_v<Contact, EdgeEdgeContact> ? 2 : 1;
   Eigen::Vector3d moved = Eigen::Vector3d::Zero();
@@ -228,17 +224,13 @@ RestOfStep restOfStep(const MeshPair& meshes, const Contact& c, bool swapped) {
     const TriangleMesh& mesh = (i < kFirst) != swapped ? meshes.a : meshes.b;
     moved += s.weights[i] * (mesh.now[s.vertices[i]] - mesh.before[s.vertices[i]]);
   }
-  const double time = 1.0 - c.timeOfImpact;
-  return {time * c.normal.dot(moved), time * time * moved.squaredNorm()};
+  return (1.0 - c.timeOfImpact) * c.normal.dot(moved);
 }
 
-/// Whether an impact's features may meet in the rest of the step. They do if the closest points
-/// pass each other, rather along the normal than across it.
+/// Whether an impact's features may meet in the rest of the step.
 template <class Contact>
-bool mayMeet(const MeshPair& meshes, const Contact& c, bool swapped, const RestOfStep& rest) {
+bool mayMeet(const MeshPair& meshes, const Contact& c, bool swapped) {
   const double radii = meshes.a.largestRadius + meshes.b.largestRadius;
-  if (rest.along <= -(c.distance + radii) && 2.0 * rest.along * rest.along >= rest.square)
-    return true;
   return mayMeetAfter(queryOf(meshes, c, swapped), c.timeOfImpact, c.normal, c.distance + radii,
                       radii);
 }
@@ -279,10 +271,11 @@ void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const OrderSc
       const auto& c = contacts[i];
       if (m_dropped[list][i] || !isImpact(c, list, i, end, ordered)) continue;
       check();
-      const RestOfStep rest = restOfStep(meshes, c, list == 1);
-      if (mayMeet(meshes, c, list == 1, rest)) continue;
       const double gap = atEnd(meshes, c, list == 1).distance - radii;
-      if (!meshes.settings.smoothNormals && !(c.distance + rest.along < gap)) continue;
+      if (!meshes.settings.smoothNormals &&
+          !(c.distance + separationUntilEnd(meshes, c, list == 1) < gap))
+        continue;
+      if (mayMeet(meshes, c, list == 1)) continue;
       m_candidates.push_back({{list, i}, gap});
       anyVertex(c, list, [](std::uint8_t& met) { return met = kAsked; });
     }
@@ -298,7 +291,7 @@ void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const OrderSc
       if (!isImpact(c, list, i, end, ordered)) continue;
       check();
       if (anyVertex(c, list, [](std::uint8_t met) { return met == kAsked; }) &&
-          mayMeet(meshes, c, list == 1, restOfStep(meshes, c, list == 1)))
+          mayMeet(meshes, c, list == 1))
         anyVertex(c, list, [](std::uint8_t& met) {
           if (met == kAsked) met = kMet;
           return false;

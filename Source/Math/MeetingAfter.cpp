@@ -67,8 +67,6 @@ bool mayMeetAfter(const ImpactQuery& query, double time, const Vector3d& normal,
   if (!(distance > radii)) return true;
   if (separation(query, 1.0, normal) > radii) return !isSeparating(query, time, normal, radii);
   const Vector3d last = stableUnit(differenceAt(query, 1.0));
-  // On each other's other side they have met, or gone around each other by more planes than below.
-  if (normal.dot(last) < kOtherSide) return true;
   constexpr int kHalvings = 3;
   return mayMeetBetween(query, time, 1.0, normal, last, radii, kHalvings);
 }

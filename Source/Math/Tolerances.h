@@ -146,12 +146,6 @@ constexpr int kTaperPieces = 16;
 /// them move further along a surface.
 constexpr int kMostClearances = 32;
 
-// ---- Rows at the step's end (Math/MeetingAfter.cpp) ----
-
-/// Cosine of the angle between the closest points at two times from which on features are on each
-/// other's other side. Any number near -1 will do: it only saves time.
-constexpr double kOtherSide = -0.98;
-
 // ---- Vertices behind a surface (NarrowPhase/Piercing.cpp) ----
 
 /// Exit distances that differ by a smaller share are equal, so that rounding does not choose.
