@@ -8,8 +8,8 @@ namespace palpate {
 
 /// Whether two features may come within their radii after a time of the step.
 ///
-/// normal   unit, from the second feature's closest point to the first's at that time; any vector if
-///          the distance is at most the radii.
+/// normal   unit, from the second feature's closest point to the first's at that time. It is not
+///          used if the distance is at most the radii.
 /// distance L: of these points.
 /// radii    L: the sum of both.
 /// Law      false is certain: planes separate the features until the end. True may be wrong where
