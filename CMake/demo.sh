@@ -24,7 +24,7 @@ if CMake/packages.sh --missing demo; then
   wait || true
   CMake/packages.sh demo  # says what was wrong, if anything was
 fi
-echo "3 of 4: the scene and what was not built yet (4 minutes at most)"
+echo "3 of 4: the scene, and the library where it is not built (1 to 3 minutes)"
 build OrganScene -DPALPATE_WITH_VTK=ON -DPALPATE_BUILD_EXAMPLES=ON
 echo "4 of 4: the run"
 xvfb-run -a build/demo/Examples/OrganScene/OrganScene "$@"

@@ -74,7 +74,7 @@ if ((all)); then
   echo "Everything that CI runs comes: one hour to one and a half on two cores. Each stage says when it begins and how long it took."
   sets=(build python test matrix docs)
 else
-  echo "Packages, the release library with its tests, and their run come: 15 to 25 minutes on two idle cores."
+  echo "Packages, the release library with its tests, and their run come: 12 to 15 minutes on two idle cores."
   sets=(build python test)
 fi
 # On a new machine the packages are installed while the library is built.

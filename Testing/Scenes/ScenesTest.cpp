@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -115,7 +116,8 @@ TEST(Organs, BreatheAlongEachOther) {
 
 TEST(Organs, FilesMatchTheGenerator) {
   for (const Organ& organ : organMeshes()) {
-    std::ifstream file(std::string(PALPATE_SOURCE_DIR) + "/Data/Organs/" + organ.name + ".obj");
+    std::ifstream file(std::filesystem::path(PALPATE_SOURCE_DIR "/Data/Organs") /
+                       (organ.name + ".obj"));
     std::stringstream text;
     text << file.rdbuf();
     EXPECT_TRUE(text.str() == organObj(organ)) << organ.name;

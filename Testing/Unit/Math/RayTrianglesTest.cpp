@@ -36,7 +36,7 @@ Pair nextPair(Random& random, int kind) {
   Pair pair{{}, cornersOf(point)};
   const auto& [a, b, c] = pair.corners;
   RaySegment& ray = pair.ray;
-  ray = {point(), {}, 0.0, kind % 4 == 1 ? 1e300 : 1.0};
+  ray = {point(), Vector3d::Zero(), 0.0, kind % 4 == 1 ? 1e300 : 1.0};
   const double s = 1.2 * random.unit() - 0.2, t = (1.2 - s) * random.unit() - 0.2;
   ray.direction = onGrid ? Vector3d(point() - ray.origin)
                          : Vector3d(2.0 * (a + s * (b - a) + t * (c - a) - ray.origin));
