@@ -179,28 +179,37 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
   const Vector3d origin = Vector3d::Zero();
   const double gap = std::max(kShapePairGap * size, kSmallestShapePairGap), tie = kOnSurface * size;
   const bool isRound = m_type == Type::Cylinder || other.m_type == Type::Cylinder;
-  PointShapeDistance out;
-  for (;;) {
-    out = polytope.signedDistance(origin, tie);
-    const auto [difference, point] = minkowski.furthest(out.normal);
-    const double supportHeight = dot(out.normal, difference);
+  // Adds a furthest point that is further than the polytope is. Returns whether it did.
+  const auto grow = [&](const MinkowskiDifference::Point& furthest, double height,
+                        double polytopeHeight) {
     // A round body may be equally deep in any number of directions. Each of them separates the
     // bodies.
     const bool enough =
-        isRound && out.distance < 0 && polytope.points().size() >= kMaxDifferencePoints;
-    if (!(supportHeight + out.distance > gap) || enough || !polytope.add(difference)) {
-      if (out.distance < 0) out.distance = -supportHeight;
-      break;
-    }
-    pointsOfA.push_back(point);
+        isRound && polytopeHeight > 0 && polytope.points().size() >= kMaxDifferencePoints;
+    if (!(height - polytopeHeight > gap) || enough || !polytope.add(furthest.difference))
+      return false;
+    pointsOfA.push_back(furthest.ofA);
+    return true;
+  };
+  PointShapeDistance out;
+  Polytope::OnFace on;
+  for (;;) {
+    out = polytope.signedDistance(origin, tie);
+    const MinkowskiDifference::Point furthest = minkowski.furthest(out.normal);
+    const double height = dot(out.normal, furthest.difference);
+    if (grow(furthest, height, -out.distance)) continue;
+    on = polytope.nearest(origin, tie);
+    if (!(out.distance < 0)) break;
+    out.distance = -height;
+    if (!isRound && !(on.from.distance > height + gap + tie)) break;
+    // Several planes are equally near, and the foot may be beside the face of the first one.
+    on = polytope.nearestFaceWithin(origin, isRound ? tie : std::numeric_limits<double>::max());
+    out.normal = polytope.normal(on.face);
+    const MinkowskiDifference::Point further = minkowski.furthest(out.normal);
+    out.distance = -dot(out.normal, further.difference);
+    if (isRound || !grow(further, -out.distance, on.from.distance)) break;
   }
   PALPATE_ASSERT(pointsOfA.size() == polytope.points().size());
-  Polytope::OnFace on = polytope.nearest(origin, tie);
-  if (isRound && out.distance < 0) {
-    on = polytope.nearestFaceWithin(origin, tie);
-    out.normal = polytope.normal(on.face);
-    out.distance = -dot(out.normal, minkowski.furthest(out.normal).difference);
-  }
   Vector3d point = m_p0;
   for (int i = 0; i < 3; ++i)
     point += on.from.weights[i] * pointsOfA[polytope.corners(on.face)[static_cast<std::size_t>(i)]];

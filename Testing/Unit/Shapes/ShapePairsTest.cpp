@@ -7,8 +7,11 @@
 #include "Common/StepBodies.h"
 #include "Common/SupportedMethods.h"
 
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -254,6 +257,36 @@ TEST(ShapePairs, SizesThatDifferTooMuchAreRefused) {
     EXPECT_NEAR(collisions.collisionData(box, ball).shapeShape()[0].distance, 0.75, 1e-12);
     ASSERT_EQ(collisions.collisionData(other, rod).shapeShape().size(), 1u);
     EXPECT_NEAR(collisions.collisionData(other, rod).shapeShape()[0].distance, 1.5, 1e-12);
+  }
+}
+
+/// A regression: among planes of almost equal depth, the points were those of a face beside the
+/// foot, and off by up to half of a box.
+TEST(ShapePairs, NearlyAlignedBoxesAndHullsMatchTheDefinition) {
+  Random random(19);
+  const auto isEven = [&] { return random() >> 63 == 0; };
+  const auto half = [&] { return std::ldexp(0.25, static_cast<int>(random() >> 62)); };
+  const auto solid = [&](const Vector3d& size) -> AnalyticalGeometry {
+    if (isEven()) return Box{Vector3d::Zero(), size};
+    ConvexHull hull;
+    for (int i = 0; i < 8; ++i)
+      hull.points.push_back(
+          size.cwiseProduct(Vector3d(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0)));
+    return hull;
+  };
+  for (int run = 0; run < casesOf(400); ++run) {
+    SCOPED_TRACE(run);
+    std::array<Vector3d, 2> sizes;
+    for (Vector3d& size : sizes)
+      for (double& x : size) x = half();
+    const double tilt = std::pow(10.0, uniform(random, -14.0, -5.0));
+    const Vector3d axis = isEven() ? Vector3d(-1, 0, 1) : randomPoint(random, -1, 1);
+    const double overlap = isEven() ? tilt : uniform(random, 0.0, 1e-3);
+    const PlacedShape a{solid(sizes[0])},
+        b{solid(sizes[1]),
+          Eigen::AngleAxisd(tilt, axis.normalized()).toRotationMatrix(),
+          {0.1 * half(), 0.1, sizes[0][2] + sizes[1][2] - overlap}};
+    expectPair(random, a, b, 4.0);
   }
 }
 
