@@ -201,8 +201,11 @@ ShapePairDistance Shape::minkowskiDistance(const Shape& other, ShapePairScratch&
     on = polytope.nearest(origin, tie);
     if (!(out.distance < 0)) break;
     out.distance = -height;
-    if (!isRound && !(on.from.distance > height + gap + tie)) break;
+    const Vector3d aside = on.from.difference - out.distance * out.normal;
+    if (!isRound && !(lengthOf(aside) > gap + tie)) break;
     // Several planes are equally near, and the foot may be beside the face of the first one.
+    // Without round sides the nearest of all faces counts, because a sliver's plane may be rounded
+    // by more than the tie.
     on = polytope.nearestFaceWithin(origin, isRound ? tie : std::numeric_limits<double>::max());
     out.normal = polytope.normal(on.face);
     const MinkowskiDifference::Point further = minkowski.furthest(out.normal);

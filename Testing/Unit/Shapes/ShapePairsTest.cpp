@@ -266,14 +266,23 @@ TEST(ShapePairs, NearlyAlignedBoxesAndHullsMatchTheDefinition) {
   Random random(19);
   const auto isEven = [&] { return random() >> 63 == 0; };
   const auto half = [&] { return std::ldexp(0.25, static_cast<int>(random() >> 62)); };
-  const auto solid = [&](const Vector3d& size) -> AnalyticalGeometry {
-    if (isEven()) return Box{Vector3d::Zero(), size};
+  const auto solid = [](bool isBox, const Vector3d& size) -> AnalyticalGeometry {
+    if (isBox) return Box{Vector3d::Zero(), size};
     ConvexHull hull;
     for (int i = 0; i < 8; ++i)
       hull.points.push_back(
           size.cwiseProduct(Vector3d(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0)));
     return hull;
   };
+  const auto turned = [](double angle, const Vector3d& axis) {
+    return Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+  };
+  for (const bool isBox : {false, true})  // a case that a user met: off by 0.157
+    for (const bool isOnBox : {false, true})
+      expectPair(random, PlacedShape{solid(isOnBox, Vector3d(0.5, 0.5, 2))},
+                 PlacedShape{solid(isBox, Vector3d::Constant(0.25)),
+                             turned(1e-6, Vector3d(-1, 0, 1)), Vector3d(0.1, 0.1, 2.249999)},
+                 4.0);
   for (int run = 0; run < casesOf(400); ++run) {
     SCOPED_TRACE(run);
     std::array<Vector3d, 2> sizes;
@@ -282,9 +291,9 @@ TEST(ShapePairs, NearlyAlignedBoxesAndHullsMatchTheDefinition) {
     const double tilt = std::pow(10.0, uniform(random, -14.0, -5.0));
     const Vector3d axis = isEven() ? Vector3d(-1, 0, 1) : randomPoint(random, -1, 1);
     const double overlap = isEven() ? tilt : uniform(random, 0.0, 1e-3);
-    const PlacedShape a{solid(sizes[0])},
-        b{solid(sizes[1]),
-          Eigen::AngleAxisd(tilt, axis.normalized()).toRotationMatrix(),
+    const PlacedShape a{solid(isEven(), sizes[0])},
+        b{solid(isEven(), sizes[1]),
+          turned(tilt, axis),
           {0.1 * half(), 0.1, sizes[0][2] + sizes[1][2] - overlap}};
     expectPair(random, a, b, 4.0);
   }
