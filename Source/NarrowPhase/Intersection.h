@@ -12,7 +12,7 @@ namespace palpate {
 /// The first rule that applies gives the contacts of two intersecting triangles:
 /// (1) Features touch: every vertex-triangle and edge-edge pair at distance zero.
 /// (2) An end of a crossing edge is behind the surface: this end's contact with the nearest feature
-///     of the surface (PiercingContacts).
+///     of the surface, and those of its edges that are as deep at a ridge (PiercingContacts).
 /// (3) A crossing edge passes below an edge or a vertex of the surface: the contact of both
 ///     (PiercingContacts).
 /// (4) Two edges of one triangle cross the other: the vertex that these edges share.

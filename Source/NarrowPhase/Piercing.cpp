@@ -15,8 +15,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <iterator>
+#include <limits>
 #include <numeric>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -39,6 +42,53 @@ struct PlacedMesh {
 int sideOf(const Corners& triangle, const Eigen::Vector3d& position) {
   SignCounts counts;
   return orient3d(triangle[0], triangle[1], triangle[2], position, counts);
+}
+
+bool holds(const Segment& edge, std::uint32_t vertex) {
+  return edge[0] == vertex || edge[1] == vertex;
+}
+
+/// From an end of an edge to where the edge crosses a triangle. NaN where rounding hides that.
+Eigen::Vector3d crossingFrom(std::uint32_t end, const PlacedMesh& own, std::uint32_t edge,
+                             const PlacedMesh& surface, std::uint32_t triangle) {
+  const Segment& ends = own.topology.edges[edge];
+  const Eigen::Vector3d along = own.at[ends[ends[0] == end]] - own.at[end];
+  const auto [a, b, c] = surface.corners(triangle);
+  const Eigen::Vector3d normal = windingNormal(a, b, c);
+  const double weight = normal.dot(a - own.at[end]) / normal.dot(along);
+  if (!(weight >= 0.0 && weight <= 1.0))
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return weight * along;
+}
+
+/// From the first of two segments to the second, if their closest points are between their ends.
+/// Nothing otherwise, or if they are nearly parallel.
+std::optional<Eigen::Vector3d> betweenInteriors(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                                                const Eigen::Vector3d& r,
+                                                const Eigen::Vector3d& s) {
+  Eigen::Vector3d u = q - p, v = s - r, from = r - p;
+  const double scale = std::max({u.cwiseAbs().maxCoeff(), v.cwiseAbs().maxCoeff(),
+                                 from.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min()});
+  u /= scale, v /= scale, from /= scale;
+  const Eigen::Vector3d normal = u.cross(v);
+  const double square = normal.squaredNorm();
+  if (!(square > kTouchAngle * kTouchAngle * u.squaredNorm() * v.squaredNorm())) return {};
+  const double ofU = from.cross(v).dot(normal), ofV = from.cross(u).dot(normal);
+  if (!(ofU > 0.0 && ofU < square && ofV > 0.0 && ofV < square)) return {};
+  return scale * (from.dot(normal) / square) * normal;
+}
+
+/// Whether two triangles hold an edge, and each is behind the other by more than rounding.
+bool isConvex(const PlacedMesh& mesh, std::uint32_t edge) {
+  const auto both = mesh.topology.edgeTriangles[edge];
+  if (both.size() != 2) return false;
+  const auto [a, b, c] = mesh.corners(both[0]);
+  const auto [p, q, r] = mesh.corners(both[1]);
+  if (windingNormal(a, b, c).cross(windingNormal(p, q, r)).norm() < kTouchAngle) return false;
+  const auto& corners = mesh.topology.elements[both[1]];
+  return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t v) {
+    return !holds(mesh.topology.edges[edge], v) && sideOf({a, b, c}, mesh.at[v]) < 0;
+  });
 }
 
 /// The edges of one triangle that cross a triangle of the other mesh.
@@ -124,6 +174,13 @@ int timesOfLeaving(const TriangleMesh& surface, bool atStart,
 /// larger value will do.
 constexpr double kExitReach = 1.5;
 
+/// Of a vertex' depth: an edge that crosses the surface at least this deep has a contact of its
+/// own. Below 1, so that rounding does not choose where the edge is as deep as its end.
+constexpr double kDeepCrossing = 0.5;
+/// Cosine of the angle between the normals of a vertex and of a ridge above its edge: at a right
+/// angle, the ridge leads out through the vertex' face and not through the crossed one.
+constexpr double kSameWayOut = 0.7;
+
 /// Searches the feature of a surface that is nearest to a vertex behind it.
 class NearestInFront {
  public:
@@ -178,7 +235,7 @@ class NearestInFront {
     for (auto end = nearer.end(); end != nearer.begin() && nearer.front().distance < shortest;
          --end) {
       std::pop_heap(nearer.begin(), end, std::greater<>());
-      m_triangle = std::prev(end)->triangle;
+      m_triangle = std::prev(end)->id;
       m_nearest = measure(m_triangle);
       const double other = exitDistance(scratch.crossings);
       if (!(other < shortest) || goesOn()) continue;
@@ -216,22 +273,16 @@ class NearestInFront {
   void findCrossings(std::span<const PiercingContacts::Behind> crossings,
                      Buffer<Eigen::Vector3d>& found) const {
     found.clear();
-    for (const auto& [ofB, vertex, triangle, edge] : crossings) {
-      const Segment& ends = m_own.topology.edges[edge];
-      const Eigen::Vector3d along = m_own.at[ends[ends[0] == vertex]] - m_position;
-      const auto [a, b, c] = m_mesh.corners(triangle);
-      const Eigen::Vector3d normal = windingNormal(a, b, c);
-      const double weight = normal.dot(a - m_position) / normal.dot(along);
-      // 0 or NaN where rounding hides the crossing: the vertex alone counts.
-      if (weight >= 0.0 && weight <= 1.0) found.push_back(weight * along);
-    }
+    for (const auto& crossing : crossings)
+      found.push_back(
+          crossingFrom(crossing.vertex, m_own, crossing.edge, m_mesh, crossing.triangle));
   }
   /// L: how far the vertex, and the places where its edges cross the surface, must move along the
   /// contact's normal to be in front of the plane through the closest point.
   double exitDistance(std::span<const Eigen::Vector3d> crossings) const {
     const VertexTriangleContact at = contact();
     double furthest = 0.0;
-    for (const Eigen::Vector3d& crossing : crossings)
+    for (const Eigen::Vector3d& crossing : crossings)  // NaN changes nothing
       furthest = std::max(furthest, -at.normal.dot(crossing));
     return furthest - at.distance;
   }
@@ -368,6 +419,39 @@ void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffer
   addDepths(pair, true, out);
 }
 
+template <class IsAllowed>
+bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t edge,
+                                std::initializer_list<std::uint32_t> triangles, ContactBuffers& out,
+                                IsAllowed&& isAllowed) {
+  const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
+  const MeshTopology& topology = surface.topology;
+  const Segment& ends = own.topology.edges[edge];
+  Buffer<Near>& ridges = m_scratch.nearer;
+  ridges.clear();
+  for (const std::uint32_t triangle : triangles)
+    for (const std::uint32_t corner : topology.elements[triangle])
+      for (const std::uint32_t around : topology.vertexTriangles[corner]) {
+        const Triangle& corners = topology.elements[around];
+        const std::uint32_t ridge =
+            topology.triangleEdges[around][std::find(corners.begin(), corners.end(), corner) -
+                                           corners.begin()];
+        if (ridge == kNoEdge) continue;
+        const Segment& both = topology.edges[ridge];
+        if (pair.self() && (holds(ends, both[0]) || holds(ends, both[1]))) continue;
+        const auto up = betweenInteriors(own.at[ends[0]], own.at[ends[1]], surface.at[both[0]],
+                                         surface.at[both[1]]);
+        if (!up) continue;
+        const double length = stableLength(*up);
+        if (isAllowed(*up, length)) ridges.push_back({length, ridge});
+      }
+  std::sort(ridges.begin(), ridges.end());
+  return std::any_of(ridges.begin(), ridges.end(), [&](const Near& near) {
+    const std::uint32_t ridge = near.id;
+    return isConvex(surface, ridge) &&
+           addIfCrossed(pair, ofB ? ridge : edge, ofB ? edge : ridge, out);
+  });
+}
+
 void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
   StepCheck check(pair, out);
   for (auto first = m_behind.begin(); first != m_behind.end();) {
@@ -387,7 +471,19 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
       const auto [a, b, c] = nearest.corners();
       check.recordTriangle(nearest.triangle(), !ofB, a, b, c);
     }
-    (ofB ? out.triangleVertex : out.vertexTriangle).push_back(nearest.contact());
+    const VertexTriangleContact contact = nearest.contact();
+    (ofB ? out.triangleVertex : out.vertexTriangle).push_back(contact);
+    if (atStart) continue;
+    for (auto crossing = begin; crossing != first; ++crossing) {
+      const Eigen::Vector3d& place = m_scratch.crossings[crossing - begin];
+      const double depth = -contact.normal.dot(place) - contact.distance;
+      if (depth > 0.0 && depth >= kDeepCrossing * -contact.distance)
+        addRidge(pair, ofB, crossing->edge, {crossing->triangle}, out,
+                 [&](const Eigen::Vector3d& up, double length) {
+                   return length <= kExitReach * depth &&
+                          up.dot(contact.normal) >= kSameWayOut * length;
+                 });
+    }
   }
 }
 
@@ -443,25 +539,19 @@ std::span<const EdgeCrossing> PiercingContacts::crossingsOf(bool ofB, std::uint3
 
 /// Returns whether other contacts stand for the pair.
 bool PiercingContacts::addBelow(const MeshPair& pair, const PiercedPair& pierced,
-                                ContactBuffers& out) const {
+                                ContactBuffers& out) {
   bool any = false;
   /// here, there: where an edge leaves the surface and enters it.
   const auto addBetween = [&](bool ofB, const EdgeCrossing& here, const EdgeCrossing& there) {
-    const PlacedMesh surface(ofB ? pair.a : pair.b, false);
-    const MeshTopology& topology = surface.topology;
-    const Triangle &crossed = topology.elements[here.triangle],
-                   &other = topology.elements[there.triangle];
-    for (const std::uint32_t v : crossed)
-      any |= containsVertex(other, v) && isBehind(!ofB && !pair.self(), v);
-    for (const std::uint32_t ridge : topology.triangleEdges[here.triangle]) {
-      if (ridge == kNoEdge) continue;
-      const auto both = topology.edgeTriangles[ridge];
-      if (both.size() != 2 || both[0] + both[1] != here.triangle + there.triangle) continue;
-      for (const std::uint32_t v : other)
-        if (!containsVertex(crossed, v) &&
-            sideOf(surface.corners(here.triangle), surface.at[v]) < 0)
-          any |= addIfCrossed(pair, ofB ? ridge : here.edge, ofB ? here.edge : ridge, out);
-    }
+    const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
+    const auto& elements = surface.topology.elements;
+    for (const std::uint32_t v : elements[here.triangle])
+      any |= containsVertex(elements[there.triangle], v) && isBehind(!ofB && !pair.self(), v);
+    const std::uint32_t end = own.topology.edges[here.edge][0];
+    const double apart = stableLength(crossingFrom(end, own, here.edge, surface, here.triangle) -
+                                      crossingFrom(end, own, here.edge, surface, there.triangle));
+    any |= addRidge(pair, ofB, here.edge, {here.triangle, there.triangle}, out,
+                    [&](const Eigen::Vector3d&, double length) { return length <= apart; });
   };
   const auto addOf = [&](bool ofB, std::uint32_t triangle, unsigned edges, std::uint32_t crossed) {
     for (int i = 0; i < 3; ++i) {

@@ -10,6 +10,7 @@
 #include <compare>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <span>
 #include <utility>
 
@@ -48,10 +49,18 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          such an edge crosses: the vertex does not leave through another sheet.
 /// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
 ///          one of the crossing edges is behind: that end's contact then stands for the pair.
+/// Ridges   the convex edges at the corners of a crossed triangle. An edge is below the nearest one
+///          that it has crossed, if both closest points are between the ends.
 /// Below    an edge that enters the surface through one triangle and leaves it through another one
-///          is below what they have in common. If that is a convex edge, and both edges have
-///          crossed, their contact stands for the pair; if it is a vertex behind the
-///          other surface, this vertex' contact.
+///          is below a ridge of these that is no further away than its two crossings are apart. The
+///          contact of both stands for the pair. If the two triangles have a vertex in common that
+///          is behind the other surface, this vertex' contact does.
+/// Rim      the contact of a vertex holds the vertex only. An edge from it may cross the surface
+///          elsewhere and deeper: a box that hangs over the edge of a table crosses the table's
+///          side. If such a crossing is at least half as deep below the plane through the closest
+///          point as the vertex, the edge has a contact with the ridge that it is below. The ridge
+///          must be at most 1.5 times that depth away, and lead out within 45 degrees of the
+///          vertex' normal.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
 ///          most 1.5 times its first exit distance from it. Scratch memory of 4 bytes for each
@@ -69,15 +78,15 @@ class PiercingContacts {
     std::uint32_t vertex, triangle, edge;
     auto operator<=>(const Behind&) const = default;
   };
-  /// A triangle near a vertex.
+  /// A triangle near a vertex, or an edge near another one.
   struct Near {
     double distance;  ///< L
-    std::uint32_t triangle;
+    std::uint32_t id;
     auto operator<=>(const Near&) const = default;
   };
   /// Of one vertex.
   struct Scratch {
-    Buffer<Eigen::Vector3d> crossings;  ///< L: from the vertex to where its edges cross
+    Buffer<Eigen::Vector3d> crossings;  ///< L: from the vertex to each Behind of it; or NaN
     Buffer<Near> nearer;
     Buffer<std::uint32_t> reached;  ///< vertices of the surface
     /// For each triangle and vertex of the surface the last turn in which it was reached.
@@ -93,7 +102,14 @@ class PiercingContacts {
   bool isBehind(bool ofB, std::uint32_t vertex) const;
   bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
   std::span<const EdgeCrossing> crossingsOf(bool ofB, std::uint32_t edge) const;
-  bool addBelow(const MeshPair&, const PiercedPair&, ContactBuffers& out) const;
+  bool addBelow(const MeshPair&, const PiercedPair&, ContactBuffers& out);
+  /// Adds the contact of an edge and the nearest ridge that it is below, of the ridges at corners
+  /// of the triangles. isAllowed(from the edge to the ridge, its length) chooses among these.
+  /// Returns whether there is one. ofB: the edge is of MeshPair::b, and the ridge is not.
+  template <class IsAllowed>
+  bool addRidge(const MeshPair&, bool ofB, std::uint32_t edge,
+                std::initializer_list<std::uint32_t> triangles, ContactBuffers& out,
+                IsAllowed&& isAllowed);
 
   Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;

@@ -34,8 +34,11 @@ class ExactContacts {
         m_b{self ? scene.a : scene.b, self ? scene.aBefore : scene.bBefore},
         m_self(self) {
     if (settings.method != Method::Intersection) return;
-    m_depthsOfA = depths(m_a, m_b);
-    if (!self) m_depthsOfB = depths(m_b, m_a);
+    Crossings ofA, ofB;
+    m_depthsOfA = depths(m_a, m_b, ofA);
+    if (!self) m_depthsOfB = depths(m_b, m_a, ofB);
+    addRims(m_a, m_b, false, m_depthsOfA, ofA);
+    addRims(m_b, m_a, true, m_depthsOfB, ofB);
   }
 
   Answer has(const Ids& ids) const {
@@ -212,21 +215,73 @@ class ExactContacts {
           side(surface, u, own[e[0]]) * side(surface, u, own[e[1]]) >= 0 ||
           crossedFeature(own[e[0]], own[e[1]], surface, u).empty())
         continue;
-      std::vector<std::uint32_t> common;
-      for (const std::uint32_t v : here)
-        if (holds(there, v)) common.push_back(v);
-      for (const std::uint32_t v : common) below.stands |= depths.contains(v);
-      if (common.size() != 2) continue;
-      const Segment ridge = sorted(common[0], common[1]);
-      if (at(surface, ridge).size() != 2) continue;
-      for (const std::uint32_t v : there)
-        if (!holds(here, v) && side(surface, crossed, surface[v]) < 0) {
-          const Segment &p = ofB ? ridge : e, &q = ofB ? e : ridge;
-          const Answer crossedEach = haveCrossed(p, q);
-          below.unsure |= crossedEach == Answer::Either;
-          if (crossedEach == Answer::Yes) below.edges.insert({p, q});
+      for (const std::uint32_t v : here) below.stands |= holds(there, v) && depths.contains(v);
+      using namespace oracle;
+      const Vector apart = crossing(own[e[0]], own[e[1]], surface, u) -
+                           crossing(own[e[0]], own[e[1]], surface, crossed);
+      addRidge(surface, ofB, e, {crossed, u}, oracle::root(oracle::dot(apart, apart)), {}, below);
+    }
+  }
+  /// Adds the nearest ridge that an edge has crossed, of those at the corners of triangles.
+  /// wayOut: the normal of the edge's end, of any length; nothing: any ridge may lead out.
+  void addRidge(const Moving& surface, bool ofB, const Segment& edge,
+                const std::set<std::uint32_t>& triangles, const mpf_class& distance,
+                const std::optional<oracle::Vector>& wayOut, Below& below) const {
+    struct Near {
+      Rational square;
+      Answer isCrossed;
+      std::pair<Segment, Segment> edges;
+    };
+    std::set<Segment> ridges;
+    for (const std::uint32_t t : triangles)
+      for (const std::uint32_t corner : surface.triangles()[t])
+        for (const std::uint32_t around : at(surface, corner))
+          for (const std::uint32_t other : surface.triangles()[around])
+            if (other != corner) ridges.insert(sorted(corner, other));
+    std::vector<Near> near;
+    for (const Segment& ridge : ridges) {
+      if (m_self && (holds({ridge[0], ridge[1], ridge[1]}, edge[0]) ||
+                     holds({ridge[0], ridge[1], ridge[1]}, edge[1])))
+        continue;
+      const std::vector<std::uint32_t> both = at(surface, ridge);
+      if (both.size() != 2) continue;
+      for (const std::uint32_t v : surface.triangles()[both[1]])
+        if (v != ridge[0] && v != ridge[1] && side(surface, both[0], surface[v]) < 0) {
+          const Segment &p = ofB ? ridge : edge, &q = ofB ? edge : ridge;
+          const oracle::Closest points =
+              oracle::edgeEdge(m_a[p[0]], m_a[p[1]], m_b[q[0]], m_b[q[1]]);
+          if (!points.interior) continue;
+          const Answer isCrossed = haveCrossed(p, q);
+          const mpf_class beyond = oracle::root(points.square) - distance;
+          if (wayOut) {
+            const mpf_class along(ofB ? oracle::dot(points.difference, *wayOut)
+                                      : Rational(-oracle::dot(points.difference, *wayOut)),
+                                  400);
+            const double cosine = mpf_class(along / oracle::root(points.square) /
+                                            oracle::root(oracle::dot(*wayOut, *wayOut)))
+                                      .get_d();
+            if (cosine < 0.7 - 1e-9) continue;
+            if (cosine < 0.7 + 1e-9 && isCrossed != Answer::No) below.unsure = true;
+          }
+          if (abs(beyond) <= 1e-9 * distance)
+            near.push_back(
+                {points.square, isCrossed == Answer::No ? isCrossed : Answer::Either, {p, q}});
+          else if (beyond < 0)
+            near.push_back({points.square, isCrossed, {p, q}});
         }
     }
+    std::stable_sort(near.begin(), near.end(),
+                     [](const Near& l, const Near& r) { return l.square < r.square; });
+    std::erase_if(near, [](const Near& each) { return each.isCrossed == Answer::No; });
+    if (near.empty()) return;
+    const auto isAsNear = [&](const Near& each) {
+      return each.square.get_d() <= (1 + 1e-9) * near.front().square.get_d();
+    };
+    const auto count = std::count_if(near.begin(), near.end(), isAsNear);
+    if (count > 1 || near.front().isCrossed == Answer::Either)
+      below.unsure = true;
+    else
+      below.edges.insert(near.front().edges);
   }
   static Segment sorted(std::uint32_t p, std::uint32_t q) {
     return {std::min(p, q), std::max(p, q)};
@@ -324,7 +379,30 @@ class ExactContacts {
     return star.holds(p) || star.holds(q) ? 0 : sense;
   }
 
-  Depths depths(const Moving& vertices, const Moving& others) const {
+  /// For each vertex behind, its edges that cross a triangle of the other mesh.
+  using Crossings = std::map<std::uint32_t, std::set<std::pair<Segment, std::uint32_t>>>;
+
+  /// The contacts of edges from vertices behind, with ridges that these are below.
+  void addRims(const Moving& vertices, const Moving& others, bool ofB, const Depths& depths,
+               const Crossings& crossings) {
+    for (const auto& [vertex, all] : crossings) {
+      const Vector3d& p = vertices[vertex];
+      const auto [a, b, c] = others.triangles()[depths.at(vertex)];
+      const oracle::Closest foot = oracle::vertexTriangle(p, others[a], others[b], others[c]);
+      for (const auto& [edge, triangle] : all) {
+        const Vector3d& q = vertices[edge[edge[0] == vertex]];
+        const Rational along = oracle::dot(foot.difference, crossing(p, q, others, triangle));
+        const double share = Rational(along / foot.square + 1).get_d();  // of the vertex' depth
+        if (share < 0.5 - 1e-9) continue;
+        Below& below = share > 0.5 + 1e-9 ? m_rims : m_unsureRims;
+        using namespace oracle;
+        const Vector wayOut = Rational(-1) * foot.difference;
+        addRidge(others, ofB, edge, {triangle}, 1.5 * share * root(foot.square), wayOut, below);
+      }
+    }
+  }
+
+  Depths depths(const Moving& vertices, const Moving& others, Crossings& crossings) const {
     const auto count = static_cast<std::uint32_t>(others.triangles().size());
     std::set<Segment> edges;
     for (const Triangle& t : vertices.triangles())
@@ -354,6 +432,7 @@ class ExactContacts {
       if (sum == 0) continue;
       Start& start = starts[edge[sum < 0]];
       for (const std::uint32_t t : triangles[sum > 0 ? -1 : 1]) {
+        crossings[edge[sum < 0]].insert({edge, t});
         start.triangles.insert(t);
         start.crossings.push_back(
             crossing(vertices[edge[sum < 0]], vertices[edge[sum > 0]], others, t));
@@ -541,10 +620,16 @@ class ExactContacts {
     return answer;
   }
 
+  bool holdsEither(const Below& below, const Segment& p, const Segment& q) const {
+    return below.edges.contains({p, q}) || (m_self && below.edges.contains({q, p}));
+  }
   Answer edges(const Segment& p, const Segment& q) const {
     switch (m_settings.method) {
       case Method::Intersection: {
-        Answer answer = Answer::No;
+        if (holdsEither(m_rims, p, q)) return Answer::Yes;
+        Answer answer = m_rims.unsure || m_unsureRims.unsure || holdsEither(m_unsureRims, p, q)
+                            ? Answer::Either
+                            : Answer::No;
         for (const std::uint32_t s : at(m_a, p))
           for (const std::uint32_t t : at(m_b, q)) {
             const Meeting meeting(*this, s, t);
@@ -553,8 +638,7 @@ class ExactContacts {
             if (isPair && meeting.touch) return Answer::Yes;
             if (!meeting.any || meeting.touch || meeting.isBehind(*this, s, t)) continue;
             const Below below = belowOf(meeting, s, t);
-            if (below.edges.contains({p, q}) || (m_self && below.edges.contains({q, p})))
-              return Answer::Yes;
+            if (holdsEither(below, p, q)) return Answer::Yes;
             if (below.unsure) answer = Answer::Either;
             if (isPair && !below.stands && !below.unsure) return Answer::Yes;
           }
@@ -613,6 +697,7 @@ class ExactContacts {
   Moving m_a, m_b;
   bool m_self;
   Depths m_depthsOfA, m_depthsOfB;
+  Below m_rims, m_unsureRims;
 };
 
 }  // namespace palpate::testing

@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <numbers>
+#include <set>
+#include <utility>
 #include <vector>
 
 namespace palpate::test {
@@ -139,7 +141,14 @@ TEST(Piercing, CornersOfOverlappingCubesLeaveThroughTheNearestFace) {
   ASSERT_EQ(found.triangleVertex.size(), 1u);
   EXPECT_EQ(found.triangleVertex[0].vertex, 7u);
   EXPECT_EQ(found.triangleVertex[0].normal, Vector3d(-Vector3d::UnitX()));
-  EXPECT_TRUE(found.edgeEdge.empty());
+  // Two edges from each corner leave the other cube through a side, as deep as the corner.
+  std::set<std::pair<Segment, Segment>> edges;
+  for (const EdgeEdgeContact& c : found.edgeEdge) {
+    edges.insert({c.edgeA, c.edgeB});
+    EXPECT_NEAR(c.distance, -0.1, 1e-15);
+    EXPECT_EQ(c.normal, Vector3d::UnitX());
+  }
+  EXPECT_EQ(edges.size(), 4u);
 }
 
 /// Of the plate's vertices in a blunt tool, whether its wall or its end is nearer. The plate may be
@@ -158,7 +167,10 @@ TEST(Piercing, ABluntToolLeavesThroughItsEnd) {
             piercingMesh(positions, {flat.topology.elements.begin(), flat.topology.elements.end()});
         const ContactBuffers found = piercingContacts(tool, surface);
         EXPECT_EQ(found.vertexTriangle.size(), 4u);
-        EXPECT_TRUE(found.edgeEdge.empty());
+        for (const EdgeEdgeContact& c : found.edgeEdge) {
+          EXPECT_GE(c.distance, -depth - 2 * bump - 1e-12);
+          EXPECT_GT(c.normal.z(), 0.98);
+        }
         for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
           for (const VertexTriangleContact& c : *list) {
             EXPECT_GE(c.distance, -depth - bump - 1e-12) << c.vertex;
