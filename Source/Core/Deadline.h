@@ -1,50 +1,11 @@
 #pragma once
 
+#include "Core/Stopping.h"
+
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cstddef>
-#include <functional>
 
 namespace palpate {
-
-/// Thrown where work ends because its time is over. An exception takes 0.03 ms, as its tables are
-/// not in the caches: long loops end without one.
-struct OutOfTime {};
-
-/// The end of a detection's budget, or an earlier cancel. Once it is over, it stays over. Any
-/// thread may ask.
-class Deadline {
- public:
-  using Time = std::chrono::steady_clock::time_point;
-  using Clock = std::function<Time()>;
-
-  /// clock: of tests; empty: the system's.
-  Deadline(Time end, const std::atomic<bool>& isCancelled, const Clock& clock)
-      : m_end(end), m_isCancelled(&isCancelled), m_clock(&clock) {}
-
-  bool isOver() const {
-    if (m_isOver.load(std::memory_order_relaxed)) return true;
-    if (!m_isCancelled->load(std::memory_order_relaxed) && now() < m_end) return false;
-    m_isOver.store(true, std::memory_order_relaxed);
-    return true;
-  }
-
-  static Time now(const Clock& clock) { return clock ? clock() : std::chrono::steady_clock::now(); }
-  static Time after(Time start, std::chrono::microseconds budget) {
-    using std::chrono::microseconds;
-    const auto most = std::chrono::duration_cast<microseconds>(Time::max() - start);
-    return start + std::clamp(budget, microseconds(0), most);
-  }
-
- private:
-  Time now() const { return now(*m_clock); }
-
-  Time m_end;
-  const std::atomic<bool>* m_isCancelled;
-  const Clock* m_clock;
-  mutable std::atomic<bool> m_isOver{false};
-};
 
 /// Whether there is a deadline that is over.
 inline bool isOver(const Deadline* deadline) { return deadline && deadline->isOver(); }

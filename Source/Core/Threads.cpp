@@ -1,3 +1,4 @@
+#include "Core/Stopping.h"
 #include "Core/Threads.h"
 
 #include <palpate/Error.h>
@@ -346,12 +347,17 @@ Threads& Threads::operator=(Threads&& other) noexcept {
 void Threads::run(std::size_t size, void (*call)(void*, std::size_t), void* function) const {
   PALPATE_ASSERT(m_executor && m_count > 1 && size > 1);
   LoopBody body(call, function);
-  if (!m_loops)
-    m_executor->run(size, LoopBody::task, &body);
-  else
-    m_loops->run(*m_executor, std::min(size, static_cast<std::size_t>(m_count)), size, body);
+  {
+    const StopScope ofExecutor(nullptr);
+    if (!m_loops)
+      m_executor->run(size, LoopBody::task, &body);
+    else
+      m_loops->run(*m_executor, std::min(size, static_cast<std::size_t>(m_count)), size, body);
+  }
   body.rethrow();
 }
+
+void throwOutOfTime() { throw OutOfTime(); }
 
 void checkThreads(int threads) {
   if (threads < 0 || threads > kMaxThreads)

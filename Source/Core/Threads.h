@@ -3,6 +3,7 @@
 #include <palpate/Executor.h>
 
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <cstddef>
 #include <memory>
@@ -20,6 +21,9 @@ class LoopsOnExecutor;
 ///
 /// Exceptions  The exception of the lowest index that throws is rethrown, as with one thread.
 ///             Indices above it may be skipped. The object stays usable.
+/// Stopping    A loop asks the calling thread's token (StopScope) before each index, and throws
+///             OutOfTime once it is over, unless an index threw something else. Functions run with
+///             that token, and code of an executor without one.
 /// Memory      Loops allocate nothing on the library's pool, and nothing after the first ones on an
 ///             executor.
 /// Waiting     Threads spin for 20 to 80 microseconds. At the end of a loop they then yield for
@@ -61,7 +65,11 @@ class Threads {
   template <class F>
   void forEach(std::size_t size, F&& f) const {
     if (m_count == 1 || size <= 1) {
-      for (std::size_t i = 0; i < size; ++i) f(i);
+      const StopScope::Token token = StopScope::current();
+      for (std::size_t i = 0; i < size; ++i) {
+        if (token) token->check();
+        f(i);
+      }
       return;
     }
     using Function = std::remove_reference_t<F>;
