@@ -517,11 +517,11 @@ void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& se
   octreeMilliseconds += watch.lap();
 }
 
-const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh, const Threads& threads,
-                                                  const Deadline* deadline) {
+const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
+                                                  const Threads& threads) {
   PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.count());
   const MemoryScope memory(MemoryStage::Octrees);
-  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads, deadline);
+  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
   return m_stars.triangles();
 }
 

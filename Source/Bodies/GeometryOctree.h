@@ -11,7 +11,6 @@
 #include "Mesh/UnfoldedStars.h"
 #include "Core/ReusableMemory.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 #include "Core/Threads.h"
 
 #include <cstdint>
@@ -68,7 +67,7 @@ class GeometryOctree {
   void updateDops(const TriangleMesh&, OctreeBounds, const Threads&);
   /// For self-collision: finds neighbouring triangles that certainly meet nowhere but in common
   /// vertices and edges. Returns UnfoldedStars::triangles().
-  const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&, const Deadline*);
+  const Triangle* findUnfoldedStars(const TriangleMesh&, const Threads&);
 
   /// Becomes a copy of an octree that isValid(), for queries only. All copies in one object must be
   /// of one octree; only what changed since the last copy is copied.

@@ -5,6 +5,7 @@
 #include "Queries/ElementsNearShape.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
@@ -58,17 +59,14 @@ std::size_t AttachedProxyWork::place(bool divides) {
   return m_proxyJobs.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, divides, step);
 }
 
-std::size_t AttachedProxyWork::start(const FrameStart& frame) {
-  return place(frame.deadline != nullptr);
-}
+std::size_t AttachedProxyWork::start(const FrameStart&) { return place(isTimed()); }
 
 void AttachedProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   m_proxyJobs.find(job, scratch);
   writeHits(scratch);
   findOthers(scratch);
-  scratch.narrowMilliseconds += watch.lap();
 }
 
 void AttachedProxyWork::runByBruteForce(JobScratch& scratch) {
@@ -93,7 +91,7 @@ void AttachedProxyWork::findOthers(JobScratch& scratch) const {
     return !m_record->b->body.mesh.topology.isEnabled(p.b);
   };
   for (const std::uint32_t point : scratch.hits.others) {
-    checkTime(scratch.deadline);
+    checkTime();
     Eigen::AlignedBox3d box(points.now[point]);
     if (swept) box.extend(points.before[point]);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
@@ -110,7 +108,7 @@ void AttachedProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
   const bool continuous = record.plan.method == Method::Continuous;
-  results.start(jobs, join.deadline);
+  results.start(jobs);
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);

@@ -7,6 +7,7 @@
 #include "Math/RayCrossing.h"
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 
@@ -46,7 +47,7 @@ std::uint32_t vertexOf(const Body& body) {
 
 /// Whether a vertex of a body was inside another one at the step's start. Tests all triangles.
 bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
-  TimeCheck check(stack.deadline, 256);
+  TimeCheck check(256);
   const auto cornersAt = [&](std::size_t i) {
     check();
     return cornersOf(outer.tree.ordered()[i], outer.mesh.before);
@@ -81,8 +82,8 @@ void forEachPush(std::span<ContactBuffers* const> local, F&& f) {
 constexpr double kSameSide = 0.5;
 
 /// Whether all contacts push to where vertices do. They then separate the bodies.
-bool agree(std::span<ContactBuffers* const> local, const Deadline* deadline) {
-  TimeCheck check(deadline, 512);
+bool agree(std::span<ContactBuffers* const> local) {
+  TimeCheck check(512);
   Vector3d sum = Vector3d::Zero();
   forEachPush(local, [&](const Vector3d& normal, bool ofEdges) {
     check();
@@ -133,9 +134,8 @@ void forEachList(const TriangleMesh& a, const TriangleMesh& b, ContactBuffers& f
   pass(found.edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
 }
 
-bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step,
-               const Deadline* deadline) {
-  TimeCheck check(deadline, 128);
+bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  TimeCheck check(128);
   bool any = false;
   for (ContactBuffers* found : step)
     forEachList(a, b, *found, [&](const auto& list, auto&& isLeaving) {
@@ -148,9 +148,8 @@ bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffe
 }
 
 /// Turns these impacts, so that they push the feature on out. Returns whether there were any.
-bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step,
-                 const Deadline* deadline) {
-  TimeCheck check(deadline, 128);
+bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  TimeCheck check(128);
   bool any = false;
   for (ContactBuffers* found : step)
     forEachList(a, b, *found, [&](auto& list, auto&& isLeaving) {
@@ -168,26 +167,24 @@ bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buf
 }  // namespace
 
 bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
-                        Buffers local, Buffers step, const Deadline* deadline) {
+                        Buffers local, Buffers step) {
   PointQueryStack& stack = m_scratch.pair.stack;
-  stack.deadline = deadline;
   m_hasTurned = false;
   stack.exactDecisions = 0;
   m_contacts.clear();
   if (!mayBeBodies(record)) return false;
   const Body &a = record.a->body, &b = record.b->body;
   const bool meet = anyIntersecting(local);
-  if (meet && agree(local, deadline)) return false;
-  const bool overlapped = startsIntersecting || meet || isInside(a, b, engine, stack) ||
-                          isInside(b, a, engine, stack) ||
-                          (anyLeaves(a.mesh, b.mesh, step, deadline) &&
-                           (wasInside(a, b, stack) || wasInside(b, a, stack)));
+  if (meet && agree(local)) return false;
+  const bool overlapped =
+      startsIntersecting || meet || isInside(a, b, engine, stack) ||
+      isInside(b, a, engine, stack) ||
+      (anyLeaves(a.mesh, b.mesh, step) && (wasInside(a, b, stack) || wasInside(b, a, stack)));
   if (!overlapped) return false;
   const BodyPair pair(a, b, engine, m_scratch.pair, kQuick.moved);
   const Penetration found = penetrationOf(pair, m_scratch, kQuick);
-  if (isOver(deadline)) return false;
   if (found.intersecting) addContacts(pair, found, record.pair.settings.thickness, local);
-  if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step, deadline);
+  if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step);
   return found.intersecting;
 }
 
@@ -215,7 +212,7 @@ void BodyContacts::addVertices(const BodyPair& pair, bool ofA, const Penetration
   const double end = penetration.depth + kExitSlack * pair.magnitude();
   for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
     if (own.triangleOf[v] == kNoElement) continue;
-    if (isOver(pair.deadline())) return;
+    checkTime();
     const auto exit = pair.lastExitOf({ofA, v}, direction, -thickness, end);
     if (!exit) continue;
     const Triangle& corners = pair.geometry(!ofA).mesh.topology.elements[exit->element];

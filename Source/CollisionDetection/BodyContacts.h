@@ -25,12 +25,10 @@ class BodyContacts {
   /// wholly inside the other. Where a body that was inside is outside at the end, impacts within
   /// the step that would pull it back are turned: they push it on out.
   ///
-  /// local    the contacts of Intersection at the end, with the triangles that intersect
-  /// step     the other contacts
-  /// deadline where it is over, the answer means nothing, or OutOfTime is thrown; null: none
-  /// Cost     of bodies that are deep in each other: that of penetrationOf(), on one thread
-  bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step,
-            const Deadline*);
+  /// local  the contacts of Intersection at the end, with the triangles that intersect
+  /// step   the other contacts
+  /// Cost   of bodies that are deep in each other: that of penetrationOf(), on one thread
+  bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step);
   ContactBuffers& contacts() { return m_contacts; }
   /// Of the last find(): the number of decisions by exact arithmetic.
   std::size_t exactDecisions() const { return m_scratch.pair.stack.exactDecisions; }

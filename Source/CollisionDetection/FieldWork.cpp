@@ -50,7 +50,7 @@ std::size_t FieldWork::start(const FrameStart& frame) {
 void FieldWork::run(int round, std::size_t job, JobScratch& scratch) const {
   PALPATE_ASSERT(job < m_jobs && round < 3);
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   const PlacedField placed = m_record->placedField();
   FieldContacts found = m_record->fieldContacts(placed);
   const auto share = [&](std::size_t size, std::size_t i) { return size * i / m_jobs; };
@@ -63,7 +63,6 @@ void FieldWork::run(int round, std::size_t job, JobScratch& scratch) const {
     found.findEdges(begin, end, scratch.contacts.shapes);
   else
     found.findFaces(begin, end, scratch.contacts.shapes);
-  scratch.narrowMilliseconds += watch.lap();
 }
 
 void FieldWork::runByBruteForce(JobScratch& scratch) const {
@@ -73,7 +72,7 @@ void FieldWork::runByBruteForce(JobScratch& scratch) const {
 void FieldWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
-  results.start(jobs, join.deadline);
+  results.start(jobs);
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
   results.sortFacts(record);
   results.order(record);

@@ -6,6 +6,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/MeetingAfter.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <bit>
@@ -74,7 +75,7 @@ void FirstImpacts::dropExcluded(const MeshPair& meshes, double end, const OrderS
     if (list == 2) return sidedOf(contents.edgeEdge[index], list);
     return sidedOf((list == 0 ? contents.vertexTriangle : contents.triangleVertex)[index], list);
   };
-  TimeCheck check(ordered.deadline, 32);
+  TimeCheck check(32);
   const auto forEachImpact = [&](auto&& f) {
     forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
       for (std::uint32_t i = 0; i < contacts.size(); ++i)
@@ -240,7 +241,7 @@ bool mayMeet(const MeshPair& meshes, const Contact& c, bool swapped) {
 void FirstImpacts::findEndRows(const MeshPair& meshes, double end, const OrderScratch& ordered,
                                const CollisionData::Contents& contents) {
   const double radii = meshes.a.largestRadius + meshes.b.largestRadius;
-  TimeCheck check(ordered.deadline, 64);
+  TimeCheck check(64);
   // Calls f(state) for the vertices of an impact, and returns whether any call did.
   const auto anyVertex = [&](const auto& c, std::uint32_t list, auto&& f) {
     const bool swapped = list == 1;
@@ -362,7 +363,7 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
   m_standIns.clear();
   dropExcluded(meshes, end, ordered, contents);
   m_entries.clear();
-  TimeCheck check(ordered.deadline, 256);
+  TimeCheck check(256);
   forEachImpactList(contents, [&](const auto& contacts, std::uint32_t list) {
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
       const auto& contact = contacts[i];
@@ -376,11 +377,10 @@ void FirstImpacts::keep(const MeshPair& meshes, double end, const OrderScratch& 
       if (features) m_entries.push_back({*features, contact.timeOfImpact, list, i});
     }
   });
-  sortUntil(ordered.deadline, m_entries.begin(), m_entries.end(),
-            [](const Entry& l, const Entry& r) {
-              return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
-                     std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
-            });
+  sortInTime(m_entries.begin(), m_entries.end(), [](const Entry& l, const Entry& r) {
+    return std::tie(l.features[0], l.features[1], l.time, l.list, l.index) <
+           std::tie(r.features[0], r.features[1], r.time, r.list, r.index);
+  });
   Place first{};
   if (!m_entries.empty()) first = {m_entries[0].list, m_entries[0].index};
   for (std::size_t i = 1; i < m_entries.size(); ++i) {

@@ -5,6 +5,7 @@
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Spin.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
@@ -30,11 +31,10 @@ constexpr auto kStartWork = [](PairWork& work, const FrameStart& frame) {
 
 }  // namespace
 
-/// startOf(work, frame): starts a pair's work and returns its number of jobs. Returns the number of
-/// pairs that were started: all, or with a deadline as many as keep the threads busy.
+/// startOf(work, frame): starts a pair's work and returns its number of jobs. Starts all pairs, or
+/// with a deadline as many as keep the threads busy.
 template <class Start>
-std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& threads,
-                         const Deadline* deadline, Start&& startOf) {
+void Frame::start(std::span<PairRecord* const> records, const Threads& threads, Start&& startOf) {
   constexpr std::size_t kJobsPerThread = 4;
   const MemoryScope memory(MemoryStage::Pairs);
   m_pairs.clear();
@@ -44,33 +44,28 @@ std::size_t Frame::start(std::span<PairRecord* const> records, const Threads& th
       threads.count() > 1 ? kJobsPerThread * static_cast<std::size_t>(threads.count()) : 1;
   // Where the deadline ends a group, none of its pairs is joined. Groups therefore become smaller
   // the longer the first pair waits, until it is alone.
-  if (deadline && !records.empty())
+  if (isTimed() && !records.empty())
     enough =
         std::max<std::size_t>(1, enough >> std::min(records.front()->data.validity().age, 16u));
-  const FrameStart frame{threads, m_nodePairs, m_stack, deadline};
+  const FrameStart frame{threads, m_nodePairs, m_stack};
   for (PairRecord* record : records) {
-    if (deadline && (m_places.size() >= enough || deadline->isOver())) break;
+    if (isTimed() && m_places.size() >= enough) break;
+    checkTime();
     record->earliest = std::numeric_limits<double>::infinity();
     m_pairs.push_back({record, workOf(*record), m_places.size()});
     Pair& pair = m_pairs.back();
-    try {
-      pair.jobCount = startOf(pair.work, frame);
-    } catch (const OutOfTime&) {
-      pair.isOutOfTime = true;
-    }
+    pair.jobCount = startOf(pair.work, frame);
     for (std::size_t i = 0; i < pair.jobCount; ++i) {
       if (m_places.size() == m_jobs.size()) m_jobs.push_back(std::make_unique<JobScratch>());
       m_jobs[m_places.size()]->clear();
-      m_jobs[m_places.size()]->deadline = deadline;
       m_places.push_back({m_pairs.size() - 1, i});
     }
   }
-  return m_pairs.size();
 }
 
 void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads,
                     BatchFunction function, void* context) {
-  start(records, threads, nullptr, kStartCandidates);
+  start(records, threads, kStartCandidates);
   std::mutex mutex;
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Pair& pair = m_pairs[m_places[i].pair];
@@ -90,13 +85,12 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
   }
 }
 
-void Frame::runRounds(const Threads& threads, const Deadline* deadline, Trace* trace) {
+void Frame::runRounds(const Threads& threads, Trace* trace) {
+  const bool inOrder = isTimed();
   for (int round = 0;; ++round) {
     bool any = false;
     for (Pair& pair : m_pairs) {
-      for (const auto& job : jobsOf(pair)) pair.isOutOfTime |= job->isOutOfTime;
-      pair.runs = !pair.isOutOfTime &&
-                  std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
+      pair.runs = std::visit([&](const auto& work) { return work.hasRound(round, jobsOf(pair)); },
                              pair.work);
       any |= pair.runs;
     }
@@ -107,34 +101,23 @@ void Frame::runRounds(const Threads& threads, const Deadline* deadline, Trace* t
     std::atomic<std::size_t> next{0};
     threads.forEach(m_places.size(), [&](std::size_t index) {
       // Threads take indices from both ends; with a deadline, jobs are run in the order of pairs.
-      const std::size_t i = deadline ? next.fetch_add(1, std::memory_order_relaxed) : index;
+      const std::size_t i = inOrder ? next.fetch_add(1, std::memory_order_relaxed) : index;
       const Pair& pair = m_pairs[m_places[i].pair];
       if (!pair.runs) return;
-      // Not by an exception, which takes as long as many tests.
-      if (deadline && deadline->isOver()) {
-        m_jobs[i]->isOutOfTime = true;
-        return;
-      }
-      Stopwatch watch;
+      const AddedTime time(m_jobs[i]->milliseconds);
       const CollisionPair& ids = pair.record->pair;
       const TraceSpan span(trace, firstEvent + i,
                            {.name = "job",
                             .a = ids.a,
                             .b = ids.b,
                             .job = static_cast<std::uint32_t>(m_places[i].job)});
-      try {
-        std::visit([&](const auto& work) { work.run(round, m_places[i].job, *m_jobs[i]); },
-                   pair.work);
-      } catch (const OutOfTime&) {
-        m_jobs[i]->isOutOfTime = true;
-      }
-      m_jobs[i]->milliseconds += watch.lap();
+      std::visit([&](const auto& work) { work.run(round, m_places[i].job, *m_jobs[i]); },
+                 pair.work);
     });
   }
 }
 
-/// Writes a pair's results and adds what its jobs counted. Results are of use only if the deadline
-/// is not over then.
+/// Writes a pair's results and adds what its jobs counted.
 void Frame::join(Pair& pair, const FrameJoin& join) {
   PALPATE_ASSERT(pair.firstJob + pair.jobCount <= m_jobs.size());
   const MemoryScope memory(MemoryStage::Results);
@@ -155,12 +138,10 @@ void Frame::join(Pair& pair, const FrameJoin& join) {
     record.statistics.candidatePairs += job->candidateCount;
     record.statistics.featurePairs += features;
   }
-  sortUntil(join.deadline, crossings.begin(), crossings.end(),
-            [](const Crossing& l, const Crossing& r) {
-              return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
-            });
+  sortInTime(crossings.begin(), crossings.end(), [](const Crossing& l, const Crossing& r) {
+    return std::tie(l.kind, l.ids, l.time) < std::tie(r.kind, r.ids, r.time);
+  });
   std::visit([&](const auto& work) { work.join(jobsOf(pair), join); }, pair.work);
-  if (isOver(join.deadline)) return;
   record.followSides();
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   if (record.pair.settings.smoothNormals)
@@ -176,9 +157,9 @@ void Frame::detect(std::span<PairRecord* const> records, const Threads& threads,
   Stopwatch watch;
   {
     const TraceSpan span(trace, "start");
-    start(records, threads, nullptr, kStartWork);
+    start(records, threads, kStartWork);
   }
-  runRounds(threads, nullptr, trace);
+  runRounds(threads, trace);
   addTimes(watch.lap(), statistics);
   for (Pair& pair : m_pairs) {
     PairRecord& record = *pair.record;
@@ -205,22 +186,21 @@ void Frame::addTimes(double wall, FrameStatistics& statistics) const {
   statistics.milliseconds.pairs += wall - ofNarrowPhase;
 }
 
-void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
-                        std::span<PairRecord* const> records, const Threads& threads,
-                        FrameStatistics& statistics, Trace* trace) {
+void Frame::detectInTime(std::uint64_t step, std::span<PairRecord* const> records,
+                         const Threads& threads, FrameStatistics& statistics, Trace* trace) {
   Stopwatch watch;
   const auto finish = [&](Pair& pair) {
     PairRecord& record = *pair.record;
     const TraceSpan span(trace, "join", record.pair.a, record.pair.b);
-    if (!pair.isOutOfTime && !deadline.isOver()) try {
-        join(pair, {threads, Engine::Octree, statistics, m_results, &deadline});
-        record.isUnfinished = deadline.isOver();
-      } catch (const OutOfTime&) {
-      }
+    record.isUnfinished = !endsInTime([&] {
+      checkTime();
+      join(pair, {threads, Engine::Octree, statistics, m_results});
+    });
     if (!record.isUnfinished) track(record, step);
     const double spent = watch.lap();
     record.statistics.milliseconds += spent;
     statistics.milliseconds.order += spent;
+    return !record.isUnfinished;
   };
   for (PairRecord* record : records) record->isUnfinished = true;
   // Pairs that run together are joined together: those of the highest priority do not wait for
@@ -232,14 +212,15 @@ void Frame::detectUntil(const Deadline& deadline, std::uint64_t step,
   auto urgent = static_cast<std::size_t>(std::find_if_not(records.begin(), records.end(), isFirst) -
                                          records.begin());
   while (!records.empty()) {
-    const std::size_t count =
-        start(urgent > 0 ? records.first(urgent) : records, threads, &deadline, kStartWork);
-    urgent -= std::min(urgent, count);
-    if (count == 0) return;
-    runRounds(threads, &deadline, trace);
+    const bool haveRun = endsInTime([&] {
+      start(urgent > 0 ? records.first(urgent) : records, threads, kStartWork);
+      runRounds(threads, trace);
+    });
     addTimes(watch.lap(), statistics);
-    for (Pair& pair : m_pairs) finish(pair);
-    records = records.subspan(count);
+    if (!haveRun) return;
+    if (!std::all_of(m_pairs.begin(), m_pairs.end(), finish)) return;
+    urgent -= std::min(urgent, m_pairs.size());
+    records = records.subspan(m_pairs.size());
   }
 }
 
@@ -250,8 +231,7 @@ void Frame::detectByBruteForce(std::span<PairRecord* const> records, FrameStatis
     Stopwatch watch;
     const TraceSpan span(trace, "brute force", record->pair.a, record->pair.b);
     const double before = statistics.milliseconds.total();
-    start({&record, 1}, oneThread, nullptr,
-          [](PairWork&, const FrameStart&) { return std::size_t{1}; });
+    start({&record, 1}, oneThread, [](PairWork&, const FrameStart&) { return std::size_t{1}; });
     Pair& pair = m_pairs.front();
     std::visit([&](auto& work) { work.runByBruteForce(*m_jobs.front()); }, pair.work);
     statistics.milliseconds.narrowPhase += watch.lap();

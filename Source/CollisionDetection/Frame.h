@@ -7,7 +7,6 @@
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/PairWork.h"
 #include "Octree/Traversal.h"
-#include "Core/Deadline.h"
 #include "Core/Threads.h"
 #include "Core/Trace.h"
 
@@ -29,10 +28,10 @@ class Frame {
   /// Writes the contacts of each pair, sorted, to PairRecord::next.
   /// trace: null for none.
   void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&, Trace* trace);
-  /// The same for a few pairs at a time in the given order, with track(), until the deadline. The
-  /// rest is PairRecord::isUnfinished.
-  void detectUntil(const Deadline&, std::uint64_t step, std::span<PairRecord* const>,
-                   const Threads&, FrameStatistics&, Trace*);
+  /// The same for a few pairs at a time in the given order, with track(), until the thread's
+  /// deadline is over. The rest is PairRecord::isUnfinished.
+  void detectInTime(std::uint64_t step, std::span<PairRecord* const>, const Threads&,
+                    FrameStatistics&, Trace*);
   /// Writes the same results, found by testing every feature against every other.
   void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&, Trace*);
   /// Takes the contacts of a pair over into the step with this number (PairRecord::track()).
@@ -44,18 +43,17 @@ class Frame {
     PairWork work;
     std::size_t firstJob, jobCount = 0;
     bool runs = false;  ///< in the present round
-    bool isOutOfTime = false;
   };
   /// The pair of a job, by its index in m_pairs, and the job's number in it.
   struct Place {
     std::size_t pair, job;
   };
   template <class Start>
-  std::size_t start(std::span<PairRecord* const>, const Threads&, const Deadline*, Start&&);
+  void start(std::span<PairRecord* const>, const Threads&, Start&&);
   Jobs jobsOf(const Pair& pair) const {
     return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
   }
-  void runRounds(const Threads&, const Deadline*, Trace*);
+  void runRounds(const Threads&, Trace*);
   void addTimes(double wall, FrameStatistics&) const;
   void join(Pair&, const FrameJoin&);
 

@@ -4,9 +4,9 @@
 #include "Queries/ElementsNearShape.h"
 #include "Shapes/ShapeFreeMotion.h"
 #include "Bodies/OctreeFrame.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -67,11 +67,11 @@ bool FreeMotionSearch::isKnown(const PairTable& pairs) const {
 }
 
 bool FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pairs, Engine engine,
-                            const Threads& threads, const Deadline* deadline) {
+                            const Threads& threads) {
   if (isKnown(pairs)) return true;
   m_known.clear();
   start(geometries, pairs);
-  const bool isComplete = search(engine, threads, deadline);
+  const bool isComplete = endsInTime([&] { search(engine, threads); });
   bool allFinished = true;
   for (const auto& record : pairs.records()) {
     if (!takesPart(*record) || (isComplete && !record->isUnfinished)) continue;
@@ -89,36 +89,30 @@ bool FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pa
   return isComplete;
 }
 
-bool FreeMotionSearch::search(Engine engine, const Threads& threads, const Deadline* deadline) {
-  const auto isOver = [&] { return deadline && deadline->isOver(); };
+void FreeMotionSearch::search(Engine engine, const Threads& threads) {
   threads.forEach(m_boxed.size(), [&](std::size_t i) {
-    if (!isOver()) boxElements(m_boxed[i]->body.mesh, m_boxed[i]->elementBoxes);
+    boxElements(m_boxed[i]->body.mesh, m_boxed[i]->elementBoxes);
   });
-  if (isOver()) return false;
   m_places.clear();
   m_nodePairs.clear();
   for (std::size_t i = 0; i < m_works.size(); ++i) {
     std::size_t jobs = 1;
     if (engine == Engine::Octree && !hasShape(*m_works[i].record)) {
-      startSearch(m_works[i], threads.count() > 1 || deadline);
+      startSearch(m_works[i], threads.count() > 1 || isTimed());
       jobs = (m_works[i].count + m_works[i].grain - 1) / m_works[i].grain;
     }
     for (std::size_t job = 0; job < jobs; ++job) m_places.push_back({i, job});
   }
   while (m_scratch.size() < m_places.size()) m_scratch.push_back(std::make_unique<Scratch>());
-  std::atomic<bool> isComplete{true};
   threads.forEach(m_places.size(), [&](std::size_t i) {
     const Work& work = m_works[m_places[i].work];
-    if (isOver())
-      isComplete = false;
-    else if (hasShape(*work.record))
+    if (hasShape(*work.record))
       withShape(work, engine, *m_scratch[i]);
     else if (engine == Engine::BruteForce)
       runByBruteForce(work, *m_scratch[i]);
-    else if (!run(work, m_places[i].job, *m_scratch[i], deadline))
-      isComplete = false;
+    else
+      run(work, m_places[i].job, *m_scratch[i]);
   });
-  return isComplete;
 }
 
 void FreeMotionSearch::commit(const GeometryTable& geometries) noexcept {
@@ -163,31 +157,24 @@ void FreeMotionSearch::startSearch(Work& work, bool divides) {
   work.grain = std::max<std::size_t>(1, (work.count + kSearchJobs - 1) / kSearchJobs);
 }
 
-bool FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch,
-                           const Deadline* deadline) const {
+void FreeMotionSearch::run(const Work& work, std::size_t job, Scratch& scratch) const {
   const std::size_t begin = job * work.grain, size = std::min(work.count - begin, work.grain);
   struct Context {
     const MeshPair pair;
     const double searchDistance;
     const FreeMotions motions;
-    const Deadline* const deadline;
-    TraversalStack& stack;
-    bool isComplete = true;
-  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record), deadline,
-            scratch.stack};
+  } context{meshesOf(*work.record), work.searchDistance, motionsOf(*work.record)};
   scratch.sink.start(
       [](void* opaque, std::span<const ElementPair> pairs) {
-        Context& c = *static_cast<Context*>(opaque);
-        c.isComplete = c.isComplete && forEachPart(c.deadline, pairs, [&](const auto& part) {
-                         findFreeMotion(c.pair, c.searchDistance, part, c.motions);
-                       });
-        if (!c.isComplete) c.stack.stop();
+        const Context& c = *static_cast<const Context*>(opaque);
+        forEachPart(pairs, [&](const auto& part) {
+          findFreeMotion(c.pair, c.searchDistance, part, c.motions);
+        });
       },
-      &context, deadline);
+      &context);
   traverse(work.trees, std::span(m_nodePairs).subspan(work.first + begin, size), scratch.stack,
            scratch.sink);
   scratch.sink.flush();
-  return context.isComplete;
 }
 
 void FreeMotionSearch::runByBruteForce(const Work& work, Scratch& scratch) {

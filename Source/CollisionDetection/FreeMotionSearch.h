@@ -8,7 +8,6 @@
 #include "Shapes/Shape.h"
 #include "Octree/Traversal.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
 
@@ -25,11 +24,9 @@ namespace palpate {
 class FreeMotionSearch {
  public:
   /// Writes Geometry::nextFreeMotion, unless nothing changed since the last commit(). The octrees
-  /// must be up to date. Returns whether the search was completed. If its time is over, free
-  /// motions follow from PairRecord::distanceBound, also those of geometries with an unfinished
-  /// pair.
-  bool find(const GeometryTable&, const PairTable&, Engine, const Threads&,
-            const Deadline* = nullptr);
+  /// must be up to date. Returns whether the search ended in time. If it did not, free motions
+  /// follow from PairRecord::distanceBound, also those of geometries with an unfinished pair.
+  bool find(const GeometryTable&, const PairTable&, Engine, const Threads&);
   /// Makes what find() wrote the result.
   void commit(const GeometryTable&) noexcept;
   /// A pair, and its state for which the results hold.
@@ -60,11 +57,10 @@ class FreeMotionSearch {
   };
 
   bool isKnown(const PairTable&) const;
-  bool search(Engine, const Threads&, const Deadline*);
+  void search(Engine, const Threads&);
   void start(const GeometryTable&, const PairTable&);
   void startSearch(Work&, bool divides);
-  /// Returns whether the deadline left time for all.
-  bool run(const Work&, std::size_t job, Scratch&, const Deadline*) const;
+  void run(const Work&, std::size_t job, Scratch&) const;
   static void runByBruteForce(const Work&, Scratch&);
   static void withShape(const Work&, Engine, Scratch&);
 

@@ -7,8 +7,8 @@
 #include "NarrowPhase/NarrowPhase.h"
 #include "Octree/Traversal.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Stopping.h"
 #include "Core/Threads.h"
 
 #include <cstddef>
@@ -26,8 +26,6 @@ struct JobScratch : CountedObject {
   bool intersectionsMissed = false;  ///< they were not looked for in every batch
   std::size_t candidateCount = 0;
   ProxyHits hits;
-  const Deadline* deadline = nullptr;  ///< of a detection with a budget
-  bool isOutOfTime = false;            ///< the job did not end
   double milliseconds = 0, narrowMilliseconds = 0;
 
   TraversalStack stack;
@@ -46,15 +44,7 @@ struct JobScratch : CountedObject {
     nearby = intersectionsMissed = false;
     candidateCount = 0;
     hits.count = 0;
-    isOutOfTime = false;
     milliseconds = narrowMilliseconds = 0;
-  }
-  /// Calls use(part) for parts of the items until the job is out of time. A traversal that is in
-  /// progress then ends.
-  template <class Item, class Use>
-  void forEachPart(std::span<const Item> items, Use&& use) {
-    if (!isOutOfTime) isOutOfTime = !palpate::forEachPart(deadline, items, use);
-    if (isOutOfTime) stack.stop();
   }
 };
 
@@ -66,9 +56,8 @@ struct FrameStart {
   const Threads& threads;
   Buffer<NodePair>& nodePairs;  ///< of the traversals of all pairs
   TraversalStack& stack;
-  const Deadline* deadline = nullptr;
   /// Whether a pair has many jobs if it is large enough. Results do not depend on it.
-  bool divides() const { return threads.count() > 1 || deadline; }
+  bool divides() const { return threads.count() > 1 || isTimed(); }
 };
 
 /// The same of join().
@@ -77,7 +66,6 @@ struct FrameJoin {
   Engine engine;
   FrameStatistics& statistics;
   class PairResults& results;
-  const Deadline* deadline = nullptr;
 };
 
 }  // namespace palpate

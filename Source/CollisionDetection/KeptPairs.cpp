@@ -4,6 +4,7 @@
 #include "Octree/BoxMap.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <cmath>
@@ -353,7 +354,7 @@ void KeptPairs::gather(std::size_t job, const MeshPair& meshes, JobScratch& scra
   PALPATE_ASSERT(job + 1 < m_jobs.size());
   for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i)
     if (!m_units[i].isMade) {
-      checkTime(scratch.deadline);
+      checkTime();
       make(m_units[i], meshes, scratch);
     }
 }
@@ -363,7 +364,7 @@ void KeptPairs::run(std::size_t job, const MeshPair& meshes, JobScratch& scratch
   PALPATE_ASSERT(job + 1 < m_jobs.size());
   for (std::size_t i = m_jobs[job]; i < m_jobs[job + 1]; ++i) {
     Unit& unit = m_units[i];
-    checkTime(scratch.deadline);
+    checkTime();
     if (!unit.isMade) make(unit, meshes, scratch);
     if (!unit.isSorted) {
       scratch.kept.assign(unit.near.begin(), unit.near.end());

@@ -9,6 +9,7 @@
 #include "NarrowPhase/StepCheck.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
@@ -22,7 +23,7 @@ namespace {
 /// Node pairs and jobs for each collision pair, where there is a deadline or more than one thread.
 constexpr std::size_t kNodePairsWanted = 256, kJobsPerPair = 32;
 /// Below this many elements, splitting a pair among threads costs more than it saves. With a
-/// deadline it is split into so many node pairs, as the search from each looks at no clock.
+/// deadline it is split into so many node pairs, as the search from each asks no deadline.
 constexpr std::size_t kSharedSize = 8192, kFewNodePairs = 8;
 
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
@@ -93,7 +94,7 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   scratch.near.clear();
   m_record->kept.run(job, meshes, scratch, scratch.near);
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   const auto enabled = [&](std::span<const ElementPair> pairs, Buffer<ElementPair>& kept) {
     const MeshTopology &a = meshes.a.topology, &b = meshes.b.topology;
     kept.assign(pairs.begin(), pairs.end());
@@ -106,16 +107,15 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   if (meshes.step.checksStart)
     m_record->kept.forEachList(
         job, meshes.step.apartBelow, [&](std::span<const ElementPair> pairs) {
-          scratch.forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
-                              [&](const auto& part) { checkStart(meshes, part, scratch); });
+          forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
+                      [&](const auto& part) { checkStart(meshes, part, scratch); });
         });
   if (anyDisabled) {
     enabled(scratch.near, scratch.kept);
     scratch.near.swap(scratch.kept);
   }
-  scratch.forEachPart(std::span<const ElementPair>(scratch.near),
-                      [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
-  scratch.narrowMilliseconds += watch.lap();
+  forEachPart(std::span<const ElementPair>(scratch.near),
+              [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
 }
 
 std::size_t MeshWork::startCandidates(const FrameStart& frame) {
@@ -128,10 +128,9 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   GeometryOctree &ofA = record.a->body.tree, &ofB = record.b->body.tree;
   const std::size_t elements = ofA.octree().size() + ofB.octree().size();
   if (!hasElements(record)) return 0;
-  const Triangle* const unfolded =
-      adjacentPairs && reportsOnlyTouching(record)
-          ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads, frame.deadline)
-          : nullptr;
+  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
+                                       ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads)
+                                       : nullptr;
   m_thickness =
       record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
   const auto treesIn = [&](BoxFrame in, double distance) {
@@ -148,7 +147,7 @@ std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs
   m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
                     searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
   const bool shared = frame.divides() && elements >= kSharedSize;
-  startPairs(m_trees, shared ? kNodePairsWanted : frame.deadline ? kFewNodePairs : 1, frame.stack);
+  startPairs(m_trees, shared ? kNodePairsWanted : isTimed() ? kFewNodePairs : 1, frame.stack);
   m_nodePairs = &frame.nodePairs;
   m_first = frame.nodePairs.size(), m_count = frame.stack.pairs.size();
   frame.nodePairs.insert(frame.nodePairs.end(), frame.stack.pairs.begin(), frame.stack.pairs.end());
@@ -230,15 +229,14 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
     if (round == 0) m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      scratch.forEachPart(pairs, [&](const auto& part) { detect(part, scratch); });
+      forEachPart(pairs, [&](const auto& part) { detect(part, scratch); });
     });
     scratch.candidateCount = scratch.sink.total();
   } else if (repeats(scratch)) {
-    Stopwatch watch;
+    const AddedTime time(scratch.narrowMilliseconds);
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      scratch.forEachPart(pairs, [&](const auto& part) { detectIntersections(part, scratch); });
+      forEachPart(pairs, [&](const auto& part) { detectIntersections(part, scratch); });
     });
-    scratch.narrowMilliseconds += watch.lap();
   }
 }
 
@@ -246,7 +244,7 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
   const MeshPair meshes = m_record->meshes(m_trees.isMapped() ? nullptr : &m_floats);
   {
     const MemoryScope memory(MemoryStage::NarrowPhase);
-    Stopwatch watch;
+    const AddedTime time(scratch.narrowMilliseconds);
     const StepFacts& facts = scratch.contacts.facts;
     if (meshes.step.checksStart) checkStart(meshes, pairs, scratch);
     if (m_record->plan.runsIntersection &&
@@ -258,7 +256,6 @@ void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) c
       findEarliest(meshes, pairs, scratch);
     else
       findContacts(meshes, pairs, scratch.contacts);
-    scratch.narrowMilliseconds += watch.lap();
   }
 }
 
@@ -314,7 +311,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   PairResults& results = join.results;
   auto& [pierced, leaving, piercingContacts, knownSides, bodies] = results.meshes;
   pierced.clear();
-  results.start(jobs, join.deadline);
+  results.start(jobs);
   auto &found = results.found(), &intersections = results.intersections();
   StepFacts& facts = results.facts();
   const bool byIntersection = record.plan.method == Method::Intersection;
@@ -324,7 +321,7 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   for (const auto* buffers : {&found, &intersections})
     for (const ContactBuffers* each : *buffers) facts.add(each->facts);
   results.sortFacts(record);
-  if (isOver(join.deadline)) return;
+  checkTime();
   if (record.plan.step.reportsImpacts && facts.clearance == 0.0) {
     for (ContactBuffers* each : found)
       replaceByImpacts(record.meshes(), facts, *each, results.impacts);
@@ -341,20 +338,20 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
     preferred = intersections.size();
     found.insert(found.begin(), intersections.begin(), intersections.end());
   }
-  if (isOver(join.deadline)) return;
+  checkTime();
   // A feature pair that Intersection reports is not reported by distance or impact as well: where
   // the step starts intersecting only Intersection knows the side.
   preferred = preferBodies(join, preferred);
-  if (isOver(join.deadline)) return;
+  checkTime();
   const std::size_t intersectionCount = results.order(record, preferred);
   join.statistics.exactDecisions += pierced.exactDecisions;
   CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
   describeExact(contents);
   const bool nearby =
       std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });
-  if (isOver(join.deadline)) return;
+  checkTime();
   results.assess(record, nearby, join.statistics);
-  if (isOver(join.deadline)) return;
+  checkTime();
   // After assess(), which tests the triangles around every impact.
   const bool mixes = record.plan.step.reportsImpacts,
              continuous = record.plan.method == Method::Continuous;
@@ -381,9 +378,8 @@ std::size_t MeshWork::preferBodies(const FrameJoin& join, std::size_t preferred)
   if (!bodies) bodies = std::make_unique<BodyContacts>();
   const bool byIntersection = record.plan.method == Method::Intersection;
   const BodyContacts::Buffers all(found), local = byIntersection ? all : intersections;
-  const bool areDeep =
-      bodies->find(record, join.engine, join.results.facts().startsPiercing(), local,
-                   all.subspan(byIntersection ? all.size() : preferred), join.deadline);
+  const bool areDeep = bodies->find(record, join.engine, join.results.facts().startsPiercing(),
+                                    local, all.subspan(byIntersection ? all.size() : preferred));
   record.byBodies = areDeep || bodies->hasTurned();
   join.statistics.exactDecisions += bodies->exactDecisions();
   if (!areDeep) return preferred;

@@ -44,11 +44,10 @@ class MeshWork {
     scratch.sink.start(
         [](void* opaque, std::span<const ElementPair> pairs) {
           Context& c = *static_cast<Context*>(opaque);
-          if (c.scratch.isOutOfTime) return;
           const std::span<const ElementPair> candidates = c.work.candidatesAmong(pairs, c.scratch);
           if (!candidates.empty()) c.use(candidates);
         },
-        &context, scratch.deadline);
+        &context);
     traverseJob(job, scratch);
   }
   /// Passes the traversal of a job to its sink, which was started.

@@ -3,6 +3,7 @@
 #include "CollisionDetection/PairOrder.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 #include <algorithm>
@@ -209,10 +210,10 @@ void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
 }
 
 void OctreeBasedCD::Implementation::prepare(std::span<PairRecord* const> records,
-                                            const Deadline* deadline, Trace* traced) {
+                                            StopScope::Token token, Trace* traced) {
   bool mustUpdate = false;
   for (PairRecord* record : records) {
-    record->isUnfinished = deadline && deadline->isOver();
+    record->isUnfinished = token && token->isOver();
     if (record->isUnfinished) continue;
     planByFieldIfProven(*record, settings.engine);
     record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
@@ -226,9 +227,8 @@ void OctreeBasedCD::Implementation::prepare(std::span<PairRecord* const> records
 }
 
 void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> records,
-                                                 const Deadline* deadline, FrameStatistics& next,
-                                                 Trace* traced) {
-  if (!deadline)
+                                                 FrameStatistics& next, Trace* traced) {
+  if (!isTimed())
     return settings.engine == Engine::Octree ? frame.detect(records, threads, next, traced)
                                              : frame.detectByBruteForce(records, next, traced);
   const auto end = std::find_if(records.begin(), records.end(),
@@ -236,12 +236,13 @@ void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> re
   const auto prepared = records.first(static_cast<std::size_t>(end - records.begin()));
   const std::uint64_t step = geometries.stepNumber();
   if (settings.engine == Engine::Octree)
-    return frame.detectUntil(*deadline, step, prepared, threads, next, traced);
+    return frame.detectInTime(step, prepared, threads, next, traced);
   for (PairRecord* record : prepared) {
-    record->isUnfinished = deadline->isOver();
-    if (record->isUnfinished) continue;
-    frame.detectByBruteForce({&record, 1}, next, traced);
-    frame.track(*record, step);
+    record->isUnfinished = !endsInTime([&] {
+      checkTime();
+      frame.detectByBruteForce({&record, 1}, next, traced);
+    });
+    if (!record->isUnfinished) frame.track(*record, step);
   }
 }
 
@@ -328,7 +329,7 @@ void OctreeBasedCD::Implementation::followSides() {
   }
 }
 
-bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
+bool OctreeBasedCD::Implementation::detect(StopScope::Token token) {
   const MemoryScope memory(MemoryStage::Pairs);
   Trace* const traced = trace ? &*trace : nullptr;
   if (traced) traced->startFrame();
@@ -343,32 +344,34 @@ bool OctreeBasedCD::Implementation::detect(const Deadline* deadline) {
     if (record->dataVersion.isCurrent(record->state()))
       planByFieldIfProven(*record, settings.engine);
   }
-  if (deadline) {
+  if (token) {
     orderByUrgency(selectedPairs);
     trustBefore.clear();
     for (const PairRecord* record : records) trustBefore.push_back(record->trust);
   }
-  prepare(records, deadline, traced);
+  prepare(records, token, traced);
   Stopwatch watch;
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
-  findContacts(records, deadline, next, traced);
-  next.freeMotionUnfinished =
-      !freeMotions.find(geometries, pairs, settings.engine, threads, deadline);
+  {
+    const StopScope scope(token);
+    findContacts(records, next, traced);
+    next.freeMotionUnfinished = !freeMotions.find(geometries, pairs, settings.engine, threads);
+  }
   {
     const MemoryScope results(MemoryStage::Results);
     watch.lap();
     // With a deadline, pairs of other answers were tracked one by one.
     for (const auto& record : pairs.records())
-      if (!deadline || !record->collides() || record->dataVersion.isCurrent(record->state()))
+      if (!token || !record->collides() || record->dataVersion.isCurrent(record->state()))
         frame.track(*record, geometries.stepNumber());
     for (PairRecord* record : records)
       if (!record->isUnfinished) record->addTags();
-    if (deadline) listUnfinished(records);
+    if (token) listUnfinished(records);
     next.milliseconds.order += watch.lap();
   }
   // Nothing below throws but the audit: a detection that fails leaves the last answers.
-  if (deadline) keepUnfinished(records, next);
+  if (token) keepUnfinished(records, next);
   freeMotions.commit(geometries);
   commit(records);
   for (const auto& record : pairs.records()) {

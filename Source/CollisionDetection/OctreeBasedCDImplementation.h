@@ -13,7 +13,7 @@
 #include "Queries/QuerySource.h"
 #include "Queries/SnapshotPool.h"
 #include "Octree/Forest.h"
-#include "Core/Deadline.h"
+#include "Core/Stopping.h"
 #include "Core/FloatingPoint.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Threads.h"
@@ -165,13 +165,13 @@ struct OctreeBasedCD::Implementation {
   /// For a StepGuard. Results and statistics of the table's pairs stay as they are.
   void detect(const GuardedPairs& guarded);
 
-  /// Returns whether everything was finished. deadline: null for none.
-  bool detect(const Deadline* deadline);
+  /// Returns whether everything was finished. The token ends the search for contacts and for free
+  /// motions, and nothing else.
+  bool detect(StopScope::Token);
 
   /// Completes the plans of pairs. Those for which no time is left become PairRecord::isUnfinished.
-  void prepare(std::span<PairRecord* const> records, const Deadline*, Trace*);
-  void findContacts(std::span<PairRecord* const> records, const Deadline*, FrameStatistics&,
-                    Trace*);
+  void prepare(std::span<PairRecord* const> records, StopScope::Token, Trace*);
+  void findContacts(std::span<PairRecord* const> records, FrameStatistics&, Trace*);
   /// records: all that had to be found, in the order of urgency. The first call lists those that
   /// are unfinished, and may throw; the second keeps their last answers.
   void listUnfinished(std::span<PairRecord* const> records);

@@ -25,9 +25,7 @@ void sortUnique(Buffer<std::uint32_t>& ids, std::size_t count, Buffer<std::uint8
 
 }  // namespace
 
-void PairResults::start(Jobs jobs, const Deadline* deadline) {
-  m_orderScratch.deadline = impacts.deadline = deadline;
-  meshes.pierced.deadline = meshes.leaving.deadline = deadline;
+void PairResults::start(Jobs jobs) {
   m_facts.clear();
   impacts.clear();
   m_found.clear();

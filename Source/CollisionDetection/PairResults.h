@@ -30,8 +30,8 @@ class PairResults {
  public:
   using Buffers = std::span<ContactBuffers* const>;
 
-  /// Begins a pair: takes the facts of its jobs. deadline: of all that follows; null: none.
-  void start(Jobs, const Deadline* deadline);
+  /// Begins a pair: takes the facts of its jobs.
+  void start(Jobs);
   StepFacts& facts() { return m_facts; }
   /// Contacts of all jobs, and Auto's from Intersection.
   std::vector<ContactBuffers*>& found() { return m_found; }

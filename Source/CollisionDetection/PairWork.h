@@ -18,7 +18,7 @@ namespace palpate {
 /// start()            returns the number of jobs; 0: nothing is near. Once all pairs have started,
 /// hasRound(n, jobs)  says whether all jobs run for the n-th time,
 /// run(n, i, scratch) runs the i-th one, on any thread,
-/// join()             writes the results to PairRecord::next, until the deadline is over.
+/// join()             writes the results to PairRecord::next.
 /// runByBruteForce()  does the work of all jobs without octrees, and without start().
 using PairWork = std::variant<MeshWork, ShapeWork, FieldWork, ProxyWork, AttachedProxyWork>;
 

@@ -3,6 +3,7 @@
 #include "CollisionDetection/PairResults.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 namespace palpate {
@@ -12,21 +13,19 @@ std::size_t ProxyWork::place(bool divides) {
                            divides);
 }
 
-std::size_t ProxyWork::start(const FrameStart& frame) { return place(frame.deadline != nullptr); }
+std::size_t ProxyWork::start(const FrameStart&) { return place(isTimed()); }
 
 void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   m_proxyJobs.find(job, scratch);
-  scratch.narrowMilliseconds += watch.lap();
 }
 
 void ProxyWork::runByBruteForce(JobScratch& scratch) {
   place(false);
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   m_proxyJobs.findByBruteForce(scratch);
-  scratch.narrowMilliseconds += watch.lap();
 }
 
 void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
@@ -48,7 +47,7 @@ void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
     m_proxyJobs.write(*jobs[i], contents.shape.data() + first);
   });
   m_proxyJobs.describe(jobs, contents);
-  join.results.start(jobs, join.deadline);
+  join.results.start(jobs);
   join.results.assess(record, false, join.statistics);
   countContacts(0, contents);
 }

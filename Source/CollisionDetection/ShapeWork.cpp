@@ -7,6 +7,7 @@
 #include "Shapes/ShapeNearings.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
+#include "Core/Stopping.h"
 #include "Core/Stopwatch.h"
 
 namespace palpate {
@@ -44,15 +45,14 @@ void ShapeWork::run(int, std::size_t, JobScratch& scratch) const {
     scratch.candidateCount = 1;
   }
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  Stopwatch watch;
+  const AddedTime time(scratch.narrowMilliseconds);
   const auto find = [&](std::span<const std::uint32_t> elements) {
     findWithShape(record, elements, scratch.contacts.shapes);
   };
   if (record.plan.kind == PairKind::MeshAndShape)
-    scratch.forEachPart(std::span<const std::uint32_t>(scratch.elements), find);
+    forEachPart(std::span<const std::uint32_t>(scratch.elements), find);
   else
     find({});
-  scratch.narrowMilliseconds += watch.lap();
   if (record.pair.settings.continuous.earliestTimeOnly) takeEarliest(*m_record, scratch.contacts);
 }
 
@@ -66,7 +66,7 @@ void ShapeWork::join(Jobs jobs, const FrameJoin& join) const {
   PairRecord& record = *m_record;
   PairResults& results = join.results;
   const bool continuous = record.plan.method == Method::Continuous;
-  results.start(jobs, join.deadline);
+  results.start(jobs);
   for (const ContactBuffers* found : results.found()) {
     results.facts().add(found->facts);
     results.facts().addShape(found->shapes, continuous);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <utility>
 
@@ -88,6 +89,44 @@ bool endsInTime(F&& f) {
     return true;
   } catch (const OutOfTime&) {
     return false;
+  }
+}
+
+/// checkTime() in one of so many calls, for a loop on one thread.
+class TimeCheck {
+ public:
+  explicit TimeCheck(unsigned calls) : m_calls(calls) {}
+  void operator()() {
+    if (m_token && ++m_count % m_calls == 0) m_token->check();
+  }
+
+ private:
+  const StopScope::Token m_token = StopScope::current();
+  unsigned m_calls, m_count = 0;
+};
+
+/// std::sort() that throws OutOfTime if there is a deadline that is over.
+template <class Iterator, class Less>
+void sortInTime(Iterator begin, Iterator end, Less&& less) {
+  if (!isTimed()) return std::sort(begin, end, less);
+  TimeCheck check(512);
+  std::sort(begin, end, [&](const auto& l, const auto& r) {
+    check();
+    return less(l, r);
+  });
+}
+
+/// Calls use(part) for all items in order. Without a deadline there is one part. Else parts are
+/// small, and OutOfTime is thrown before a part if the deadline is over. The result of use must not
+/// depend on how items are divided.
+template <class Span, class Use>
+void forEachPart(const Span& items, Use&& use) {
+  constexpr std::size_t kPart = 16;  // takes some microseconds
+  const StopScope::Token token = StopScope::current();
+  if (!token) return use(items);
+  for (std::size_t begin = 0; begin < items.size(); begin += kPart) {
+    token->check();
+    use(items.subspan(begin, begin + kPart < items.size() ? kPart : items.size() - begin));
   }
 }
 

@@ -18,4 +18,17 @@ class Stopwatch {
   std::chrono::steady_clock::time_point m_start = std::chrono::steady_clock::now();
 };
 
+/// Adds the milliseconds of its life to a sum, also where an exception ends it.
+class AddedTime {
+ public:
+  explicit AddedTime(double& sum) : m_sum(sum) {}
+  ~AddedTime() { m_sum += m_watch.lap(); }
+  AddedTime(const AddedTime&) = delete;
+  AddedTime& operator=(const AddedTime&) = delete;
+
+ private:
+  double& m_sum;
+  Stopwatch m_watch;
+};
+
 }  // namespace palpate

@@ -126,18 +126,15 @@ bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views
 }  // namespace
 
 void UnfoldedStars::find(const MeshTopology& topology, std::span<const Triangle> ordered,
-                         const FloatPoint* before, const FloatPoint* now, const Threads& threads,
-                         const Deadline* deadline) {
+                         const FloatPoint* before, const FloatPoint* now, const Threads& threads) {
   const CountedVector<Triangle>& triangles = topology.elements;
   m_views.resize(triangles.size());
   threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    checkTime(deadline);
     HWY_DYNAMIC_DISPATCH(viewsKernel)
     (triangles.data() + from, to - from, before, now, m_views.data() + from);
   });
   const auto forAll = [&](std::size_t size, auto&& f) {
     threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-      checkTime(deadline);
       for (std::size_t i = from; i < to; ++i) f(i);
     });
   };

@@ -3,7 +3,6 @@
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 #include "Core/Threads.h"
 
 #include <cstdint>
@@ -39,9 +38,8 @@ class UnfoldedStars {
  public:
   /// ordered: the triangles in the order in which triangles() returns them. before and now: floats
   /// of one frame, at the ends of the step.
-  /// deadline: null for none.
   void find(const MeshTopology&, std::span<const Triangle> ordered, const FloatPoint* before,
-            const FloatPoint* now, const Threads&, const Deadline* deadline);
+            const FloatPoint* now, const Threads&);
 
   /// The ordered triangles, readable BoxArrays::kPadding past their end. Each vertex whose star is
   /// not unfolded is replaced by a unique number. Two triangles that still share a number need no

@@ -2,6 +2,7 @@
 
 #include "Math/ClosestPoint.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <Eigen/Geometry>
 
@@ -115,6 +116,7 @@ bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t tri
   const bool triangleFirst = swapped && !pair.self();
   const std::uint32_t tagOfVertex = (swapped ? pair.b : pair.a).tagOfVertex(vertex),
                       tagOfTriangle = mesh.tag(triangle);
+  const StopScope ofPredicate(nullptr);
   return !(*pair.predicate)(
       triangleFirst ? ContactFeatures{Kind::TriangleVertex, t, v, tagOfTriangle, tagOfVertex}
                     : ContactFeatures{Kind::VertexTriangle, v, t, tagOfVertex, tagOfTriangle});
@@ -122,9 +124,11 @@ bool rejectsVertex(const MeshPair& pair, std::uint32_t vertex, std::uint32_t tri
 
 bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB) {
   const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  return (!pair.keepsApart && areNearAtRest(pair, p, q)) ||
-         (pair.predicate && !(*pair.predicate)({ContactFeatures::Kind::EdgeEdge, p, q,
-                                                pair.a.tagOfEdge(p), pair.b.tagOfEdge(q)}));
+  if (!pair.keepsApart && areNearAtRest(pair, p, q)) return true;
+  if (!pair.predicate) return false;
+  const StopScope ofPredicate(nullptr);
+  return !(*pair.predicate)(
+      {ContactFeatures::Kind::EdgeEdge, p, q, pair.a.tagOfEdge(p), pair.b.tagOfEdge(q)});
 }
 
 bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction,

@@ -9,7 +9,6 @@
 #include "Mesh/TriangleMesh.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 
 #include <algorithm>
 #include <compare>
@@ -165,10 +164,9 @@ struct ContactBuffers {
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch
   StepFacts facts;
-  std::size_t featurePairs = 0;        ///< tested
-  std::size_t exactDecisions = 0;      ///< left to exact arithmetic
-  std::size_t validityPairs = 0;       ///< triangle pairs tested for Validity::startedApart
-  const Deadline* deadline = nullptr;  ///< of the work after the last batch; null: none
+  std::size_t featurePairs = 0;    ///< tested
+  std::size_t exactDecisions = 0;  ///< left to exact arithmetic
+  std::size_t validityPairs = 0;   ///< triangle pairs tested for Validity::startedApart
   void clear();
 };
 

@@ -1,6 +1,7 @@
 #include "NarrowPhase/Order.h"
 
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <functional>
@@ -30,8 +31,8 @@ Ids byElement(const ShapeContact& c) {
 template <class Contact, class ListOf, class Entries, class IdsOf>
 std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferred, ListOf&& listOf,
                   Entries& entries, CountedVector<Contact>& out, IdsOf&& idsOf,
-                  Buffer<std::uint8_t>* flags, const Deadline* deadline) {
-  TimeCheck check(deadline, 256);
+                  Buffer<std::uint8_t>* flags) {
+  TimeCheck check(256);
   std::size_t size = 0;
   for (const ContactBuffers* found : buffers) size += std::invoke(listOf, *found).size();
   entries.clear();
@@ -42,8 +43,8 @@ std::size_t order(std::span<ContactBuffers* const> buffers, std::size_t preferre
       const Ids ids = idsOf(contact);
       entries.push_back({ContactSortKey(ids[0], ids[1], i < preferred), &contact});
     }
-  sortUntil(deadline, entries.begin(), entries.end(),
-            [](const auto& l, const auto& r) { return l.key < r.key; });
+  sortInTime(entries.begin(), entries.end(),
+             [](const auto& l, const auto& r) { return l.key < r.key; });
   entries.erase(std::unique(entries.begin(), entries.end(),
                             [&](const auto& l, const auto& r) {
                               check();
@@ -76,13 +77,12 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
   const auto shapesOf = [](const ContactBuffers& found) -> auto& { return found.shapes.shape; };
   const std::size_t count =
       order(buffers, preferred, &ContactBuffers::vertexTriangle, scratch.vertexTriangle,
-            out.vertexTriangle, byVertex, &scratch.preferred[0], scratch.deadline) +
+            out.vertexTriangle, byVertex, &scratch.preferred[0]) +
       order(buffers, preferred, &ContactBuffers::triangleVertex, scratch.vertexTriangle,
-            out.triangleVertex, byTriangle, &scratch.preferred[1], scratch.deadline) +
+            out.triangleVertex, byTriangle, &scratch.preferred[1]) +
       order(buffers, preferred, &ContactBuffers::edgeEdge, scratch.edgeEdge, out.edgeEdge, byEdges,
-            &scratch.preferred[2], scratch.deadline);
-  order(buffers, preferred, shapesOf, scratch.shape, out.shape, byElement, nullptr,
-        scratch.deadline);
+            &scratch.preferred[2]);
+  order(buffers, preferred, shapesOf, scratch.shape, out.shape, byElement, nullptr);
   out.shapeShape.clear();
   for (const ContactBuffers* buffer : buffers)
     out.shapeShape.insert(out.shapeShape.end(), buffer->shapes.shapeShape.begin(),
@@ -92,7 +92,7 @@ std::size_t orderContacts(std::span<ContactBuffers* const> buffers, std::size_t 
   for (const ContactBuffers* buffer : buffers)
     triangles.insert(triangles.end(), buffer->intersectingTriangles.begin(),
                      buffer->intersectingTriangles.end());
-  sortUntil(scratch.deadline, triangles.begin(), triangles.end(), std::less<>());
+  sortInTime(triangles.begin(), triangles.end(), std::less<>());
   triangles.erase(std::unique(triangles.begin(), triangles.end()), triangles.end());
   return count;
 }

@@ -4,7 +4,6 @@
 
 #include "NarrowPhase/NarrowPhase.h"
 #include "Core/Assert.h"
-#include "Core/Deadline.h"
 
 #include <array>
 #include <cstdint>
@@ -44,7 +43,6 @@ struct OrderScratch {
   /// For the lists vertexTriangle, triangleVertex and edgeEdge of the last call: which contacts are
   /// from preferred buffers. Empty if there are no such buffers.
   std::array<Buffer<std::uint8_t>, 3> preferred;
-  const Deadline* deadline = nullptr;  ///< null: none
 };
 
 /// Collects the buffers' contacts, sorted by element ids, each once. The first `preferred` buffers

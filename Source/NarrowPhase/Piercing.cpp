@@ -11,6 +11,7 @@
 #include "Math/Tolerances.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <cmath>
@@ -389,21 +390,20 @@ void recordCrossings(const MeshPair& pair, bool atStart, const ElementPair& tria
 }
 
 void PiercingContacts::collect(std::span<ContactBuffers* const> found,
-                               Buffer<EdgeCrossing> ContactBuffers::*list,
-                               const Deadline* deadline) {
+                               Buffer<EdgeCrossing> ContactBuffers::*list) {
   m_crossings.clear();
   for (const ContactBuffers* buffers : found)
     m_crossings.insert(m_crossings.end(), (buffers->*list).begin(), (buffers->*list).end());
-  sortUntil(deadline, m_crossings.begin(), m_crossings.end(), std::less<>());
+  sortInTime(m_crossings.begin(), m_crossings.end(), std::less<>());
   m_crossings.erase(std::unique(m_crossings.begin(), m_crossings.end()), m_crossings.end());
 }
 
 void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* const> found,
                             ContactBuffers& out) {
-  collect(found, &ContactBuffers::crossings, out.deadline);
+  collect(found, &ContactBuffers::crossings);
   findBehind(pair, false, out);
   addDepths(pair, false, out);
-  TimeCheck check(out.deadline, 32);
+  TimeCheck check(32);
   for (const ContactBuffers* buffers : found)
     for (const PiercedPair& pierced : buffers->pierced) {
       check();
@@ -414,7 +414,7 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
 
 void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffers* const> found,
                                    ContactBuffers& out) {
-  collect(found, &ContactBuffers::crossingsAtStart, out.deadline);
+  collect(found, &ContactBuffers::crossingsAtStart);
   findBehind(pair, true, out);
   addDepths(pair, true, out);
 }
@@ -457,7 +457,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
   for (auto first = m_behind.begin(); first != m_behind.end();) {
     const bool ofB = first->ofB;
     const std::uint32_t vertex = first->vertex;
-    checkTime(out.deadline);
+    checkTime();
     NearestInFront nearest(pair, ofB, atStart, vertex);
     const auto begin = first;
     for (; first != m_behind.end() && first->ofB == ofB && first->vertex == vertex; ++first)
@@ -488,7 +488,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
 }
 
 void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuffers& out) {
-  TimeCheck check(out.deadline, 64);
+  TimeCheck check(64);
   SignCounts counts;
   m_behind.clear();
   for (auto first = m_crossings.begin(); first != m_crossings.end();) {
@@ -506,7 +506,7 @@ void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuf
         m_behind.push_back({first->ofB, ends[leaves < 0], first->triangle, first->edge});
   }
   out.exactDecisions += counts.undecided;
-  sortUntil(out.deadline, m_behind.begin(), m_behind.end(), std::less<>());
+  sortInTime(m_behind.begin(), m_behind.end(), std::less<>());
   m_behind.erase(std::unique(m_behind.begin(), m_behind.end()), m_behind.end());
 }
 
@@ -660,7 +660,7 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
   findBeside(pair, false, others, m_atEnd, m_besideAtEnd);
   findBeside(pair, true, others, m_atStart, m_besideAtStart);
   const bool drops = pair.reportsDistinct(), b = !pair.self();
-  TimeCheck check(atStart.deadline, 32);
+  TimeCheck check(32);
   // ofB: the mesh of each vertex.
   const auto represents = [&](const auto& contact, const std::array<bool, 4>& ofB) {
     check();

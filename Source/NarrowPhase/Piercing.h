@@ -95,8 +95,7 @@ class PiercingContacts {
   };
 
  private:
-  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list,
-               const Deadline*);
+  void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list);
   void findBehind(const MeshPair&, bool atStart, ContactBuffers& out);
   void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
   bool isBehind(bool ofB, std::uint32_t vertex) const;
@@ -136,7 +135,7 @@ class PiercingContacts {
 ///          that are on the wrong side.
 class KnownSides {
  public:
-  /// atEnd, atStart: Intersection's contacts. Ends at the deadline of atStart.
+  /// atEnd, atStart: Intersection's contacts.
   void apply(const MeshPair&, std::span<ContactBuffers* const> atEnd, const ContactBuffers& atStart,
              std::span<ContactBuffers* const> others);
 

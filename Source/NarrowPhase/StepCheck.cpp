@@ -4,6 +4,7 @@
 #include "Math/MotionBound.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <Eigen/Geometry>
 
@@ -63,7 +64,7 @@ void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t first
 
 void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
                       ContactBuffers& out) {
-  TimeCheck check(out.deadline, 32);
+  TimeCheck check(32);
   const auto isTouched = [&](const Buffer<std::uint32_t>& sorted, auto... vertices) {
     return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
   };

@@ -4,7 +4,6 @@
 #include "Octree/Octree.h"
 #include "Octree/Walk.h"
 #include "Core/Buffer.h"
-#include "Core/Deadline.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -14,9 +13,8 @@ namespace palpate {
 /// Scratch of point queries, which keeps its peak capacity. Each query clears it first, so that a
 /// query that ended with an exception does not affect the next one.
 struct PointQueryStack {
-  Buffer<std::uint32_t> found;         ///< of findOverlapping()
-  std::size_t exactDecisions = 0;      ///< of all queries, until the caller clears it
-  const Deadline* deadline = nullptr;  ///< of several queries; null: none
+  Buffer<std::uint32_t> found;     ///< of findOverlapping()
+  std::size_t exactDecisions = 0;  ///< of all queries, until the caller clears it
 };
 
 /// Descends from the root into the nodes that `enter(node)` accepts. It calls enter() for each node

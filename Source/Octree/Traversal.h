@@ -8,6 +8,7 @@
 #include "Math/Box.h"
 #include "Core/Assert.h"
 #include "Core/Buffer.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <array>
@@ -32,15 +33,15 @@ class PairSink {
   static constexpr std::size_t kBatch = 4096, kSmallBatch = 512;
   static constexpr std::size_t kMaxAtOnce = 16;  ///< pairs for which reserveSpace() reserves space
 
-  /// smallBatches: so that the function is called often, as a deadline needs.
-  void start(Function function, void* context, bool smallBatches = false) {
+  /// With a deadline, batches are small, so that the function is called often.
+  void start(Function function, void* context) {
     m_function = function;
     m_context = context;
     m_size = 0;
     m_total = 0;
-    m_pairs.resize(!function      ? std::max(m_pairs.capacity(), kBatch)
-                   : smallBatches ? kSmallBatch
-                                  : kBatch);
+    m_pairs.resize(!function   ? std::max(m_pairs.capacity(), kBatch)
+                   : isTimed() ? kSmallBatch
+                               : kBatch);
   }
   /// Returns space for kMaxAtOnce pairs. Call advance() with the number of pairs written there.
   ElementPair* reserveSpace() {
@@ -110,9 +111,6 @@ void setShift(TreePair&, const std::array<double, 3>& offset, double thickness);
 /// that a traversal that ended with an exception does not affect the next one.
 struct TraversalStack {
   Buffer<NodePair> pairs, level;
-
-  /// Ends a traversal from its sink's function, which may be called a few times more.
-  void stop() { pairs.clear(); }
 };
 
 /// Writes the node pairs to start from to stack.pairs. If the roots do not overlap there are none,

@@ -3,6 +3,7 @@
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <array>
@@ -246,12 +247,10 @@ OverlapTest::Result OverlapTest::find(const Vector3d& shift, CountedVector<Both>
   };
   m_pair.forEachIntersecting(shift, std::ref(test));  // a copy would allocate
   m_pair.countExactDecisions(std::exchange(m_counts.undecided, 0));
-  if (isOver(m_pair.deadline())) return Result::Apart;
   if (intersecting)
-    sortUntil(m_pair.deadline(), intersecting->begin(), intersecting->end(),
-              [](const Both& l, const Both& r) {
-                return std::pair(l.elementA, l.elementB) < std::pair(r.elementA, r.elementB);
-              });
+    sortInTime(intersecting->begin(), intersecting->end(), [](const Both& l, const Both& r) {
+      return std::pair(l.elementA, l.elementB) < std::pair(r.elementA, r.elementB);
+    });
   if (any) return Result::Piercing;
   return isAnyPartInside(true) || isAnyPartInside(false) ? Result::Inside : Result::Apart;
 }
@@ -315,7 +314,7 @@ bool isConvex(const BodyPair& pair, bool ofA) {
     const auto [a, b, c] = cornersOf(topology.elements[triangle], positions);
     return number * windingNormal(a, b, c).dot(p - a) <= most;
   };
-  TimeCheck check(pair.deadline(), 64);
+  TimeCheck check(64);
   for (std::uint32_t e = 0; e < topology.edges.size(); ++e) {
     check();
     const auto both = topology.edgeTriangles[e];

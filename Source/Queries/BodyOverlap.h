@@ -44,7 +44,6 @@ class OverlapTest {
   };
   OverlapTest(const BodyPair&, OverlapScratch&);
   /// intersecting: if given, receives the pairs of triangles that have a common point, by elements.
-  /// At the pair's deadline the answer is Apart.
   Result find(const Eigen::Vector3d& shift,
               CountedVector<BodyPair::IntersectingTriangles>* intersecting = nullptr);
 

@@ -5,6 +5,7 @@
 #include "Mesh/Corners.h"
 #include "Math/RayCrossing.h"
 #include "Math/Tolerances.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <bit>
@@ -17,8 +18,8 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
-void BodyVertices::assign(const Body& geometry, const Deadline* deadline) {
-  TimeCheck check(deadline, 512);
+void BodyVertices::assign(const Body& geometry) {
+  TimeCheck check(512);
   const auto& now = geometry.mesh.now;
   positions.resize(now.size());
   for (std::size_t v = 0; v < now.size(); ++v) {
@@ -55,8 +56,8 @@ double BodyVertices::magnitude() const {
 
 double unitOf(double magnitude) { return std::exp2(-std::ilogb(std::max(magnitude, 0x1p-1000))); }
 
-Vector3d BodyVertices::furthest(const Vector3d& direction, const Deadline* deadline) const {
-  TimeCheck check(deadline, 1024);
+Vector3d BodyVertices::furthest(const Vector3d& direction) const {
+  TimeCheck check(1024);
   double most = -std::numeric_limits<double>::infinity();
   std::size_t best = 0;
   for (std::size_t v = 0; v < positions.size(); ++v) {
@@ -77,8 +78,8 @@ BodyPair::BodyPair(const Body& a, const Body& b, Engine engine, BodyPairScratch&
       m_engine(engine),
       m_movesTransform(moved == Moved::Body && a.isPlaced()),
       m_scratch(scratch) {
-  scratch.a.assign(a, scratch.stack.deadline);
-  scratch.b.assign(b, scratch.stack.deadline);
+  scratch.a.assign(a);
+  scratch.b.assign(b);
   m_magnitude = std::max(scratch.a.magnitude(), scratch.b.magnitude());
 }
 
@@ -103,9 +104,9 @@ void BodyPair::forEachIntersecting(
     const Vector3d& shift, const std::function<bool(const IntersectingTriangles&)>& f) const {
   SignCounts counts;
   IntersectingTriangles both;
-  TimeCheck check(deadline(), 16);
+  TimeCheck check(16);
   const auto test = [&](std::uint32_t elementB) {
-    if (check.isOver()) return false;
+    check();
     both.elementB = elementB;
     both.b = cornersOfB(elementB);
     both.found = intersectTriangles(both.a, both.b, counts);
@@ -127,7 +128,6 @@ void BodyPair::forEachIntersecting(
     return;
   }
   if (!m_scratch.pairs) m_scratch.pairs = std::make_unique<PairScratch>();
-  m_scratch.pairs->deadline = deadline();
   PairBound bound;
   bound.distance = boxErrorOf(m_a, m_b);
   forNearElements(
@@ -146,7 +146,7 @@ void BodyPair::forEachIntersecting(
 }
 
 int BodyPair::windingNumberOf(bool ofA, const Vector3d& p) const {
-  checkTime(deadline());
+  checkTime();
   return windingNumber(geometry(ofA), p, m_engine, m_scratch.stack);
 }
 
@@ -170,7 +170,7 @@ bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
   if (!box.contains(p)) return false;
   if (shift.isZero(0.0)) return windingNumberOf(true, p) != 0;
   SignCounts counts;
-  TimeCheck check(deadline(), 256);
+  TimeCheck check(256);
   const auto cornersAt = [&](std::size_t i) {
     check();
     return cornersOfA(m_a.tree.octree().order()[i], shift);

@@ -8,7 +8,6 @@
 #include "Octree/PointQueries.h"
 #include "Math/TriangleIntersection.h"
 #include "Core/CountedVector.h"
-#include "Core/Deadline.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -29,10 +28,10 @@ struct BodyVertices {
   CountedVector<std::uint32_t> partOf;       ///< per vertex: the vertex that stands for its part
   Eigen::AlignedBox3d box;                   ///< of the vertices that are in triangles
 
-  void assign(const Body&, const Deadline* = nullptr);
+  void assign(const Body&);
   double magnitude() const;  ///< L: the largest coordinate
   /// The vertex that is furthest along a direction.
-  Eigen::Vector3d furthest(const Eigen::Vector3d& direction, const Deadline* = nullptr) const;
+  Eigen::Vector3d furthest(const Eigen::Vector3d& direction) const;
 };
 
 /// 1/L: a power of two that brings coordinates up to a magnitude to about 1, so that no product of
@@ -61,8 +60,6 @@ class BodyPair {
   const BodyVertices& vertices(bool ofA) const { return ofA ? m_scratch.a : m_scratch.b; }
   Engine engine() const { return m_engine; }
   double magnitude() const { return m_magnitude; }  ///< L: the largest coordinate
-  /// Of the scratch. Null: none. Searches that say nothing else throw OutOfTime.
-  const Deadline* deadline() const { return m_scratch.stack.deadline; }
   void countExactDecisions(std::size_t count) const { m_scratch.stack.exactDecisions += count; }
 
   Corners cornersOfA(std::uint32_t element, const Eigen::Vector3d& shift) const;
@@ -73,7 +70,7 @@ class BodyPair {
     Corners a, b;  ///< a moved
     TriangleIntersection found;
   };
-  /// Calls f for all that intersect, in any order, until it returns false or the deadline is over.
+  /// Calls f for all that intersect, in any order, until it returns false.
   void forEachIntersecting(const Eigen::Vector3d& shift,
                            const std::function<bool(const IntersectingTriangles&)>& f) const;
 
@@ -93,7 +90,7 @@ class BodyPair {
     return at.ofA ? moved(at.vertex, shift) : m_scratch.b.positions[at.vertex];
   }
   /// Where a vertex, on its way along a direction from `begin` to `end`, passes the other body's
-  /// surface last. Both are L, from where it is. Looks at no deadline.
+  /// surface last. Both are L, from where it is. Asks no deadline.
   struct Exit {
     double distance;  ///< L, from where it is
     std::uint32_t element;

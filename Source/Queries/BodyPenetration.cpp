@@ -5,6 +5,7 @@
 #include "Math/StableLength.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <Eigen/Geometry>
 
@@ -78,12 +79,11 @@ class Search {
       const double least = (m_hulls.depth - m_hulls.gap) / m_unit - m_mostSlack;
       improve(m_hulls.direction, {kInfinity, std::max(least, 0.0), operations()});
     }
-    if (!isOver() && !isMinimal()) {
+    if (!isMinimal()) {
       findInside(true, m_scratch.insideA);
       findInside(false, m_scratch.insideB);
       searchDirections();
     }
-    if (isOver()) return {};
     if (!m_best.separates) leaveHull(m_hulls.direction);
     Penetration out = result();
     out.minimal = isMinimal();
@@ -92,11 +92,9 @@ class Search {
 
  private:
   Vector3d furthest(bool ofA, const Vector3d& direction) const {
-    checkTime(m_pair.deadline());
-    return m_unit * m_pair.vertices(ofA).furthest(direction, m_pair.deadline());
+    checkTime();
+    return m_unit * m_pair.vertices(ofA).furthest(direction);
   }
-
-  bool isOver() const { return palpate::isOver(m_pair.deadline()); }
 
   // ---- One direction ----
 
@@ -105,8 +103,7 @@ class Search {
     double least;            ///< L: no shorter translation separates the bodies
     std::size_t operations;  ///< of all sweeps
   };
-  /// Ends at the deadline without having separated the bodies. wantsLast: the last contact is
-  /// wanted even if the bodies are not separated before the end.
+  /// wantsLast: the last contact is wanted even if the bodies are not separated before the end.
   Translation translate(const Vector3d& direction, const Limits& limits, bool wantsLast) {
     Translation at;
     at.direction = direction;
@@ -128,7 +125,7 @@ class Search {
       if (at.separates) return at;
       switch (m_test.find(at.depth * direction)) {
         case OverlapTest::Result::Apart:
-          at.separates = !isOver();
+          at.separates = true;
           // Where they overlap by less than the inset, nothing has crossed.
           if (at.last.elementA == kNoElement) at.last = m_sweep.touchingAt(direction, m_sweep.t());
           return at;
@@ -178,7 +175,7 @@ class Search {
     const BodyVertices& own = m_pair.vertices(ofA);
     const Eigen::AlignedBox3d& other = m_pair.vertices(!ofA).box;
     inside.clear();
-    TimeCheck check(m_pair.deadline(), 1024);
+    TimeCheck check(1024);
     for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
       check();
       if (own.triangleOf[v] != kNoElement && other.contains(own.positions[v])) inside.push_back(v);
@@ -229,8 +226,7 @@ class Search {
       if (!(length > 0) || !(length < (1.0 - kDepthGain) * std::min(depth, m_best.depth))) return;
       const Translation found =
           translate(*next / length, {kWorthDescent * depth, 0.0, operations}, true);
-      if (found.last.elementA == kNoElement || isOver() || m_sweep.operations() > operations)
-        return;
+      if (found.last.elementA == kNoElement || m_sweep.operations() > operations) return;
       take(found, true);
       if (found.separates) depth = std::min(depth, found.depth);
       shortest.add(found.last.normal, found.last.normal.dot(found.depth * found.direction));
@@ -262,7 +258,6 @@ class Search {
       const double end = std::min(limit, kWorthDescent * m_best.depth);
       if (!(seed.bound < std::min(end, m_best.depth)) || m_sweep.operations() > operations) break;
       improve(seed.direction, {end, seed.bound, operations});
-      if (isOver()) return;
     }
   }
   /// At most the limit.
@@ -281,7 +276,7 @@ class Search {
     m_scratch.seeds.push_back({direction, m_scratch.seeds.size()});
   }
   void addNormals() {
-    TimeCheck check(m_pair.deadline(), 16);
+    TimeCheck check(16);
     const auto add = [&](bool ofA, std::uint32_t element) {
       check();
       if (m_scratch.seeds.size() < kMostFaceNormals)

@@ -61,8 +61,7 @@ Penetration apart(GeometryId a, GeometryId b);
 ///          four times as many until something separates the bodies. Each test costs what it finds.
 Penetration penetrationOf(const Body& a, const Body& b, Engine, PenetrationScratch&,
                           const PenetrationEffort& = kThorough);
-/// The same of bodies with triangles. The pair must use scratch.pair and effort.moved. Where its
-/// deadline is over, the answer means nothing.
+/// The same of bodies with triangles. The pair must use scratch.pair and effort.moved.
 Penetration penetrationOf(const BodyPair&, PenetrationScratch&, const PenetrationEffort&);
 
 }  // namespace palpate

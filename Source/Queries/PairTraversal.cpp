@@ -1,6 +1,7 @@
 #include "Queries/PairTraversal.h"
 
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <array>
@@ -103,17 +104,17 @@ class PairDescent {
         m_b(b, scratch.b),
         m_context(context),
         m_test(test),
-        m_waiting(scratch.waiting),
-        m_timeCheck(scratch.deadline, 32) {}
+        m_waiting(scratch.waiting) {}
 
   HWY_ATTR void run(const PairBound& bound) {
     setBound(bound);
+    TimeCheck check(32);
     m_waiting.clear();
     m_waiting.enter({{0, static_cast<std::uint32_t>(m_a.side().octree.size())},
                      {0, static_cast<std::uint32_t>(m_b.side().octree.size())}},
                     0.0f);
     for (decltype(PairScratch::waiting)::Entry entry; m_waiting.next(m_limit, entry);) {
-      if (m_timeCheck.isOver()) return;
+      check();
       const auto& [a, b] = entry.node;
       const float lowestA = lowestOf(m_a, a), lowestB = lowestOf(m_b, b);
       if (lowestA + lowestB > m_lowest) continue;
@@ -280,7 +281,6 @@ class PairDescent {
   float m_limit = 0;   ///< of computed squared distances of boxes
   float m_lowest = 0;  ///< of computed sums of heights
   decltype(PairScratch::waiting)& m_waiting;
-  TimeCheck m_timeCheck;
 };
 
 HWY_ATTR void searchPairsKernel(const PairSide& a, const PairSide& b, const PairBound& bound,

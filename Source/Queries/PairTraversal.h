@@ -6,7 +6,6 @@
 #include "Octree/Walk.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
-#include "Core/Deadline.h"
 
 #include <array>
 #include <cstddef>
@@ -65,14 +64,13 @@ struct PairScratch {
   /// Squared distances of boxes. On each level of each octree, all siblings and the own elements of
   /// their parent wait.
   NearestStack<float, Subtrees, 2 * (kChildren * kMaxLevels + 1)> waiting;
-  const Deadline* deadline = nullptr;  ///< null: none
 };
 
 /// Tests elements. Returns the bound for those that follow.
 using TestElements = PairBound (*)(void* context, const NearElements&);
 
 /// Visits pairs of elements, nearest pairs of nodes first. Of two nodes the larger one is replaced
-/// by its children. Ends at the deadline of the scratch.
+/// by its children.
 void searchPairs(const PairSide& a, const PairSide& b, const PairBound&, PairScratch&,
                  void* context, TestElements);
 

@@ -4,6 +4,7 @@
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <Eigen/Geometry>
 
@@ -136,7 +137,7 @@ void TranslationSweep::load(bool ofA, Side& side) {
     x = (x | x << 4) & 0x030c30c3u;
     return (x | x << 2) & 0x09249249u;
   };
-  TimeCheck check(m_pair.deadline(), 256);
+  TimeCheck check(256);
   side.order.clear();
   topology.forEachElement([&](std::uint32_t element) {
     check();
@@ -148,7 +149,7 @@ void TranslationSweep::load(bool ofA, Side& side) {
     };
     side.order.push_back({at(0) | at(1) << 1 | at(2) << 2, element});
   });
-  sortUntil(m_pair.deadline(), side.order.begin(), side.order.end(), std::less());
+  sortInTime(side.order.begin(), side.order.end(), std::less());
   side.corners.clear();
   for (const auto& [place, element] : side.order) {
     const Corners p = cornersOf(topology.elements[element], own.positions);
@@ -165,7 +166,7 @@ void TranslationSweep::makeInset() {
   auto& normals = m_scratch.normals;
   auto& vertices = m_scratch.vertices;
   normals.assign(topology.elements.size(), Vector3d::Zero());
-  TimeCheck check(m_pair.deadline(), 256);
+  TimeCheck check(256);
   const Vector3d centre = m_unit * own.box.center();
   double volume = 0;
   for (std::size_t i = 0; i < m_scratch.a.corners.size(); ++i) {
@@ -284,7 +285,7 @@ void TranslationSweep::enter(const Task& task) {
 
 bool TranslationSweep::advance(const Limits& limits, bool isInside) {
   auto& later = m_scratch.later;
-  TimeCheck check(m_pair.deadline(), 1);
+  TimeCheck check(1);
   const double limit = m_unit * limits.end;
   m_limit = limits.wantsLast ? kNever : limit;
   if (isBlocked()) return false;
@@ -292,7 +293,8 @@ bool TranslationSweep::advance(const Limits& limits, bool isInside) {
     m_end = m_t;
     m_next = {};
     while (!m_scratch.now.empty()) {
-      if (check.isOver() || m_operations > limits.operations || m_end > m_limit) return false;
+      check();
+      if (m_operations > limits.operations || m_end > m_limit) return false;
       run();
     }
     if (m_end > m_t) {

@@ -3,6 +3,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "Math/MotionBound.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -40,9 +41,9 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
   Buffer<ElementPair>& batch = counts.part;
   batch.clear();
   IntersectionAtEnd end;
-  TimeCheck checkOften(counts.deadline, 64);
+  TimeCheck checkOften(64);
   const auto check = [&] {
-    checkTime(counts.deadline);
+    checkTime();
     end.isKnown = batch.size() <= checksLeft;
     if (!end.isKnown) return;
     checksLeft -= batch.size();

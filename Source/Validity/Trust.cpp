@@ -4,6 +4,7 @@
 #include "NarrowPhase/Meeting.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
+#include "Core/Stopping.h"
 
 #include <algorithm>
 #include <limits>
@@ -271,7 +272,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     std::span<const ElementPair> left(contents.intersectingTriangles);
     for (; !found.piercing && !left.empty();
          left = left.subspan(std::min(left.size(), kTogether))) {
-      checkTime(counts.deadline);
+      checkTime();
       found = meetingOf(meshes, false, left.first(std::min(left.size(), kTogether)), counts);
     }
     m_atEnd.meeting = found.piercing ? Meeting::Piercing : Meeting::Touching;

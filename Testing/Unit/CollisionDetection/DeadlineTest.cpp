@@ -693,13 +693,13 @@ TEST(Deadline, LargeBodiesThatOverlap) {
   const std::atomic<bool> isCancelled = false;
   const Deadline deadline(Deadline::Time::max(), isCancelled, clock);
   PenetrationScratch scratch;
-  scratch.pair.stack.deadline = &deadline;
+  const StopScope scope(&deadline);
   const BodyPair pair(record.a->body, record.b->body, Engine::Octree, scratch.pair, kQuick.moved);
   const std::size_t vertices = large.positions.size(), loops = vertices / 1024;
   EXPECT_GE(looks, (vertices + large.triangles.size()) / 512);
   looks = 0;
   const Vector3d direction(0, 0, 1);
-  pair.vertices(true).furthest(direction, &deadline);
+  pair.vertices(true).furthest(direction);
   EXPECT_EQ(looks, loops);
 }
 
@@ -777,6 +777,40 @@ TEST(Deadline, AnotherThreadCancels) {
     EXPECT_TRUE(isCancelled);
     EXPECT_TRUE(row.collisions.statistics().unfinishedPairs.empty());
     EXPECT_TRUE(row.collisions.detectCollision(microseconds::max()));
+  }
+}
+
+/// A predicate may use other objects, whose work no budget of its own detection ends.
+TEST(Deadline, PredicatesUseOtherObjects) {
+  const Mesh large = sphere(30, 40, {0, 0, 0}, 1.0), small = sphere(16, 20, {0.7, 0.1, 0.2}, 0.4);
+  const auto begin = [&](OctreeBasedCD& other) {
+    const std::array ids{addMesh(other, large), addMesh(other, small)};
+    other.addCollisionPair(ids[0], ids[1], {.method = Method::Auto, .thickness = 0.02});
+    return ids;
+  };
+  for (const int threads : {1, 3}) {
+    OctreeBasedCD truth({.threads = 1});
+    const auto exact = begin(truth);
+    truth.detectCollision();
+    const double depth = truth.queries().penetration(exact[0], exact[1]).depth;
+    Row row(4, kTouching, {.threads = threads});
+    row.collisions.detectCollision();
+    row.moveAll({0, 1e-3, 0});
+    std::atomic<bool> isCancelled = false;
+    row.collisions.setContactPredicate(row.ids[0], row.ids[1], [&](const ContactFeatures&) {
+      if (isCancelled.exchange(true)) return true;
+      row.collisions.cancelDetection();
+      OctreeBasedCD other({.threads = threads});
+      const auto ids = begin(other);
+      other.detectCollision();
+      EXPECT_EQ(answersOf(other), answersOf(truth));
+      EXPECT_GT(contactsOf(other), 10u);
+      EXPECT_EQ(other.queries().penetration(ids[0], ids[1]).depth, depth);
+      return true;
+    });
+    EXPECT_FALSE(row.collisions.detectCollision(microseconds::max()));
+    EXPECT_TRUE(isCancelled);
+    EXPECT_GT(row.collisions.statistics().unfinishedPairs.size(), 0u);
   }
 }
 

@@ -8,6 +8,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <numeric>
+#include <random>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -143,6 +146,66 @@ TEST(Stopping, ErrorsHavePrecedence) {
                                    }),
                    std::runtime_error);
     }
+}
+
+TEST(Stopping, SortInTime) {
+  std::vector<int> values(3000);
+  std::iota(values.begin(), values.end(), 0);
+  const std::vector<int> sorted = values;
+  std::shuffle(values.begin(), values.end(), std::mt19937(5));
+  const auto looksOf = [&](std::int64_t end) {
+    const Asked asked(end);
+    const StopScope scope(asked.token());
+    std::vector<int> copy = values;
+    const bool isComplete =
+        endsInTime([&] { sortInTime(copy.begin(), copy.end(), std::less<>()); });
+    EXPECT_EQ(isComplete, asked.looks() < end);
+    EXPECT_EQ(copy == sorted, isComplete);
+    return asked.looks();
+  };
+  const std::int64_t all = looksOf(kNever);
+  EXPECT_GT(all, 30);
+  for (std::int64_t end = 1; end <= all + 1; ++end) EXPECT_EQ(looksOf(end), std::min(end, all));
+  std::vector<int> copy = values;
+  sortInTime(copy.begin(), copy.end(), std::less<>());
+  EXPECT_EQ(copy, sorted);
+}
+
+TEST(Stopping, ForEachPart) {
+  std::vector<int> items(100);
+  std::iota(items.begin(), items.end(), 0);
+  std::vector<int> seen;
+  std::size_t parts = 0;
+  const auto collect = [&] {
+    seen.clear();
+    parts = 0;
+    forEachPart(std::span<const int>(items), [&](std::span<const int> part) {
+      ++parts;
+      seen.insert(seen.end(), part.begin(), part.end());
+    });
+  };
+  collect();
+  EXPECT_EQ(parts, 1u);
+  EXPECT_EQ(seen, items);
+  for (std::int64_t end = 1; end < 10; ++end) {
+    const Asked asked(end);
+    const StopScope scope(asked.token());
+    EXPECT_EQ(endsInTime(collect), end > 7);
+    EXPECT_EQ(parts, std::min<std::size_t>(7, static_cast<std::size_t>(end - 1)));
+    EXPECT_EQ(seen.size(), std::min<std::size_t>(100, 16 * parts));
+    EXPECT_TRUE(std::equal(seen.begin(), seen.end(), items.begin()));
+  }
+}
+
+TEST(Stopping, TimeCheckAsksInOneOfSoManyCalls) {
+  const Asked asked(3);
+  const StopScope scope(asked.token());
+  TimeCheck check(10);
+  for (int i = 0; i < 29; ++i) check();
+  EXPECT_EQ(asked.looks(), 2);
+  EXPECT_THROW(check(), OutOfTime);
+  EXPECT_THROW(checkTime(), OutOfTime);
+  EXPECT_EQ(asked.looks(), 3);  // once over, no clock is read
 }
 
 }  // namespace

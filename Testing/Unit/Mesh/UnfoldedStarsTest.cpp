@@ -45,8 +45,8 @@ std::vector<ElementPair> answered(const Step& step) {
     useSimdPath(path);
     for (const int threads : {1, 3}) {
       UnfoldedStars stars;
-      stars.find(step.topology, step.topology.elements, before.data(), now.data(), Threads(threads),
-                 nullptr);
+      stars.find(step.topology, step.topology.elements, before.data(), now.data(),
+                 Threads(threads));
       const std::vector<Triangle> found(stars.triangles(),
                                         stars.triangles() + step.topology.elements.size());
       if (first.empty()) first = found;
