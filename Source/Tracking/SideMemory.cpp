@@ -4,6 +4,7 @@
 #include "NarrowPhase/Proximity.h"
 #include "Tracking/SmoothNormals.h"
 #include "Math/ClosestPoint.h"
+#include "Math/StableLength.h"
 #include "Exact/Predicates.h"
 #include "Core/Assert.h"
 
@@ -159,25 +160,50 @@ bool isOn(bool forward, const Vector3d& a, const Vector3d& b, const Vector3d& c,
   return sign == 0 || (sign > 0) == forward;
 }
 
-/// Slides a vertex along the surface to the next triangle that is nearer to it.
-bool slideVertex(const MeshPair& pair, bool now, Side& side) {
+/// Below a flat surface the closest point moves as far as the vertex does beside it. Below a round
+/// one it moves further, and from the centre on it runs ahead to the far wall of a closed body,
+/// where a side must not follow it. A little above 1.
+constexpr double kMostSliding = 1.25;
+
+/// Slides a vertex along the surface, at the step's end, to the next triangle that is nearer to it.
+/// Returns whether there is one. The closest points of both triangles may be `farthest` apart, from
+/// which their distance is then taken.
+bool slideVertex(const MeshPair& pair, Side& side, double& farthest) {
   const VertexSide of(pair, side.passage.kind);
   const MeshTopology& topology = of.triangles.topology;
   const std::uint32_t vertex = of.vertexOf(side.passage);
   PALPATE_ASSERT(topology.elements[of.triangleOf(side.passage)] == side.corners);
-  double least = distanceOf(of, vertex, side.corners, now).distance;
+  const VertexTriangleDistance here = distanceOf(of, vertex, side.corners, true);
+  double least = here.distance, way = 0.0;
   std::uint32_t nearest = kNoElement;
   for (const std::uint32_t corner : side.corners)
     for (const std::uint32_t t : topology.vertexTriangles[corner]) {
-      const double distance = distanceOf(of, vertex, topology.elements[t], now).distance;
-      if (!(distance < least) || !mayTouch(pair, of, vertex, t)) continue;
-      least = distance;
+      const VertexTriangleDistance there = distanceOf(of, vertex, topology.elements[t], true);
+      if (!(there.distance < least)) continue;
+      const double apart = stableLength(there.difference - here.difference);
+      if (!(apart <= farthest) || !mayTouch(pair, of, vertex, t)) continue;
+      least = there.distance;
+      way = apart;
       nearest = t;
     }
   if (nearest == kNoElement) return false;
+  farthest -= way;
   side.passage.ids[!of.swapped] = nearest;
   side.corners = topology.elements[nearest];
   return true;
+}
+
+/// How far a side may slide in the step: kMostSliding times the motion of the vertex across the
+/// direction that its closest point had at the step's start.
+double farthestSlide(const MeshPair& pair, const Side& side) {
+  const VertexSide of(pair, side.passage.kind);
+  const std::uint32_t vertex = of.vertexOf(side.passage);
+  const VertexTriangleDistance at = distanceOf(of, vertex, side.corners, false);
+  Vector3d moved = of.vertices.now[vertex] - of.vertices.before[vertex];
+  for (int i = 0; i < 3; ++i)
+    moved -=
+        at.weights[i] * (of.triangles.now[side.corners[i]] - of.triangles.before[side.corners[i]]);
+  return kMostSliding * stableLength(moved - moved.dot(at.normal) * at.normal);
 }
 
 /// The same for two edges, one of which slides on.
@@ -207,10 +233,6 @@ bool slideEdges(const MeshPair& pair, bool now, Side& side) {
   return true;
 }
 
-bool slide(const MeshPair& pair, bool now, Side& side) {
-  return isEdges(side.passage) ? slideEdges(pair, now, side) : slideVertex(pair, now, side);
-}
-
 /// Whether a point of the feature has the surface on all sides of it, or the line on both.
 bool isInside(const MeshTopology& topology, const MeshFeature& feature) {
   if (feature.kind == MeshFeature::Kind::Face) return true;
@@ -238,8 +260,6 @@ bool locateVertex(const MeshPair& pair, Side& side) {
       !findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]) ||
       !mayTouch(pair, of, vertex, of.triangleOf(side.passage)))
     return false;
-  while (slideVertex(pair, false, side)) {
-  }
   const VertexTriangleDistance measured = distanceOf(of, vertex, side.corners, false);
   const MeshFeature feature =
       featureOf(of.triangles.topology, of.triangleOf(side.passage), measured.feature);
@@ -468,8 +488,10 @@ bool SideMemory::contains(const MeshPair& pair, const Course& course, const Side
 
 void SideMemory::add(const MeshPair& pair, const Side& side, double time) {
   Course course{side, time, true, m_visited.size(), 0, kNoElement};
+  double farthest = isEdges(side.passage) ? 0.0 : farthestSlide(pair, side);
   do m_visited.push_back(course.side);
-  while (slide(pair, true, course.side));
+  while (isEdges(side.passage) ? slideEdges(pair, true, course.side)
+                               : slideVertex(pair, course.side, farthest));
   course.count = m_visited.size() - course.first;
   course.next =
       std::exchange(m_heads[listOf(side.passage)], static_cast<std::uint32_t>(m_courses.size()));

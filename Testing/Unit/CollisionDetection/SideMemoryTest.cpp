@@ -432,6 +432,42 @@ TEST_F(OnePoint, IsLedBackFromAnyDepthAndPlace) {
   EXPECT_GT(stepTo({0.2, 0.7, 0.01}).vertexTriangle()[0].distance, 0);
 }
 
+/// The nearest wall is another one, but the point leaves through the wall through which it came.
+TEST(SideMemory, InAClosedBodyLeadsBackTheWayThatAPointCame) {
+  for (const Mesh& body : {dividedBox({-1, -1, -1}, {1, 1, 1}, 1),
+                           dividedBox({-1, -1, -1}, {1, 1, 1}, 7), sphere(13, 16, {0, 0, 0}, 1)})
+    for (const double aside : {0.0, 0.02, 0.3}) {
+      OctreeBasedCD collisions;
+      const GeometryId wall = collisions.addTriangleMesh(body.positions, body.triangles);
+      const Positions way = [&] {  // through the top, down to the bottom, and up again
+        Positions all{{0.11, 0.07, 1.1}};
+        for (const double z : {0.8, 0.5, 0.2, -0.1, -0.4, -0.7, -0.8})
+          all.emplace_back(0.11 + aside * (0.8 - z) / 1.6, 0.07, z);
+        for (std::size_t i = all.size() - 1; i-- > 0;) all.push_back(all[i]);
+        return all;
+      }();
+      const GeometryId tip = collisions.addPointSet(Positions{way[0]});
+      collisions.addCollisionPair(tip, wall, remembering(0.02));
+      for (std::size_t i = 1; i < way.size(); ++i) {
+        collisions.advance();
+        collisions.setPositions(tip, Positions{way[i]});
+        collisions.detectCollision();
+        const CollisionData& data = collisions.collisionData(tip, wall);
+        const std::size_t sides = data.rememberedSides().size();
+        EXPECT_EQ(sides, i == 1 ? 0u : 1u) << i << ' ' << aside;
+        if (sides == 0) continue;
+        ASSERT_EQ(data.vertexTriangle().size(), 1u) << i << ' ' << aside;
+        // Far aside, below a round wall, the way out is oblique.
+        EXPECT_GT(data.vertexTriangle()[0].normal.z(), aside < 0.1 ? 0.7 : 0.0)
+            << i << ' ' << aside;
+        EXPECT_LT(data.vertexTriangle()[0].distance, 0.0);
+      }
+      collisions.advance();
+      collisions.detectCollision();
+      EXPECT_TRUE(collisions.collisionData(tip, wall).rememberedSides().empty()) << aside;
+    }
+}
+
 /// A solver's rounds: only the positions at advance() count.
 TEST_F(OnePoint, RemembersPositionsAtTheStepsEnd) {
   stepTo({0.43, 0.47, 0.1});
