@@ -19,6 +19,13 @@ constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds(), before ther
 constexpr std::size_t kGroupGrain = 128;
 constexpr std::size_t kElementsPerSlice = 64, kMostSlices = 4096;
 
+constexpr std::uint32_t kNoGroup = 0xffffffffu;
+
+void sortUnique(CountedVector<std::uint32_t>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
   resizeSparingly(floats, positions.size());
@@ -51,15 +58,197 @@ double GeometryOctree::sampleFrame(const TriangleMesh& mesh, Revision topology) 
   return m_sample.spread;
 }
 
+GeometryOctree::Strategy GeometryOctree::strategyFor(const TriangleMesh& mesh, double scale,
+                                                     const OctreeSettings& settings,
+                                                     const Lag& lag) const {
+  constexpr std::size_t kFew = 8;  // Few are at most one vertex in this many.
+  if (settings.update != OctreeUpdate::Auto || !m_isBuilt || m_isLoose || m_swept || m_treeSwept ||
+      mesh.now.isPlaced() || m_frame.scale != scale)
+    return Strategy::Whole;
+  const auto changed = mesh.now.changesSince(m_lastPositions);
+  if (!m_isLagging && changed && changed->size() * kFew <= mesh.now.size())
+    return Strategy::Changed;
+  const bool mayLag = lag.motion && m_lastPositions == lag.motion->from() &&
+                      mesh.now.bodyRevision() == lag.motion->to();
+  return mayLag ? Strategy::Lagging : Strategy::Whole;
+}
+
 void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double scale,
-                            const OctreeSettings& settings, const Threads& threads) {
+                            const OctreeSettings& settings, const Threads& threads,
+                            const Lag& lag) {
   PALPATE_ASSERT(scale > 0.0);
-  const State now = stateOf(mesh, topology);
-  const bool isSameTopology = m_treeVersion.state().topology == topology;
-  bool canRefit = m_isBuilt && isSameTopology;
-  const bool isCut = m_isBuilt && !isSameTopology && settings.update == OctreeUpdate::Auto;
+  Strategy strategy = strategyFor(mesh, scale, settings, lag);
+  const State last = m_treeVersion.state();
+  bool keepsOrder = m_isBuilt;
   m_treeVersion.invalidate();
-  m_isBuilt = m_isLagging = false;
+  m_isBuilt = false;
+  if (strategy != Strategy::Whole && m_slicesLayout != m_octree.layout()) makeSlices(mesh);
+  if (keepsOrder && last.topology != topology)
+    keepsOrder = settings.update == OctreeUpdate::Auto &&
+                 replaceElements(mesh, settings, strategy != Strategy::Whole);
+  if (!keepsOrder) strategy = Strategy::Whole;
+  m_removed.clear();
+  m_elements = mesh.topology.elements.size();
+  State now = stateOf(mesh, topology);
+  m_isLagging = strategy == Strategy::Lagging;
+  switch (strategy) {
+    case Strategy::Whole:
+      fitWhole(mesh, scale, settings, threads, keepsOrder);
+      break;
+    case Strategy::Changed:
+      fitChanged(mesh, threads);
+      break;
+    case Strategy::Lagging:
+      fitLagging(mesh, lag, threads);
+      now = {topology, last.now, last.before};
+      break;
+  }
+  m_lastPositions = mesh.now.bodyRevision();
+  m_isBuilt = mesh.topology.count() > 0;
+  m_treeVersion.commit(now);
+}
+
+void GeometryOctree::reserveCut(std::size_t removed) {
+  if (m_isBuilt && !isLargeCut(m_removed.size() + removed, m_ordered.size()))
+    reserveAmortized(m_removed, m_removed.size() + removed);
+}
+
+void GeometryOctree::cut(std::span<const std::uint32_t> removed,
+                         std::span<const std::pair<Revision, Revision>> positions) noexcept {
+  if (!m_isBuilt) return;
+  if (isLargeCut(m_removed.size() + removed.size(), m_ordered.size())) return forgetElements();
+  m_removed.insert(m_removed.end(), removed.begin(), removed.end());
+  const auto appended =
+      std::find_if(positions.begin(), positions.end(),
+                   [&](const auto& revisions) { return revisions.first == m_lastPositions; });
+  if (appended != positions.end()) m_lastPositions = appended->second;
+}
+
+/// Makes m_groupOf for the present layout.
+void GeometryOctree::findGroups() {
+  if (m_groupsLayout == m_octree.layout()) return;
+  m_groupsLayout = 0;
+  m_groupOf.reserve(withSpare(m_elements));
+  m_groupOf.assign(m_elements, kNoGroup);
+  const auto order = m_octree.order(), groups = m_octree.groups();
+  for (std::uint32_t g = 0; g + 1 < groups.size(); ++g)
+    for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) m_groupOf[order[i]] = g;
+  m_groupsLayout = m_octree.layout();
+}
+
+/// Removes elements that cuts removed, and lets others that they added join groups that are near.
+/// Returns false, so that the tree must be built anew, if these are many, or if a group would
+/// become too full. keepsBoxes: as of Octree::replace(); slices of such groups are then due.
+bool GeometryOctree::replaceElements(const TriangleMesh& mesh, const OctreeSettings& settings,
+                                     bool keepsBoxes) {
+  const MeshTopology& topology = mesh.topology;
+  const std::size_t added = topology.elements.size() - m_elements;
+  if (isLargeCut(m_removed.size() + added, m_ordered.size()) || 2 * m_replaced > m_ordered.size())
+    return false;
+  findGroups();
+  const std::uint64_t before = m_groupsLayout;
+  const bool hasSlices = m_slicesLayout == before;
+  m_groupsLayout = m_slicesLayout = m_cut.before = m_cut.after = 0;
+  const auto groups = m_octree.groups();
+  CountedVector<std::uint32_t>& changed = m_cut.groups;
+  changed.clear();
+  for (const std::uint32_t id : m_removed)  // also those that were added since the last update
+    if (id < m_elements) changed.push_back(std::exchange(m_groupOf[id], kNoGroup));
+  sortUnique(changed);
+  CountedVector<std::uint32_t> places;
+  CountedVector<std::uint32_t> vertices;  // of elements that left or joined
+  const auto addVertices = [&](const Triangle& corners) {
+    vertices.insert(vertices.end(), corners.begin(), corners.end());
+  };
+  for (const std::uint32_t group : changed)
+    for (std::uint32_t i = groups[group]; i < groups[group + 1]; ++i)
+      if (m_groupOf[m_octree.order()[i]] == kNoGroup) {
+        places.push_back(i);
+        addVertices(m_ordered[i]);
+      }
+
+  CountedVector<Octree::Joining> joining;
+  for (auto id = static_cast<std::uint32_t>(m_elements); id < topology.elements.size(); ++id) {
+    if (topology.isRemoved(id)) continue;
+    FloatBox box;
+    for (const std::uint32_t vertex : topology.elements[id]) {
+      const FloatPoint p = m_frame(mesh.now.body()[vertex]);
+      box.add(FloatBox{{p.x, p.y, p.z, 0}, {p.x, p.y, p.z, 0}});
+    }
+    joining.push_back({m_octree.groupNear(box), id});
+    addVertices(topology.elements[id]);
+  }
+  std::sort(joining.begin(), joining.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.group, a.element) < std::pair(b.group, b.element);
+  });
+  for (auto first = joining.begin(); first != joining.end();) {
+    const std::uint32_t group = first->group, size = groups[group + 1] - groups[group];
+    const auto last =
+        std::find_if(first, joining.end(), [=](const auto& one) { return one.group != group; });
+    const auto place = [&](std::uint32_t of) {
+      return std::lower_bound(places.begin(), places.end(), of);
+    };
+    const auto joined = last - first, left = place(groups[group + 1]) - place(groups[group]);
+    if (joined > left &&
+        size + joined - left > std::max<std::int64_t>(size, 2 * settings.maxElementsPerLeaf))
+      return false;
+    changed.push_back(group);
+    first = last;
+  }
+  sortUnique(changed);
+  reserveAmortized(m_groupOf, topology.elements.size());
+  m_groupOf.resize(topology.elements.size(), kNoGroup);
+  for (const auto& [group, element] : joining) m_groupOf[element] = group;
+  if (!changed.empty()) {
+    const auto moves = m_octree.replace(places, joining, keepsBoxes);
+    orderElements(topology, moves, joining);
+    m_replaced += places.size() + joining.size();
+  }
+  if (hasSlices) {
+    findPiecesAgain(
+        m_slicePieces, changed, topology.vertexCount,
+        [&](std::size_t i) { return std::pair(m_slices[i].firstGroup, m_slices[i].endGroup); },
+        [&](std::size_t i) { m_slices[i].moved = std::numeric_limits<double>::infinity(); });
+    m_slicesLayout = m_octree.layout();
+  }
+  sortUnique(vertices);
+  for (const std::uint32_t vertex : vertices)
+    for (const std::uint32_t element : topology.vertexTriangles[vertex])
+      if (const std::uint32_t group = m_groupOf[element];
+          changed.empty() || group != changed.back())
+        changed.push_back(group);
+  sortUnique(changed);
+  m_cut.before = before;
+  m_groupsLayout = m_cut.after = m_octree.layout();
+  return true;
+}
+
+/// Brings m_ordered into the octree's order after Octree::replace().
+void GeometryOctree::orderElements(const MeshTopology& topology,
+                                   std::span<const Octree::Move> moves,
+                                   std::span<const Octree::Joining> joining) {
+  const std::size_t size = m_octree.size(),
+                    most = std::max(size, m_ordered.size()) + BoxArrays::kPadding;
+  const std::span<Triangle> ordered = m_orderedMemory.resized(m_ordered, most);
+  const auto order = m_octree.order(), groups = m_octree.groups();
+  const auto fill = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) m_ordered[i] = topology.elements[order[i]];
+  };
+  if (ordered.empty()) {
+    startOrdered(size);
+    return fill(0, size);
+  }
+  Octree::move(ordered.data(), moves);
+  m_ordered = ordered.first(size);
+  std::uint32_t last = kNoGroup;
+  for (const auto& [group, element] : joining)
+    if (std::exchange(last, group) != group) fill(groups[group], groups[group + 1]);
+}
+
+/// Fits the boxes of all elements. keepsOrder: they are in the octree's order.
+void GeometryOctree::fitWhole(const TriangleMesh& mesh, double scale,
+                              const OctreeSettings& settings, const Threads& threads,
+                              bool keepsOrder) {
   m_frame = m_floatsFrame = {m_sample.median, scale};
   m_spread = m_sample.spread;
   m_treeSwept = m_swept && !mesh.now.hasSameBody(mesh.before);
@@ -73,14 +262,13 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
     startOrdered(0);
   } else {
     bool fits = false;
-    if (isCut) canRefit = replaceElements(mesh.topology, settings);
-    if (canRefit && settings.update == OctreeUpdate::Auto) {
+    if (keepsOrder && settings.update == OctreeUpdate::Auto) {
       fitBoxes(mesh, settings, threads, false);
       lastUpdate = LooseOctree::Update::Refitted;
       fits = m_octree.isTight();
     }
     if (!fits) {
-      if (!canRefit) {
+      if (!keepsOrder) {
         m_octree.reset(size, mesh.topology.removed);
         startOrdered(size);
         for (std::size_t i = 0; i < size; ++i)
@@ -90,172 +278,34 @@ void GeometryOctree::update(const TriangleMesh& mesh, Revision topology, double 
       fitBoxes(mesh, settings, threads, true);
       lastUpdate = LooseOctree::Update::Rebuilt;
     }
-    m_isBuilt = true;
   }
   m_lag = 0.0;
   m_isLoose = false;
   for (Slice& slice : m_slices) slice.moved = 0.0;
-  m_lastPositions = mesh.now.bodyRevision();
   ++m_updates;
-  m_treeVersion.commit(now);
 }
 
-/// Removes elements that a cut removed. Each element that it added joins the group of the nearest
-/// of those, by the sums of their corners. Returns false, and changes nothing, if a group would
-/// become empty or too full, or if the cut is so large that a rebuild costs less.
-bool GeometryOctree::replaceElements(const MeshTopology& topology, const OctreeSettings& settings) {
-  constexpr std::size_t kLargeCut = 4096;
-  constexpr std::uint32_t kNoGroup = 0xffffffffu;
-  const auto order = m_octree.order();
-  const auto groups = m_octree.groups();
-  if (order.empty()) return false;
-  if (m_groupsLayout != m_octree.layout()) {
-    m_groupsLayout = 0;
-    const std::size_t count = *std::max_element(order.begin(), order.end()) + std::size_t{1};
-    m_groupOf.reserve(withSpare(count));
-    m_groupOf.assign(count, kNoGroup);
-    for (std::uint32_t g = 0; g + 1 < groups.size(); ++g)
-      for (std::uint32_t i = groups[g]; i < groups[g + 1]; ++i) m_groupOf[order[i]] = g;
-    m_groupsLayout = m_octree.layout();
-  }
-  const auto firstAdded = static_cast<std::uint32_t>(m_groupOf.size());
-  struct Gone {
-    std::uint32_t place, group;
-    Triangle corners;
-    std::array<float, 3> sum;
-  };
-  const auto sumOf = [&](const Triangle& t) {
-    const FloatPoint &a = m_floats[t[0]], &b = m_floats[t[1]], &c = m_floats[t[2]];
-    return std::array{a.x + b.x + c.x, a.y + b.y + c.y, a.z + b.z + c.z};
-  };
-  CountedVector<Gone> gone;
-  for (const std::uint32_t id : topology.removed) {
-    if (id >= firstAdded || m_groupOf[id] == kNoGroup) continue;
-    const std::uint32_t group = m_groupOf[id];
-    const auto place = static_cast<std::uint32_t>(
-        std::find(order.begin() + groups[group], order.begin() + groups[group + 1], id) -
-        order.begin());
-    gone.push_back({place, group, m_ordered[place], sumOf(m_ordered[place])});
-  }
-  std::sort(gone.begin(), gone.end(),
-            [](const Gone& l, const Gone& r) { return l.place < r.place; });
-  const std::size_t added = topology.elements.size() - firstAdded;
-  if (gone.empty() || gone.size() * std::max<std::size_t>(1, added) > kLargeCut + order.size())
-    return false;
-  CountedVector<Octree::Joining> joining;
-  for (std::uint32_t id = firstAdded; id < topology.elements.size(); ++id) {
-    if (topology.isRemoved(id)) continue;
-    const auto sum = sumOf(topology.elements[id]);
-    std::uint32_t nearest = kNoGroup;
-    float least = std::numeric_limits<float>::infinity();
-    for (const Gone& one : gone) {
-      float squared = 0;
-      for (std::size_t k = 0; k < 3; ++k) squared += (one.sum[k] - sum[k]) * (one.sum[k] - sum[k]);
-      if (squared < least || nearest == kNoGroup) least = squared, nearest = one.group;
-    }
-    joining.push_back({nearest, id});
-  }
-  std::sort(joining.begin(), joining.end(), [](const auto& a, const auto& b) {
-    return std::pair(a.group, a.element) < std::pair(b.group, b.element);
-  });
-  CountedVector<std::uint32_t> places;
-  const auto fits = [&](std::uint32_t group) {
-    const auto countIn = [&](const auto& list) {
-      return std::count_if(list.begin(), list.end(),
-                           [&](const auto& one) { return one.group == group; });
-    };
-    const std::int64_t size =
-        std::int64_t{groups[group + 1]} - groups[group] - countIn(gone) + countIn(joining);
-    return size >= 1 && size <= 2 * std::int64_t{settings.maxElementsPerLeaf};
-  };
-  for (std::size_t i = 0; i < gone.size(); ++i) {
-    if ((i == 0 || gone[i].group != gone[i - 1].group) && !fits(gone[i].group)) return false;
-    places.push_back(gone[i].place);
-  }
-  reserveAmortized(m_groupOf, topology.elements.size());
-  // Nothing below throws, but for want of memory: the next update then builds the octree anew.
-  const std::uint64_t before = m_octree.layout();
-  const bool hasSlices = m_slicesLayout == before;
-  m_groupsLayout = m_slicesLayout = m_cut.before = m_cut.after = 0;
-  const auto moves = m_octree.replace(places, joining);
-  const std::size_t size = m_octree.size(), padded = size + BoxArrays::kPadding;
-  const std::span<Triangle> ordered =
-      m_orderedMemory.resized(m_ordered, std::max(padded, m_ordered.size() + BoxArrays::kPadding));
-  if (ordered.empty()) {
-    startOrdered(size);
-    for (std::size_t i = 0; i < size; ++i) m_ordered[i] = topology.elements[m_octree.order()[i]];
-  } else {
-    Octree::move(ordered.data(), moves);
-    m_ordered = ordered.first(size);
-    for (const auto& [group, element] : joining)
-      for (std::uint32_t i = groups[group]; i < groups[group + 1]; ++i)
-        m_ordered[i] = topology.elements[m_octree.order()[i]];
-  }
-  m_groupOf.resize(topology.elements.size(), kNoGroup);
-  for (const std::uint32_t id : topology.removed) m_groupOf[id] = kNoGroup;
-  for (const auto& [group, element] : joining) m_groupOf[element] = group;
-  m_groupsLayout = m_octree.layout();
-
-  CountedVector<std::uint32_t>& changed = m_cut.groups;
-  changed.clear();
-  for (const Gone& one : gone) changed.push_back(one.group);
-  for (const auto& [group, element] : joining) changed.push_back(group);
-  const auto sortChanged = [&] {
-    std::sort(changed.begin(), changed.end());
-    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
-  };
-  sortChanged();
-  if (hasSlices) {
-    const auto rangeOf = [&](std::size_t slice) {
-      return std::pair(groups[m_slices[slice].firstGroup], groups[m_slices[slice].endGroup]);
-    };
-    findPiecesAgain(m_slicePieces, changed, topology.vertexCount, rangeOf, [](std::size_t) {});
-    m_slicesLayout = m_octree.layout();
-  }
-  const auto addAround = [&](const Triangle& corners) {
-    for (const std::uint32_t vertex : corners)
-      for (const std::uint32_t element : topology.vertexTriangles[vertex])
-        changed.push_back(m_groupOf[element]);
-  };
-  for (const Gone& one : gone) addAround(one.corners);
-  for (const auto& [group, element] : joining) addAround(topology.elements[element]);
-  sortChanged();
-  m_cut.before = before;
-  m_cut.after = m_octree.layout();
-  return true;
-}
-
-bool GeometryOctree::canRefitSome(const TriangleMesh& mesh, Revision topology, double scale,
-                                  const OctreeSettings& settings) const {
-  return settings.update == OctreeUpdate::Auto && isValid() && m_isBuilt && !m_isLoose &&
-         !m_swept && !m_treeSwept && !mesh.now.isPlaced() &&
-         m_treeVersion.state().topology == topology && m_frame.scale == scale;
-}
-
-bool GeometryOctree::canLag(const TriangleMesh& mesh, Revision topology, double scale,
-                            const OctreeSettings& settings, const PieceMotion& motion) const {
-  return canRefitSome(mesh, topology, scale, settings) && m_lastPositions == motion.from() &&
-         mesh.now.bodyRevision() == motion.to();
-}
-
-bool GeometryOctree::updateChanged(const TriangleMesh& mesh, Revision topology, double scale,
-                                   const OctreeSettings& settings, const Threads& threads) {
-  constexpr std::size_t kFew = 8;  // Few are at most one vertex in this many.
+/// Fits the boxes of slices with vertices that changed, and of slices that a cut changed.
+void GeometryOctree::fitChanged(const TriangleMesh& mesh, const Threads& threads) {
   const auto changed = mesh.now.changesSince(m_lastPositions);
-  if (m_isLagging || !canRefitSome(mesh, topology, scale, settings) || !changed ||
-      changed->size() * kFew > mesh.now.size())
-    return false;
-  const State now = stateOf(mesh, topology);
-  m_treeVersion.invalidate();
+  PALPATE_ASSERT(changed.has_value());
   Stopwatch watch;
-  threads.forChunks(changed->size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    toFloats(mesh.now.body().subspan(changed->begin + from, to - from), m_frame,
-             m_floats.data() + changed->begin + from);
-  });
-  if (m_slicesLayout != m_octree.layout()) makeSlices(mesh);
+  const auto convert = [&](std::size_t begin, std::size_t end) {
+    threads.forChunks(end - begin, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+      toFloats(mesh.now.body().subspan(begin + from, to - from), m_frame,
+               m_floats.data() + begin + from);
+    });
+  };
+  const std::size_t known = m_floats.size(), size = mesh.now.size();
+  PALPATE_ASSERT(known <= size);
+  if (m_floats.capacity() < size) m_floats.reserve(withSpare(size));
+  m_floats.resize(size);
+  convert(changed->begin, changed->end);
+  convert(known, size);
   for (std::size_t i = 0; i < m_slices.size(); ++i) {
     const auto pieces = m_slicePieces[i];
-    if (std::none_of(pieces.begin(), pieces.end(), [&](std::uint32_t piece) {
+    if (m_slices[i].moved == 0.0 &&
+        std::none_of(pieces.begin(), pieces.end(), [&](std::uint32_t piece) {
           return changed->overlaps(
               {piece * PieceMotion::kPiece, (piece + 1) * PieceMotion::kPiece});
         }))
@@ -268,9 +318,6 @@ bool GeometryOctree::updateChanged(const TriangleMesh& mesh, Revision topology, 
   lastUpdate = LooseOctree::Update::Refitted;
   ++m_updates;
   boxMilliseconds += watch.lap();
-  m_lastPositions = mesh.now.bodyRevision();
-  m_treeVersion.commit(now);
-  return true;
 }
 
 /// After all slices were fitted. A tree that became loose is built again by the next update.
@@ -299,28 +346,25 @@ void GeometryOctree::makeSlices(const TriangleMesh& mesh) {
   m_slicesLayout = m_octree.layout();
 }
 
-void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& motion, double lag,
+/// Brings the floats up to date, and fits the boxes of some slices.
+void GeometryOctree::fitLagging(const TriangleMesh& mesh, const Lag& allowed,
                                 const Threads& threads) {
-  PALPATE_ASSERT(isValid() && m_isBuilt && !m_treeSwept && lag >= 0.0);
-  const State state = m_treeVersion.state();
-  m_treeVersion.invalidate();
-  m_isLagging = true;
+  const double lag = allowed.most;
+  PALPATE_ASSERT(!m_treeSwept && lag > 0.0);
   Stopwatch watch;
   m_floatsFrame = {m_sample.median, m_frame.scale};
   computeFloats(mesh.now.body(), m_floatsFrame, m_floats, threads);
-  if (m_slicesLayout != m_octree.layout()) makeSlices(mesh);
   double share = 0.0;  // of the slices that should be fitted now
   for (std::size_t i = 0; i < m_slices.size(); ++i) {
-    const MotionRange range = motion.of(m_slicePieces[i]);
+    const MotionRange range = allowed.motion->of(m_slicePieces[i]);
     const double step = range.lower.cwiseAbs().cwiseMax(range.upper.cwiseAbs()).maxCoeff();
     // The rounding of the displacements, and of this sum.
     m_slices[i].moved = (m_slices[i].moved + step) * (1.0 + 0x1p-50);
     share += step;
   }
-  const std::size_t size = m_slices.size(),
-                    wanted = lag > 0.0 && share < lag * static_cast<double>(size)
-                                 ? static_cast<std::size_t>(share / lag) + 1
-                                 : size;
+  const std::size_t size = m_slices.size(), wanted = share < lag * static_cast<double>(size)
+                                                         ? static_cast<std::size_t>(share / lag) + 1
+                                                         : size;
   std::size_t fitted = 0;
   for (std::size_t i = 0; i < size && fitted < wanted; ++i) {
     fitted += m_slices[m_nextSlice].moved > 0.0;
@@ -343,8 +387,6 @@ void GeometryOctree::updateSome(const TriangleMesh& mesh, const PieceMotion& mot
     ++m_updates;
   }
   boxMilliseconds += watch.lap();
-  m_lastPositions = mesh.now.bodyRevision();
-  m_treeVersion.commit(state);
 }
 
 /// Fits the boxes of a slice, unless its elements did not move.
@@ -503,6 +545,7 @@ void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& set
   m_ordered = {};
   const auto keys = m_orderedMemory.start<std::uint64_t>(size);
   m_octree.build(all, m_spread * m_frame.scale, settings, keys, threads);
+  m_replaced = 0;
   startOrdered(size);
   octreeMilliseconds += watch.lap();
 }
@@ -521,14 +564,15 @@ const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
   PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.count());
   const MemoryScope memory(MemoryStage::Octrees);
-  m_stars.find(mesh.topology, m_ordered, floatsAtStart(), m_floats.data(), threads);
+  m_stars.find(mesh.topology, m_octree.order(), m_ordered, floatsAtStart(), m_floats.data(),
+               threads);
   return m_stars.triangles();
 }
 
 std::size_t GeometryOctree::bytesBesidesOctree() const {
   return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) +
-         m_groupOf.capacity() * sizeof(std::uint32_t) + m_orderedMemory.bytes() +
-         m_slices.capacity() * sizeof(Slice) + m_slicePieces.bytes();
+         (m_groupOf.capacity() + m_removed.capacity()) * sizeof(std::uint32_t) +
+         m_orderedMemory.bytes() + m_slices.capacity() * sizeof(Slice) + m_slicePieces.bytes();
 }
 
 }  // namespace palpate

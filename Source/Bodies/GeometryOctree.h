@@ -15,13 +15,20 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 
 namespace palpate {
 
-/// The octree over one geometry's elements, with the float positions that its boxes come from.
+/// The octree over one geometry's elements, with the float positions that its boxes come from. It
+/// owns how an octree follows its geometry: update() first brings the elements up to date, then
+/// the boxes.
 ///
-/// Its boxes may lag behind the positions: updateSome() fits those of some elements only. All
-/// positions are then within lag() of their boxes.
+/// Elements. After cuts, of which cut() tells, few elements leave the nodes or join them. After
+/// many, or where a node would become too full, the tree is built anew.
+///
+/// Boxes. One of three strategies brings boxes to the positions, in slices of consecutive groups:
+/// Whole, Changed or Lagging. With Lagging, boxes are behind the positions: all positions are
+/// within lag() of their boxes.
 ///
 /// If an update throws, there is no valid tree, and the next update builds it anew.
 class GeometryOctree {
@@ -33,27 +40,35 @@ class GeometryOctree {
   /// outdated. Returns the spread of the positions.
   double sampleFrame(const TriangleMesh&, Revision topology);
   bool isCurrent(const TriangleMesh&, Revision topology, double scale) const;
+  /// How far boxes may lag behind the positions.
+  struct Lag {
+    const PieceMotion* motion;  ///< from the last update; null: they must not lag
+    double most;                ///< L
+  };
+  /// Which boxes update() fits.
+  enum class Strategy : std::uint8_t {
+    Whole,    ///< all; nodes that have become loose are built anew
+    Changed,  ///< those of slices with vertices that changed since the last update: few
+    /// Those of so many slices, in turn, that lag() is small enough. While the motion does not
+    /// change, these are in turn all slices, about as many in each call. The octree isCurrent()
+    /// only after the next update without lag.
+    Lagging,
+  };
   /// scale: the scale of the float frames, common to all geometries.
+  /// Cost     of Changed: linear in the changed vertices and in the elements of their slices, and
+  ///          in the number of slices. Else linear in all vertices. After cuts: see
+  ///          Octree::replace(). At most that of a new tree, and of a refit before it.
   void update(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
-              const Threads&);
-  /// Call when the elements are others. Otherwise elements were removed or appended if the topology
-  /// has changed, and the next update() keeps the nodes if these are few.
+              const Threads&, const Lag& = {});
+  /// Call when the elements are others, but for cuts. The next update() builds the tree anew.
   void forgetElements() { m_isBuilt = false; }
-  /// Instead of update(), if few vertices changed since the last one, and it swept no step: brings
-  /// the floats and boxes of these up to date. Returns false if that is not so.
-  /// Cost     linear in these vertices and in the elements of their slices, and in the number of
-  ///          slices.
-  bool updateChanged(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
-                     const Threads&);
-  /// Whether updateSome() is possible: the tree was updated to the positions from which the motion
-  /// was measured, without sweeping the step, is tight, and is in the body's frame, the world.
-  bool canLag(const TriangleMesh&, Revision topology, double scale, const OctreeSettings&,
-              const PieceMotion&) const;
-  /// Instead of update(): brings the floats up to date, and the boxes of so many elements that
-  /// lag() is at most `lag`. While the motion does not change, these are in turn all elements,
-  /// about as many in each call. The octree isCurrent() only after the next update().
-  void updateSome(const TriangleMesh&, const PieceMotion&, double lag, const Threads&);
-  /// Whether the last update was updateSome() to the positions now, of these elements.
+  /// Call before cut(), which then does not throw.
+  void reserveCut(std::size_t removed);
+  /// These elements were removed, and others perhaps appended. Positions to which vertices were
+  /// appended have other revisions now: from their first to their second.
+  void cut(std::span<const std::uint32_t> removed,
+           std::span<const std::pair<Revision, Revision>> positions) noexcept;
+  /// Whether the last update was Lagging to the positions now, of these elements.
   bool laggedTo(const TriangleMesh& mesh, Revision topology, double scale) const {
     return m_isLagging && isValid() && m_frame.scale == scale &&
            m_treeVersion.state().topology == topology && m_lastPositions == mesh.now.bodyRevision();
@@ -79,7 +94,7 @@ class GeometryOctree {
   bool encloses(const TriangleMesh&, Revision topology) const;
   std::uint64_t updates() const { return m_updates; }       ///< counts update()
   bool isValid() const { return m_treeVersion.isValid(); }  ///< no update has failed since
-  bool isLagging() const { return m_isLagging; }            ///< the last update was updateSome()
+  bool isLagging() const { return m_isLagging; }            ///< the last update was Lagging
   const Octree& octree() const { return m_octree; }
   const FloatFrame& frame() const { return m_frame; }              ///< of the boxes
   const FloatFrame& floatsFrame() const { return m_floatsFrame; }  ///< of floats()
@@ -93,31 +108,35 @@ class GeometryOctree {
   const FloatPoint* floatsAtStart() const {
     return (m_treeSwept ? m_floatsBefore : m_floats).data();
   }
-  /// A cut that kept the nodes: Octree::layout() before and after it, and the groups, ascending,
-  /// that hold elements with a vertex of those that it removed or added.
+  /// Cuts between two updates that kept the nodes: Octree::layout() before and after them, and the
+  /// groups, ascending, that hold elements with a vertex of those that they removed or added, or
+  /// held removed ones.
   struct Cut {
     std::uint64_t before = 0, after = 0;
     CountedVector<std::uint32_t> groups;
   };
   const Cut& lastCut() const { return m_cut; }
-  /// Finds the pieces of PieceMotion of those ranges again that hold one of these groups, and calls
-  /// found(i) for each. pieces: of each range. rangeOf(i): its places in the order, which ascend.
-  /// groups: ascending.
+  /// Finds the pieces of PieceMotion of those ranges of groups again that hold one of `changed`,
+  /// and calls found(i) for each. pieces: of each range. rangeOf(i): its groups, which ascend.
+  /// changed: groups, ascending.
   template <class RangeOf, class F>
-  void findPiecesAgain(IndexLists& pieces, const CountedVector<std::uint32_t>& groups,
+  void findPiecesAgain(IndexLists& pieces, std::span<const std::uint32_t> changed,
                        std::size_t vertexCount, RangeOf&& rangeOf, F&& found) const {
-    auto group = groups.begin();
-    for (std::size_t i = 0; i < pieces.size() && group != groups.end(); ++i) {
+    CountedVector<std::size_t> again;
+    CountedVector<std::pair<std::uint32_t, std::uint32_t>> places;
+    auto group = changed.begin();
+    for (std::size_t i = 0; i < pieces.size() && group != changed.end(); ++i) {
       const std::pair<std::uint32_t, std::uint32_t> range = rangeOf(i);
-      const auto isInside = [&] {
-        return group != groups.end() && m_octree.groups()[*group] < range.second;
-      };
-      if (!isInside()) continue;
-      while (isInside()) ++group;
-      const IndexLists now = piecesOf(m_ordered, std::span(&range, 1), vertexCount);
-      pieces.reserveMore(0, now[0].size());
-      pieces.replace(i, now[0]);
-      found(i);
+      if (*group >= range.second) continue;
+      while (group != changed.end() && *group < range.second) ++group;
+      again.push_back(i);
+      places.push_back({m_octree.groups()[range.first], m_octree.groups()[range.second]});
+    }
+    const IndexLists now = piecesOf(m_ordered, places, vertexCount);
+    pieces.reserveMore(0, now.itemCount());
+    for (std::size_t i = 0; i < again.size(); ++i) {
+      pieces.replace(again[i], now[i]);
+      found(again[i]);
     }
   }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
@@ -138,19 +157,25 @@ class GeometryOctree {
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
   void startOrdered(std::size_t size);
-  bool replaceElements(const MeshTopology&, const OctreeSettings&);
-  bool canRefitSome(const TriangleMesh&, Revision topology, double scale,
-                    const OctreeSettings&) const;
+  bool replaceElements(const TriangleMesh&, const OctreeSettings&, bool keepsBoxes);
+  void findGroups();
+  void orderElements(const MeshTopology&, std::span<const Octree::Move>,
+                     std::span<const Octree::Joining>);
+  Strategy strategyFor(const TriangleMesh&, double scale, const OctreeSettings&, const Lag&) const;
+  void fitWhole(const TriangleMesh&, double scale, const OctreeSettings&, const Threads&,
+                bool keepsOrder);
+  void fitChanged(const TriangleMesh&, const Threads&);
+  void fitLagging(const TriangleMesh&, const Lag&, const Threads&);
   void makeSlices(const TriangleMesh&);
   void measureLooseness();
   void refit(const TriangleMesh&, std::size_t slice);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
-  /// Consecutive groups, whose boxes updateSome() fits together.
+  /// Consecutive groups, whose boxes are fitted together.
   struct Slice {
     std::uint32_t firstGroup, endGroup;
-    double moved;  ///< L: of a coordinate, at most, since the boxes were fitted
+    double moved;  ///< L: of a coordinate, at most, since the boxes were fitted; infinity: cut
   };
 
   FloatFrame m_frame, m_floatsFrame;
@@ -165,19 +190,22 @@ class GeometryOctree {
   Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
   Buffer<FloatBox> m_boundsBoxes;
   DerivedFrom<State> m_treeVersion;
-  // Of updateSome() and updateChanged():
+  // Of Changed and Lagging:
   CountedVector<Slice> m_slices;
   IndexLists m_slicePieces;          ///< of PieceMotion, for each slice
   std::uint64_t m_slicesLayout = 0;  ///< Octree::layout() of the slices
   std::size_t m_nextSlice = 0;
   double m_lag = 0;
-  // Of replaceElements(), made by the first one:
+  // Of cuts:
+  CountedVector<std::uint32_t> m_removed;  ///< since the last update; unless !m_isBuilt
+  std::size_t m_elements = 0;              ///< ids below it were known to the last update
+  std::size_t m_replaced = 0;              ///< elements that left or joined since the last build
   CountedVector<std::uint32_t> m_groupOf;  ///< per element: its group of the octree, or none
   std::uint64_t m_groupsLayout = 0;        ///< Octree::layout() of m_groupOf
   Cut m_cut;
   bool m_isLagging = false, m_isLoose = false;
   Revision m_lastPositions;    ///< of the last update of any kind
-  std::size_t m_refitted = 0;  ///< slices that updateChanged() fitted since looseness was measured
+  std::size_t m_refitted = 0;  ///< slices that Changed fitted since looseness was measured
   Buffer<Eigen::Vector3d> m_corners;
   Buffer<FloatPoint> m_cornerFloats;
   Buffer<Triangle> m_cornerTriangles;

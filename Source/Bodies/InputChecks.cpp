@@ -151,7 +151,7 @@ CountedVector<std::uint32_t> checkedRemoval(const GeometryLabel& label, const st
       refuse(id, " was removed before");
   }
   CountedVector<std::uint32_t> sorted(removed.begin(), removed.end());
-  std::sort(sorted.begin(), sorted.end());
+  if (!std::is_sorted(sorted.begin(), sorted.end())) std::sort(sorted.begin(), sorted.end());
   if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end()); twice != sorted.end())
     refuse(*twice, " is removed twice");
   return sorted;

@@ -82,7 +82,7 @@ struct Geometry : CountedObject {
   double shortEdge = 0;  ///< L: one edge in 16 is shorter at rest, before cuts; 0 without edges
   GeometryMotion motion;
   PieceMotion pieces;   ///< from one detection to the next, for KeptPairs
-  bool mayLag = false;  ///< the update that runs, or ran last, may be GeometryOctree::updateSome()
+  bool mayLag = false;  ///< the update that runs, or ran last, may be GeometryOctree::Lagging
   std::shared_ptr<const SurfaceProxy> proxy;  ///< attached, or null
   SurfaceProxySettings proxySettings;         ///< if there is one
   /// L: OctreeBasedCD::freeMotion(), of the last detection and of the one that runs. Empty before

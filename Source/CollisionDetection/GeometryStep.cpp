@@ -122,8 +122,7 @@ void GeometryStep::cut(TriangleMesh& mesh, std::span<const Eigen::Vector3d> newV
     m_cuts.positions.clear();
     m_cuts.gone.clear();
   }
-  m_cuts.gone.insert(m_cuts.gone.end(), gone.begin(), gone.end());
-  std::sort(m_cuts.gone.begin(), m_cuts.gone.end());
+  insertSorted(m_cuts.gone, gone);
   m_cuts.after = after;
   if (!newVertices.empty()) append(mesh, newVertices);
 }

@@ -37,10 +37,10 @@ double heightOf(const Triangle& triangle, std::span<const Eigen::Vector3d> rest)
 }
 
 /// Computed in the body's frame, so that it does not depend on the transform.
-SmallestHeight smallestHeight(std::span<const Triangle> triangles,
-                              std::span<const Eigen::Vector3d> rest) {
+SmallestHeight smallestHeight(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
   SmallestHeight smallest;
-  for (const Triangle& triangle : triangles) smallest.add(heightOf(triangle, rest));
+  topology.forEachElement(
+      [&](std::uint32_t t) { smallest.add(heightOf(topology.elements[t], rest)); });
   return smallest;
 }
 
@@ -96,7 +96,7 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
   mesh.rest = std::move(rest);
   mesh.topology = std::move(topology);
   geometry->step.start(mesh, std::move(body));
-  geometry->smallestHeight = smallestHeight(mesh.topology.elements, mesh.rest);
+  geometry->smallestHeight = smallestHeight(mesh.topology, mesh.rest);
   geometry->shortEdge = shortEdge(mesh.topology, mesh.rest);
   BodyRevisions& revisions = geometry->body.revisions;
   for (Revision* revision :
@@ -347,8 +347,7 @@ void GeometryTable::setTopology(Geometry& geometry, CountedVector<Eigen::Vector3
   geometry.body.solid = std::move(solid);
   geometry.body.mesh.tags.clear();
   geometry.step.start(geometry.body.mesh, std::move(body));
-  geometry.smallestHeight =
-      smallestHeight(geometry.body.mesh.topology.elements, geometry.body.mesh.rest);
+  geometry.smallestHeight = smallestHeight(geometry.body.mesh.topology, geometry.body.mesh.rest);
   geometry.shortEdge = shortest;
   geometry.body.tree.forgetElements();
   geometry.body.revisions.elements.topology = geometry.body.revisions.counter.next();
@@ -449,7 +448,9 @@ std::vector<std::uint32_t> GeometryTable::replaceTetrahedra(GeometryId id, Ids r
       checkedRemoval(geometry, "tetrahedron", count, solid.topology.removed, removed);
   checkTetrahedra(geometry, cut.rest().size(), added, count);
   auto ids = idsFrom(count, added.size());
-  if (TetrahedraCut::isPossible(solid.topology, cut.rest(), added)) {
+  // A tetrahedron in a cut costs about as much as several triangles.
+  if (!isLargeCut(4 * (sorted.size() + added.size()), count - solid.topology.removed.size()) &&
+      TetrahedraCut::isPossible(solid.topology, cut.rest(), added)) {
     TetrahedraCut ofSolid(solid.topology, cut.rest(), sorted, added);
     if (ofSolid.fault()) refuse(geometry, *ofSolid.fault());
     if (!solid.tags.empty()) reserveAmortized(solid.tags, count + added.size());
@@ -497,14 +498,18 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   TriangleMesh& mesh = body.mesh;
   const std::size_t count = mesh.topology.elements.size();
   SmallestHeight smallest = geometry.smallestHeight;
-  for (const std::uint32_t t : cut.removed)
-    smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
-  for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
+  const bool isLarge = isLargeCut(cut.removed.size() + cut.added.size(), mesh.topology.count());
+  if (!isLarge) {
+    for (const std::uint32_t t : cut.removed)
+      smallest.remove(heightOf(mesh.topology.elements[t], mesh.rest));
+    for (const Triangle& t : cut.added) smallest.add(heightOf(t, mesh.rest));
+  }
   if (!mesh.tags.empty()) reserveAmortized(mesh.tags, count + cut.added.size());
   // Where nothing else uses the positions, vertices are appended to them.
   const bool continues = geometry.pieces.isAt(geometry.step.detected());
   if (continues) geometry.pieces.forget();
   geometry.step.reserveCut(mesh, cut.positions.size(), cut.removed.size());
+  body.tree.reserveCut(cut.removed.size());
   CountedVector<std::pair<std::uint32_t, Triangle>> gone;
   for (const std::uint32_t t : cut.removed) gone.push_back({t, mesh.topology.elements[t]});
   std::function<void(const EdgeChange&)> prepareEdges;
@@ -515,12 +520,21 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   const ElementsState before = body.revisions.elements;
   if (!mesh.tags.empty()) mesh.tags.resize(mesh.topology.elements.size(), 0);
   geometry.smallestHeight =
-      smallest.isKnown() ? smallest : smallestHeight(mesh.topology.elements, mesh.rest);
+      !isLarge && smallest.isKnown() ? smallest : smallestHeight(mesh.topology, mesh.rest);
   BodyRevisions& revisions = body.revisions;
   for (Revision* revision :
        {&revisions.elements.topology, &revisions.elements.enabled, &revisions.filter})
     *revision = revisions.counter.next();
+  std::array<std::pair<Revision, Revision>, 3> positions;
+  const auto ends = [&] {
+    return std::array{mesh.now.bodyRevision(), mesh.before.bodyRevision(),
+                      geometry.step.detected().bodyRevision()};
+  };
+  const auto last = ends();
   geometry.step.cut(mesh, cut.positions, before, count, revisions.elements, gone);
+  const auto appended = ends();
+  for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = {last[i], appended[i]};
+  body.tree.cut(cut.removed, positions);
   if (continues) geometry.pieces.continueAt(geometry.step.detected());
   geometry.freeMotion.clear();
 }
@@ -598,19 +612,13 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
     Geometry& geometry = *m_changed[i];
     const TraceSpan span(trace, firstEvent + i, {.name = "octree", .a = geometry.body.id});
     const Threads& shared = size(&geometry) < kSmall ? one : threads;
-    if (geometry.body.tree.updateChanged(
-            geometry.body.mesh, geometry.body.revisions.elements.topology, scale, settings, shared))
-      return;
-    if (const double lag = lagFor(geometry);
-        lag > 0.0 &&
-        geometry.body.tree.canLag(geometry.body.mesh, geometry.body.revisions.elements.topology,
-                                  scale, settings, geometry.pieces))
-      return geometry.body.tree.updateSome(geometry.body.mesh, geometry.pieces, lag, shared);
-    if (!geometry.body.tree.isCurrent(geometry.body.mesh, geometry.body.revisions.elements.topology,
-                                      scale))
-      geometry.body.tree.update(geometry.body.mesh, geometry.body.revisions.elements.topology,
-                                scale, settings, shared);
-    geometry.body.tree.updateDops(geometry.body.mesh, settings.bounds, shared);
+    Body& body = geometry.body;
+    const Revision topology = body.revisions.elements.topology;
+    const double lag = lagFor(geometry);
+    if (!body.tree.isCurrent(body.mesh, topology, scale))
+      body.tree.update(body.mesh, topology, scale, settings, shared,
+                       {lag > 0.0 ? &geometry.pieces : nullptr, lag});
+    body.tree.updateDops(body.mesh, settings.bounds, shared);
   });
 }
 

@@ -72,10 +72,15 @@ void KeptPairs::Parts::make(const Body& body) {
   const Octree& tree = body.tree.octree();
   layout = 0;
   nodes.clear();
+  groups.assign(1, 0);
   addParts(tree, 0, std::max(kElementsPerPart, tree.size() / kMostParts), nodes);
   CountedVector<std::pair<std::uint32_t, std::uint32_t>> ranges;
   ranges.reserve(nodes.size());
-  for (const OctreeNode node : nodes) ranges.push_back(rangeOf(tree, node));
+  for (const OctreeNode node : nodes) {
+    ranges.push_back(rangeOf(tree, node));
+    groups.push_back(static_cast<std::uint32_t>(
+        std::ranges::lower_bound(tree.groups(), ranges.back().second) - tree.groups().begin()));
+  }
   pieces = piecesOf(body.tree.ordered(), ranges, body.mesh.topology.vertexCount);
   moved.resize(nodes.size());
   isCut.assign(nodes.size(), 0);
@@ -93,7 +98,7 @@ void KeptPairs::Parts::cut(const Body& body) {
   layout = 0;
   body.tree.findPiecesAgain(
       pieces, body.tree.lastCut().groups, body.mesh.topology.vertexCount,
-      [&](std::size_t part) { return rangeOf(body.tree.octree(), nodes[part]); },
+      [&](std::size_t part) { return std::pair(groups[part], groups[part + 1]); },
       [&](std::size_t part) { isCut[part] = 1; });
   layout = body.tree.octree().layout();
 }

@@ -140,7 +140,9 @@ class KeptPairs {
 
   /// The nodes of an octree that hold all of its elements, each once.
   struct Parts {
-    CountedVector<OctreeNode> nodes;    ///< as NodePair has them
+    CountedVector<OctreeNode> nodes;  ///< as NodePair has them
+    /// Part i has groups [groups[i], groups[i + 1]) of the octree.
+    CountedVector<std::uint32_t> groups;
     IndexLists pieces;                  ///< of PieceMotion, for each node
     CountedVector<MotionRange> moved;   ///< of each node, since the last detection
     std::uint64_t layout = 0;           ///< Octree::layout() of the nodes

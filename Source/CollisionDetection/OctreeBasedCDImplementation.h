@@ -120,7 +120,7 @@ struct OctreeBasedCD::Implementation {
       GeometryTable::CutPreparation prepare;
       if (pairs.needsNearAtRest(geometry))
         prepare = [&](const EdgeChange& change, std::span<const Eigen::Vector3d> rest) {
-          near = pairs.changeNearAtRest(geometry, change, rest);
+          near = pairs.changeNearAtRest(geometry, change, rest, threads);
         };
       auto result = call(prepare);
       if (prepare) pairs.setNearAtRest(geometry, near);

@@ -331,22 +331,18 @@ void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
 }
 
 ChangedLists PairTable::changeNearAtRest(GeometryId id, const EdgeChange& change,
-                                         std::span<const Eigen::Vector3d> rest) {
+                                         std::span<const Eigen::Vector3d> rest,
+                                         const Threads& threads) {
   PairRecord& record = *m_byIds.at(keyOf(id, id));
   IndexLists& now = record.nearAtRest;
   ChangedLists changed = verticesWithinAfterCut(record.a->body.mesh.topology, change, rest,
-                                                record.pair.settings.restDistance, now);
-  now.reserveMore(rest.size() - now.size(), changed.lists.itemCount());
+                                                record.pair.settings.restDistance, now, threads);
+  if (!changed.areAll) now.reserveMore(rest.size() - now.size(), changed.lists.itemCount());
   return changed;
 }
 
-void PairTable::setNearAtRest(GeometryId id, const ChangedLists& changed) noexcept {
-  IndexLists& lists = m_byIds.find(keyOf(id, id))->second->nearAtRest;
-  for (std::size_t i = 0; i < changed.vertices.size(); ++i)
-    if (changed.vertices[i] < lists.size())
-      lists.replace(changed.vertices[i], changed.lists[i]);
-    else
-      lists.append(changed.lists[i]);
+void PairTable::setNearAtRest(GeometryId id, ChangedLists& changed) noexcept {
+  replaceLists(m_byIds.find(keyOf(id, id))->second->nearAtRest, changed);
 }
 
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,

@@ -197,8 +197,8 @@ class PairTable {
   void setNearAtRest(GeometryId, IndexLists) noexcept;
   /// If so: how a cut of the topology now changes them. rest: with new vertices. Throws TooLarge.
   ChangedLists changeNearAtRest(GeometryId, const EdgeChange&,
-                                std::span<const Eigen::Vector3d> rest);
-  void setNearAtRest(GeometryId, const ChangedLists&) noexcept;
+                                std::span<const Eigen::Vector3d> rest, const Threads&);
+  void setNearAtRest(GeometryId, ChangedLists&) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.
   void checkRigid(const Geometry&) const;

@@ -2,7 +2,10 @@
 
 #include "Core/CountedVector.h"
 
+#include <algorithm>
 #include <cstddef>
+#include <functional>
+#include <iterator>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -51,6 +54,22 @@ constexpr std::size_t withSpare(std::size_t size) { return size + size / 16; }
 template <class T>
 void reserveAmortized(CountedVector<T>& vector, std::size_t size) {
   if (size > vector.capacity()) vector.reserve(size + size / 2);
+}
+
+/// Inserts ascending items into an ascending vector, which has room for them.
+/// Cost     a search for each item, and one move of what is behind the first one.
+template <class T, class Items, class Precedes = std::less<>>
+void insertSorted(CountedVector<T>& vector, const Items& items, Precedes&& precedes = {}) {
+  auto count = static_cast<std::ptrdiff_t>(vector.size());
+  vector.resize(vector.size() + std::size(items));
+  auto out = vector.end();
+  for (auto item = std::rbegin(items); item != std::rend(items); ++item) {
+    const auto end = vector.begin() + count,
+               place = std::upper_bound(vector.begin(), end, *item, precedes);
+    out = std::move_backward(place, end, out);
+    *--out = *item;
+    count = place - vector.begin();
+  }
 }
 
 /// Gives back most of the memory beyond the contents. Without memory for a smaller copy it does

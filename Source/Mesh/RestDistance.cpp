@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace palpate {
 
@@ -38,21 +39,21 @@ struct EdgeLists {
   CountedVector<Edge> edges;
   double longest = 0.0, mean = 0.0;
 
-  EdgeLists(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest, double distance)
-      : offsets(topology.vertexCount + 1, 0) {
-    CountedVector<double> lengths(topology.edges.size(), kUnreached);
+  EdgeLists(std::size_t vertexCount, std::span<const Segment> all,
+            std::span<const Eigen::Vector3d> rest, double distance)
+      : offsets(vertexCount + 1, 0) {
+    CountedVector<double> lengths;
+    lengths.reserve(all.size());
+    for (const auto& [p, q] : all) lengths.push_back(lengthOf(rest[p] - rest[q]));
     const auto forEachShort = [&](auto&& f) {
       for (std::size_t e = 0; e < lengths.size(); ++e)
-        if (lengths[e] < distance) f(topology.edges[e], lengths[e]);
+        if (lengths[e] < distance) f(all[e], lengths[e]);
     };
-    topology.forEachEdge([&](std::uint32_t e) {
-      lengths[e] = lengthOf(rest[topology.edges[e][0]] - rest[topology.edges[e][1]]);
-    });
     forEachShort([&](const Segment& edge, double length) {
       for (const std::uint32_t end : edge) ++offsets[end + 1];
       longest = std::max(longest, length);
     });
-    for (std::size_t v = 0; v < topology.vertexCount; ++v) offsets[v + 1] += offsets[v];
+    for (std::size_t v = 0; v < vertexCount; ++v) offsets[v + 1] += offsets[v];
     edges.resize(offsets.back());
     CountedVector<std::uint32_t> next(offsets.begin(), offsets.end() - 1);
     forEachShort([&](const Segment& edge, double length) {
@@ -208,13 +209,11 @@ void checkPairs(std::size_t pairs) {
                 "restDistance: more than 2^28 pairs of vertices are nearer than this distance");
 }
 
-}  // namespace
-
-IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
-                          double distance, const Threads& threads) {
-  PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
-  const EdgeLists edges(topology, rest, distance);
-  const std::size_t count = topology.vertexCount, tasks = (count + kGrain - 1) / kGrain;
+/// verticesWithin() along these edges.
+IndexLists verticesAlong(std::span<const Segment> all, std::span<const Eigen::Vector3d> rest,
+                         double distance, const Threads& threads) {
+  const std::size_t count = rest.size(), tasks = (count + kGrain - 1) / kGrain;
+  const EdgeLists edges(count, all, rest, distance);
   CountedVector<std::uint32_t> offsets(count + 1, 0);
   CountedVector<CountedVector<std::uint32_t>> found(tasks);
   std::atomic<std::size_t> nextTask = 0, pairs = 0;
@@ -243,33 +242,61 @@ IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::V
   return {offsets, std::move(items)};
 }
 
+}  // namespace
+
+IndexLists verticesWithin(const MeshTopology& topology, std::span<const Eigen::Vector3d> rest,
+                          double distance, const Threads& threads) {
+  PALPATE_ASSERT(distance > 0.0 && rest.size() == topology.vertexCount);
+  CountedVector<Segment> edges;
+  edges.reserve(topology.edges.size());
+  topology.forEachEdge([&](std::uint32_t e) { edges.push_back(topology.edges[e]); });
+  return verticesAlong(edges, rest, distance, threads);
+}
+
 ChangedLists verticesWithinAfterCut(const MeshTopology& topology, const EdgeChange& change,
                                     std::span<const Eigen::Vector3d> rest, double distance,
-                                    const IndexLists& before) {
+                                    const IndexLists& before, const Threads& threads) {
   PALPATE_ASSERT(distance > 0.0 && before.size() == topology.vertexCount &&
                  rest.size() >= topology.vertexCount);
   constexpr double kRings = 16.0;
+  // Searches around a cut take about as long as so many of all.
+  constexpr std::size_t kCostOfSearch = 4;
+  const auto sortUnique = [](CountedVector<std::uint32_t>& ids) {
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  };
+  const auto endsOf = [&](const CountedVector<Segment>& edges) {
+    CountedVector<std::uint32_t> ends;
+    for (const Segment& edge : edges) ends.insert(ends.end(), edge.begin(), edge.end());
+    sortUnique(ends);
+    return ends;
+  };
+  const auto all = [&] {
+    CountedVector<Segment> edges(change.added);
+    topology.forEachEdge([&](std::uint32_t e) {
+      if (!std::binary_search(change.gone.begin(), change.gone.end(), topology.edges[e]))
+        edges.push_back(topology.edges[e]);
+    });
+    return ChangedLists{{}, verticesAlong(edges, rest, distance, threads), true};
+  };
+  const CountedVector<std::uint32_t> gone = endsOf(change.gone), added = endsOf(change.added);
+  if (2 * kCostOfSearch * (gone.size() + added.size()) > rest.size()) return all();
   // A search from the other end of a path adds its lengths in another order.
   const double reach = distance * (1.0 + 0x1p-30);
   CutEdges edges(topology, change, rest);
   ShortestPaths paths(edges, rest.size(), reach, reach / kRings, reach);
   ChangedLists changed;
-  const auto addReached = [&](const CountedVector<Segment>& from) {
-    CountedVector<std::uint32_t> ends;
-    for (const Segment& edge : from) ends.insert(ends.end(), edge.begin(), edge.end());
-    std::sort(ends.begin(), ends.end());
-    ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
+  const auto addReached = [&](const CountedVector<std::uint32_t>& ends) {
     for (const std::uint32_t end : ends)
       paths.forEachReached(end, [&](std::uint32_t v) { changed.vertices.push_back(v); });
   };
-  addReached(change.gone);
+  addReached(gone);
   edges.setAfter(true);
-  addReached(change.added);
+  addReached(added);
   for (std::size_t v = topology.vertexCount; v < rest.size(); ++v)
     changed.vertices.push_back(static_cast<std::uint32_t>(v));
-  std::sort(changed.vertices.begin(), changed.vertices.end());
-  changed.vertices.erase(std::unique(changed.vertices.begin(), changed.vertices.end()),
-                         changed.vertices.end());
+  sortUnique(changed.vertices);
+  if (kCostOfSearch * changed.vertices.size() > rest.size()) return all();
   paths.setDistance(distance);
   std::size_t pairs = before.itemCount();
   CountedVector<std::uint32_t> list;
@@ -282,6 +309,18 @@ ChangedLists verticesWithinAfterCut(const MeshTopology& topology, const EdgeChan
     checkPairs(pairs);
   }
   return changed;
+}
+
+void replaceLists(IndexLists& lists, ChangedLists& changed) noexcept {
+  if (changed.areAll) {
+    lists = std::move(changed.lists);
+    return;
+  }
+  for (std::size_t i = 0; i < changed.vertices.size(); ++i)
+    if (changed.vertices[i] < lists.size())
+      lists.replace(changed.vertices[i], changed.lists[i]);
+    else
+      lists.append(changed.lists[i]);
 }
 
 }  // namespace palpate

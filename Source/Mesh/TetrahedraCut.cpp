@@ -88,6 +88,15 @@ void TetrahedraCut::makeLists() {
   m_topology.vertexTetrahedra = std::move(lists);
 }
 
+/// The tetrahedra around that vertex of a face that has the fewest.
+std::span<const std::uint32_t> TetrahedraCut::shortestList(const Triangle& face) const {
+  std::span<const std::uint32_t> shortest = m_topology.vertexTetrahedra[face[0]];
+  for (const std::uint32_t vertex : face)
+    if (const auto list = m_topology.vertexTetrahedra[vertex]; list.size() < shortest.size())
+      shortest = list;
+  return shortest;
+}
+
 /// Finds what becomes of the faces of tetrahedra that are removed or added.
 void TetrahedraCut::findFaces() {
   struct Face {
@@ -113,9 +122,9 @@ void TetrahedraCut::findFaces() {
     const auto& [p, q, r] = first->vertices;
     before.clear(), after.clear();
     if (r < m_topology.vertexTetrahedra.size())
-      for (const std::uint32_t t : m_topology.vertexTetrahedra[r]) {
+      for (const std::uint32_t t : shortestList(first->vertices)) {
         const Tetrahedron& corners = m_topology.tetrahedra[t];
-        if (!holds(corners, p) || !holds(corners, q)) continue;
+        if (!holds(corners, p) || !holds(corners, q) || !holds(corners, r)) continue;
         std::uint32_t face = 0;  // the one without the other corner
         while (corners[face] == p || corners[face] == q || corners[face] == r) ++face;
         before.push_back(4 * t + face);
@@ -204,10 +213,9 @@ void TetrahedraCut::apply() noexcept {
     for (std::uint32_t& face : to.faceIds[owner])
       if (face == id) face = kNoElement;
   }
-  for (const std::uint32_t t : m_removed) {
+  for (const std::uint32_t t : m_removed)
     to.faceIds[t] = {kNoElement, kNoElement, kNoElement, kNoElement};
-    to.removed.insert(std::lower_bound(to.removed.begin(), to.removed.end(), t), t);
-  }
+  insertSorted(to.removed, m_removed);
   to.tetrahedra.insert(to.tetrahedra.end(), m_added.begin(), m_added.end());
   for (const std::uint8_t isPositive : m_isPositive) to.isPositive.push_back(isPositive != 0);
   to.faceIds.resize(to.tetrahedra.size(), {kNoElement, kNoElement, kNoElement, kNoElement});

@@ -38,6 +38,7 @@ class TetrahedraCut {
   bool isRemoved(std::uint32_t tetrahedron) const;
   const Tetrahedron& tetrahedron(std::uint32_t id) const;
   Triangle orientedFace(std::uint32_t side) const;
+  std::span<const std::uint32_t> shortestList(const Triangle& face) const;
   void makeLists();
   void findFaces();
   void findIds(Sides& exposed, CountedVector<std::uint32_t>& gone);

@@ -5,6 +5,7 @@
 #include "Core/Buffer.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace palpate {
@@ -39,7 +40,9 @@ class TopologyCut {
         m_added(added),
         m_firstAdded(static_cast<std::uint32_t>(mesh.elements.size())),
         m_firstNewVertex(mesh.vertexCount),
-        m_vertexCount(vertexCount) {
+        m_vertexCount(vertexCount),
+        m_isRemoved(mesh.elements.size(), false) {
+    for (const std::uint32_t t : removed) m_isRemoved[t] = true;
     findAffected();
     findLists();
     reserve();
@@ -95,18 +98,15 @@ class TopologyCut {
   struct Vertex {
     std::uint32_t id;
     bool isUsed = false;  ///< afterwards
-    Ids list{};           ///< enabled elements afterwards
   };
   struct Edge {
     Segment vertices;
     std::uint32_t id;
     bool stays = false;
-    Ids list{};
+    auto key() const { return std::pair(vertices, id); }
   };
 
-  bool isRemoved(std::uint32_t t) const {
-    return std::binary_search(m_removed.begin(), m_removed.end(), t);
-  }
+  bool isRemoved(std::uint32_t t) const { return m_isRemoved[t]; }
   std::uint32_t idOf(const Segment& vertices) const {
     return std::lower_bound(m_edges.begin(), m_edges.end(), vertices,
                             [](const Edge& edge, const Segment& v) { return edge.vertices < v; })
@@ -116,22 +116,31 @@ class TopologyCut {
   /// The vertices and edges of elements that are removed or added.
   void findAffected() {
     Ids vertices;
-    CountedVector<Segment> edges;
-    const auto add = [&](const Triangle& t) {
+    for (const std::uint32_t t : m_removed) {
+      vertices.insert(vertices.end(), m_mesh.elements[t].begin(), m_mesh.elements[t].end());
+      for (const std::uint32_t e : m_mesh.triangleEdges[t])
+        if (e != kNoEdge) m_edges.push_back({m_mesh.edges[e], e});
+    }
+    for (const Triangle& t : m_added) {
       vertices.insert(vertices.end(), t.begin(), t.end());
-      forEachEdge(t, [&](const Segment& edge, std::size_t) { edges.push_back(edge); });
-    };
-    for (const std::uint32_t t : m_removed) add(m_mesh.elements[t]);
-    for (const Triangle& t : m_added) add(t);
+      forEachEdge(t, [&](const Segment& edge, std::size_t) { m_edges.push_back({edge, kNoEdge}); });
+    }
     for (std::size_t v = m_firstNewVertex; v < m_vertexCount; ++v)
       vertices.push_back(static_cast<std::uint32_t>(v));
     sortUnique(vertices);
-    sortUnique(edges);
+    m_vertices.reserve(vertices.size());
     for (const std::uint32_t v : vertices) m_vertices.push_back({v});
+    // Of equal edges, those with known numbers come first.
+    std::sort(m_edges.begin(), m_edges.end(),
+              [](const Edge& l, const Edge& r) { return l.key() < r.key(); });
+    m_edges.erase(
+        std::unique(m_edges.begin(), m_edges.end(),
+                    [](const Edge& l, const Edge& r) { return l.vertices == r.vertices; }),
+        m_edges.end());
     auto newId = static_cast<std::uint32_t>(m_mesh.edges.size());
-    for (const Segment& edge : edges) {
-      const std::uint32_t known = m_mesh.findEdge(edge);
-      m_edges.push_back({edge, known == kNoEdge ? newId++ : known});
+    for (Edge& edge : m_edges) {
+      if (edge.id == kNoEdge) edge.id = m_mesh.findEdge(edge.vertices);
+      if (edge.id == kNoEdge) edge.id = newId++;
     }
   }
 
@@ -142,27 +151,31 @@ class TopologyCut {
     for (const std::uint32_t t : m_mesh.disabled)
       if (!isRemoved(t)) m_disabled.add(m_mesh.elements[t], t);
     added.sort(), m_disabled.sort();
-    const auto listAfter = [&](const IndexLists& before, std::uint32_t id, const auto& addedTo) {
-      Ids list;
+    Ids list;
+    const auto listAfter = [&](const IndexLists& before, std::uint32_t id, const auto& addedTo,
+                               IndexLists& lists) {
+      list.clear();
       if (id < before.size())
         for (const std::uint32_t t : before[id])
           if (!isRemoved(t)) list.push_back(t);
       for (const auto& [key, t] : addedTo) list.push_back(t);
-      return list;
+      lists.append(list);
+      return !list.empty();
     };
-    for (Vertex& v : m_vertices) {
-      v.list = listAfter(m_mesh.vertexTriangles, v.id, added.byVertex.of(v.id));
-      v.isUsed = !v.list.empty() || !m_disabled.byVertex.of(v.id).empty();
-    }
-    for (Edge& e : m_edges) {
-      e.list = listAfter(m_mesh.edgeTriangles, e.id, added.byEdge.of(e.vertices));
-      e.stays = !e.list.empty() || !m_disabled.byEdge.of(e.vertices).empty();
-    }
+    for (Vertex& v : m_vertices)
+      v.isUsed = listAfter(m_mesh.vertexTriangles, v.id, added.byVertex.of(v.id), m_vertexLists) ||
+                 !m_disabled.byVertex.of(v.id).empty();
+    for (Edge& e : m_edges)
+      e.stays = listAfter(m_mesh.edgeTriangles, e.id, added.byEdge.of(e.vertices), m_edgeLists) ||
+                !m_disabled.byEdge.of(e.vertices).empty();
   }
 
   void reserve() {
+    const auto newEdges = static_cast<std::size_t>(
+        std::count_if(m_edges.begin(), m_edges.end(),
+                      [&](const Edge& edge) { return edge.id >= m_mesh.edges.size(); }));
     const std::size_t elements = m_firstAdded + m_added.size(),
-                      edges = m_mesh.edges.size() + m_edges.size();
+                      edges = m_mesh.edges.size() + newEdges;
     reserveAmortized(m_mesh.elements, elements);
     reserveAmortized(m_mesh.triangleEdges, elements);
     reserveAmortized(m_mesh.owned, elements);
@@ -172,14 +185,20 @@ class TopologyCut {
     reserveAmortized(m_mesh.hasClosedStar, m_vertexCount);
     reserveAmortized(m_mesh.edges, edges);
     reserveAmortized(m_mesh.m_isGone, edges);
-    reserveAmortized(m_mesh.m_addedEdges, m_mesh.m_addedEdges.size() + m_edges.size());
-    const auto reserveLists = [](IndexLists& lists, std::size_t size, const auto& affected) {
-      std::size_t items = 0;
-      for (const auto& one : affected) items += one.list.size();
-      lists.reserveMore(size - lists.size(), items);
+    reserveAmortized(m_mesh.m_addedEdges, m_mesh.m_addedEdges.size() + newEdges);
+    const auto reserveLists = [](IndexLists& lists, std::size_t newLists, const auto& affected,
+                                 const IndexLists& after) {
+      std::size_t items = 0;  // of lists that grow
+      for (std::size_t i = 0; i < affected.size(); ++i)
+        if (const std::uint32_t id = affected[i].id;
+            id >= lists.size() || after[i].size() > lists[id].size())
+          items += after[i].size();
+      lists.reserveMore(newLists, items);
     };
-    reserveLists(m_mesh.vertexTriangles, m_vertexCount, m_vertices);
-    reserveLists(m_mesh.edgeTriangles, edges, m_edges);
+    reserveLists(m_mesh.vertexTriangles, m_vertexCount - m_firstNewVertex, m_vertices,
+                 m_vertexLists);
+    reserveLists(m_mesh.edgeTriangles, edges - m_mesh.edges.size(), m_edges, m_edgeLists);
+    m_newEdges.reserve(newEdges);
   }
 
   /// Takes the affected vertices and edges from their owners, or gives them to new ones.
@@ -207,8 +226,8 @@ class TopologyCut {
       m_mesh.elements[t] = {0, 0, 0};
       m_mesh.triangleEdges[t] = {kNoEdge, kNoEdge, kNoEdge};
       m_mesh.isDisabled[t] = true;
-      m_mesh.removed.insert(std::lower_bound(m_mesh.removed.begin(), m_mesh.removed.end(), t), t);
     }
+    insertSorted(m_mesh.removed, m_removed);
     std::erase_if(m_mesh.disabled, [&](std::uint32_t t) { return isRemoved(t); });
     for (const Triangle& t : m_added) {
       m_mesh.elements.push_back(t);
@@ -223,35 +242,33 @@ class TopologyCut {
     for (const Edge& e : m_edges) {
       if (e.id >= m_mesh.edges.size()) {
         m_mesh.edges.push_back(e.vertices);
-        m_mesh.m_addedEdges.insert(
-            std::lower_bound(m_mesh.m_addedEdges.begin(), m_mesh.m_addedEdges.end(), e.vertices,
-                             [&](std::uint32_t other, const Segment& vertices) {
-                               return m_mesh.edges[other] < vertices;
-                             }),
-            e.id);
+        m_newEdges.push_back(e.id);
       }
       if (!e.stays && m_mesh.m_isGone.empty()) m_mesh.m_isGone.resize(m_mesh.edges.size(), false);
       if (m_mesh.m_isGone.empty()) continue;
       m_mesh.m_isGone.resize(m_mesh.edges.size(), false);
       m_mesh.m_isGone[e.id] = !e.stays;
     }
+    insertSorted(m_mesh.m_addedEdges, m_newEdges, [&](std::uint32_t l, std::uint32_t r) {
+      return m_mesh.edges[l] < m_mesh.edges[r];
+    });
   }
 
   void replaceLists() {
-    const auto replace = [](IndexLists& lists, const auto& affected) {
-      for (const auto& one : affected)
-        if (one.id < lists.size())
-          lists.replace(one.id, one.list);
+    const auto replace = [](IndexLists& lists, const auto& affected, const IndexLists& after) {
+      for (std::size_t i = 0; i < affected.size(); ++i)
+        if (affected[i].id < lists.size())
+          lists.replace(affected[i].id, after[i]);
         else
-          lists.append(one.list);
+          lists.append(after[i]);
     };
-    for (const Vertex& v : m_vertices) {
-      const bool isNew = v.id >= m_firstNewVertex;
-      m_mesh.untestedVertices += v.list.empty();
-      m_mesh.untestedVertices -= !isNew && m_mesh.vertexTriangles[v.id].empty();
+    for (std::size_t i = 0; i < m_vertices.size(); ++i) {
+      const std::uint32_t v = m_vertices[i].id;
+      m_mesh.untestedVertices += m_vertexLists[i].empty();
+      m_mesh.untestedVertices -= v < m_firstNewVertex && m_mesh.vertexTriangles[v].empty();
     }
-    replace(m_mesh.vertexTriangles, m_vertices);
-    replace(m_mesh.edgeTriangles, m_edges);
+    replace(m_mesh.vertexTriangles, m_vertices, m_vertexLists);
+    replace(m_mesh.edgeTriangles, m_edges, m_edgeLists);
     m_mesh.vertexCount = m_vertexCount;
     m_mesh.isUsed.resize(m_vertexCount, false);
     for (const Vertex& v : m_vertices) m_mesh.isUsed[v.id] = v.isUsed;
@@ -279,10 +296,11 @@ class TopologyCut {
                  isClosed(e);
         });
       };
+      const auto list = m_mesh.vertexTriangles[v.id];
       const auto disabled = m_disabled.byVertex.of(v.id);
       m_mesh.openStars -= m_mesh.hasClosedStar[v.id] == 0;
       m_mesh.hasClosedStar[v.id] =
-          std::all_of(v.list.begin(), v.list.end(), areClosed) &&
+          std::all_of(list.begin(), list.end(), areClosed) &&
           std::all_of(disabled.begin(), disabled.end(),
                       [&](const auto& held) { return areClosed(held.second); });
       m_mesh.openStars += m_mesh.hasClosedStar[v.id] == 0;
@@ -294,9 +312,12 @@ class TopologyCut {
   std::span<const Triangle> m_added;
   const std::uint32_t m_firstAdded;
   const std::size_t m_firstNewVertex, m_vertexCount;
-  CountedVector<Vertex> m_vertices;  ///< affected, by their ids
-  CountedVector<Edge> m_edges;       ///< affected, by their vertices
-  Elements m_disabled;               ///< disabled ones that stay
+  CountedVector<bool> m_isRemoved;        ///< per element before
+  CountedVector<Vertex> m_vertices;       ///< affected, by their ids
+  CountedVector<Edge> m_edges;            ///< affected, by their vertices
+  IndexLists m_vertexLists, m_edgeLists;  ///< of these: enabled elements afterwards
+  Ids m_newEdges;
+  Elements m_disabled;  ///< disabled ones that stay
 };
 
 void MeshTopology::cut(std::span<const std::uint32_t> newlyRemoved, std::span<const Triangle> added,
@@ -304,9 +325,42 @@ void MeshTopology::cut(std::span<const std::uint32_t> newlyRemoved, std::span<co
                        const std::function<void(const EdgeChange&)>& prepare) {
   PALPATE_ASSERT(std::is_sorted(newlyRemoved.begin(), newlyRemoved.end()));
   PALPATE_ASSERT(newVertexCount >= vertexCount);
+  if (isLargeCut(newlyRemoved.size() + added.size(), count()))
+    return cutAnew(newlyRemoved, added, newVertexCount, prepare);
   TopologyCut cut(*this, newlyRemoved, added, newVertexCount);
   if (prepare) prepare(cut.edgeChange());
   cut.apply();
+}
+
+void MeshTopology::cutAnew(std::span<const std::uint32_t> newlyRemoved,
+                           std::span<const Triangle> added, std::size_t newVertexCount,
+                           const std::function<void(const EdgeChange&)>& prepare) {
+  CountedVector<Triangle> all;
+  all.reserve(elements.size() + added.size());
+  all.assign(elements.begin(), elements.end());
+  all.insert(all.end(), added.begin(), added.end());
+  Ids allRemoved(removed.size() + newlyRemoved.size()), stillDisabled;
+  std::merge(removed.begin(), removed.end(), newlyRemoved.begin(), newlyRemoved.end(),
+             allRemoved.begin());
+  std::set_difference(disabled.begin(), disabled.end(), newlyRemoved.begin(), newlyRemoved.end(),
+                      std::back_inserter(stillDisabled));
+  MeshTopology after(newVertexCount, all, allRemoved);
+  after.type = type;
+  if (!stillDisabled.empty()) after.disable(stillDisabled);
+  if (prepare) {
+    CountedVector<Segment> before;
+    forEachEdge([&](std::uint32_t e) { before.push_back(edges[e]); });
+    std::sort(before.begin(), before.end());
+    EdgeChange change;
+    const auto subtract = [](const auto& from, const auto& those, auto& result) {
+      std::set_difference(from.begin(), from.end(), those.begin(), those.end(),
+                          std::back_inserter(result));
+    };
+    subtract(before, after.edges, change.gone);
+    subtract(after.edges, before, change.added);
+    prepare(change);
+  }
+  *this = std::move(after);
 }
 
 }  // namespace palpate

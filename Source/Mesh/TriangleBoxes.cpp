@@ -45,6 +45,10 @@ HWY_ATTR void triangleBoxesOf(const FloatPoint* HWY_RESTRICT vertices,
   Chunk chunk;
   std::size_t chunkBegin = groups.front(), fill = 0;
   for (std::size_t g = 0; g + 1 < groups.size(); ++g) {
+    if (groups[g] == groups[g + 1]) {
+      groupBoxes[g] = FloatBox();
+      continue;
+    }
     V groupLower[kVectors], groupUpper[kVectors];
     for (std::size_t k = 0; k < kVectors; ++k) {
       groupLower[k] = empty;

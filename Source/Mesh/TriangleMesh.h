@@ -73,6 +73,12 @@ void forEachWithout(std::size_t size, std::span<const std::uint32_t> without, F&
       f(id);
 }
 
+/// Whether a cut that removes or adds so many elements costs more than to compute anew what follows
+/// from the elements that are left.
+constexpr bool isLargeCut(std::size_t changed, std::size_t elements) {
+  return changed > elements / 8;
+}
+
 /// The edges that a cut removes and adds, sorted.
 struct EdgeChange {
   CountedVector<Segment> gone, added;
@@ -94,7 +100,7 @@ struct MeshTopology {
   std::size_t vertexCount = 0;
   CountedVector<Triangle> elements;  ///< triangle {p, q, r}, segment {p, q, q}, point {p, p, p}
   /// Unique, lower vertex first, and sorted, but for those that cuts added behind them. An edge
-  /// keeps its number, also while no element has it: see forEachEdge().
+  /// keeps its number in small cuts, also while no element has it: see forEachEdge().
   CountedVector<Segment> edges;
   /// Edge i joins corners i and i + 1 mod 3; kNoEdge if both are the same vertex.
   CountedVector<std::array<std::uint32_t, 3>> triangleEdges;
@@ -115,8 +121,10 @@ struct MeshTopology {
   /// The elements after a cut: these are removed, in ascending order, and others are added. The
   /// topology equals one that is constructed anew, but for the numbers of edges. prepare: called
   /// before anything changes; may throw. Changes nothing if it throws.
-  /// Cost     searches for what is around the cut. It is linear only where elements are disabled,
-  ///          and, amortized by what is added, where arrays have to grow.
+  /// Cost     searches for what is around the cut, after one sort of it. Linear parts are moves of
+  ///          ids that cuts removed or added, a look at disabled elements, and, amortized by what
+  ///          is added, copies of arrays that have to grow. A large cut costs a topology
+  ///          constructed anew, and numbers the edges again.
   void cut(std::span<const std::uint32_t> removed, std::span<const Triangle> added,
            std::size_t newVertexCount,
            const std::function<void(const EdgeChange&)>& prepare = nullptr);
@@ -170,6 +178,8 @@ struct MeshTopology {
 
  private:
   friend class TopologyCut;
+  void cutAnew(std::span<const std::uint32_t> removed, std::span<const Triangle> added,
+               std::size_t newVertexCount, const std::function<void(const EdgeChange&)>& prepare);
   void findOwners(const CountedVector<bool>& isDisabled);
   std::size_t sortedEdges() const { return edges.size() - m_addedEdges.size(); }
   /// The index of an edge, also of one that is gone.

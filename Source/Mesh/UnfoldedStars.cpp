@@ -21,14 +21,14 @@ using Point = Vector3<V>;
 
 HWY_INLINE V coordinate(const Point& p, int k) { return k == 0 ? p.x : k == 1 ? p.y : p.z; }
 
-/// The views of triangles, as sets of ViewBit.
+/// The views of triangles, as sets of ViewBit, by the triangles' ids.
 ///
 /// Rounding: let R be at least the size of a coordinate of any corner, S that of both edges from
 /// corner 0 together, at most R. A float is off by 2^-23 R, an edge by E = 2^-21 R. A component of
 /// the cross product of two edges, or the sum of two such components, is off by less than 4 (E_i
 /// S_j + S_i E_j) + 16 E_i E_j.
-HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const FloatPoint* before,
-                          const FloatPoint* now, std::uint32_t* views) {
+HWY_ATTR void viewsKernel(const Triangle* triangles, const std::uint32_t* ids, std::size_t size,
+                          const FloatPoint* before, const FloatPoint* now, std::uint32_t* views) {
   constexpr float kLargest = 0x1p60f;  // products are in range, and no float was clamped
   const D d;
   const hn::RebindToUnsigned<D> du;
@@ -84,7 +84,7 @@ HWY_ATTR void viewsKernel(const Triangle* triangles, std::size_t size, const Flo
       }
     }
     hn::Store(view, du, bits);
-    std::copy_n(bits, count, views + begin);
+    for (std::size_t lane = 0; lane < count; ++lane) views[ids[begin + lane]] = bits[lane];
   }
 }
 
@@ -125,13 +125,13 @@ bool isUnfolded(const MeshTopology& topology, const Buffer<std::uint32_t>& views
 
 }  // namespace
 
-void UnfoldedStars::find(const MeshTopology& topology, std::span<const Triangle> ordered,
-                         const FloatPoint* before, const FloatPoint* now, const Threads& threads) {
-  const CountedVector<Triangle>& triangles = topology.elements;
-  m_views.resize(triangles.size());
-  threads.forChunks(triangles.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+void UnfoldedStars::find(const MeshTopology& topology, std::span<const std::uint32_t> order,
+                         std::span<const Triangle> ordered, const FloatPoint* before,
+                         const FloatPoint* now, const Threads& threads) {
+  m_views.resize(topology.elements.size());
+  threads.forChunks(ordered.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     HWY_DYNAMIC_DISPATCH(viewsKernel)
-    (triangles.data() + from, to - from, before, now, m_views.data() + from);
+    (ordered.data() + from, order.data() + from, to - from, before, now, m_views.data());
   });
   const auto forAll = [&](std::size_t size, auto&& f) {
     threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {

@@ -36,10 +36,11 @@ struct ViewBit {
 /// 2008; a star's contour needs no test of its own.)
 class UnfoldedStars {
  public:
-  /// ordered: the triangles in the order in which triangles() returns them. before and now: floats
-  /// of one frame, at the ends of the step.
-  void find(const MeshTopology&, std::span<const Triangle> ordered, const FloatPoint* before,
-            const FloatPoint* now, const Threads&);
+  /// order: the ids of the triangles that were not removed. ordered: they in this order, in which
+  /// triangles() returns them. before and now: floats of one frame, at the ends of the step.
+  void find(const MeshTopology&, std::span<const std::uint32_t> order,
+            std::span<const Triangle> ordered, const FloatPoint* before, const FloatPoint* now,
+            const Threads&);
 
   /// The ordered triangles, readable BoxArrays::kPadding past their end. Each vertex whose star is
   /// not unfolded is replaced by a unique number. Two triangles that still share a number need no

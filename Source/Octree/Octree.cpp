@@ -7,6 +7,8 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace palpate {
@@ -17,6 +19,7 @@ namespace {
 constexpr std::size_t kGroupsPerTask = 1024;
 
 double halfArea(const FloatBox& box) {
+  if (box.empty()) return 0.0;
   const double x = double{box.upper[0]} - box.lower[0], y = double{box.upper[1]} - box.lower[1],
                z = double{box.upper[2]} - box.lower[2];
   return x * y + y * z + z * x;
@@ -102,17 +105,69 @@ void Octree::build(const FloatBox& bounds, double bulk, const OctreeSettings& se
   m_stage = Stage::LaidOut;
 }
 
+/// The group that holds a place of the order.
+std::uint32_t Octree::groupAt(std::uint32_t place) const {
+  const Buffer<std::uint32_t>& groups = m_nodes.groups;
+  return static_cast<std::uint32_t>(std::upper_bound(groups.begin(), groups.end(), place) -
+                                    groups.begin() - 1);
+}
+
+std::uint32_t Octree::groupNear(const FloatBox& box) const {
+  PALPATE_ASSERT(isBuilt() && size() > 0);
+  const auto longestOf = [](const FloatBox& of) {
+    return std::max(
+        {of.upper[0] - of.lower[0], of.upper[1] - of.lower[1], of.upper[2] - of.lower[2]});
+  };
+  constexpr float kLarge = 0.5f;  // of a node: such elements are its own; any share will do
+  const float longest = longestOf(box);
+  OctreeNode node = 0;
+  while (const OctreeNode children = firstChild(node)) {
+    const auto own = ownRange(node);
+    if (own.first < own.second && longest > kLarge * longestOf(this->box(node))) break;
+    float least = std::numeric_limits<float>::infinity();
+    node = children;
+    for (unsigned slot = 0; slot < kChildren; ++slot) {
+      if (isEmpty(children + slot)) continue;
+      const FloatBox child = this->box(children + slot);
+      float apart = 0.0f, middles = 0.0f;
+      for (int k = 0; k < 3; ++k) {
+        apart += std::max({0.0f, child.lower[k] - box.upper[k], box.lower[k] - child.upper[k]});
+        middles += std::fabs((child.lower[k] - box.lower[k]) + (child.upper[k] - box.upper[k]));
+      }
+      // Where several overlap the box, their middles decide.
+      const float distance = apart + 0x1p-10f * middles;
+      if (distance < least || isEmpty(node)) {
+        least = distance;
+        node = children + slot;
+      }
+    }
+  }
+  return groupAt(ownRange(node).first);
+}
+
+/// If all slots of a node's child block have become empty, the node becomes a leaf of its own
+/// elements, and so on upward. The block stays in the pool until the next build.
+void Octree::unlinkIfEmpty(OctreeNode node) {
+  while (blockOf(node) != 0) {
+    const OctreeBlock& block = m_nodes.pool[blockOf(node)];
+    for (unsigned slot = 0; slot < kChildren; ++slot)
+      if (!block.isEmpty(slot)) return;
+    const OctreeNode above = parent(blockOf(node));
+    const auto [begin, end] = ownRange(above);
+    OctreeBlock& blockAbove = m_nodes.pool[blockOf(above)];
+    blockAbove.child[slotOf(above)] = OctreeBlock::kLeaf | (end - begin);
+    node = above;
+  }
+}
+
 CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> places,
-                                            std::span<const Joining> joining) {
-  PALPATE_ASSERT(isBuilt() && !places.empty());
+                                            std::span<const Joining> joining, bool keepsBoxes) {
+  PALPATE_ASSERT(isBuilt() && !(places.empty() && joining.empty()));
+  PALPATE_ASSERT(size() + joining.size() > places.size());
   m_stage = Stage::Empty;
   m_dops.directions = 3;
   ++m_layout;
   Buffer<std::uint32_t>& groups = m_nodes.groups;
-  const auto groupOf = [&](std::uint32_t place) {
-    return static_cast<std::uint32_t>(std::upper_bound(groups.begin(), groups.end(), place) -
-                                      groups.begin() - 1);
-  };
   /// From an old place on, ranges begin so much further behind.
   struct Shift {
     std::uint32_t place, by;  ///< modulo 2^32
@@ -129,11 +184,12 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
   auto gone = places.begin();
   for (auto joins = joining.begin(); joins != joining.end() || gone != places.end();) {
     if (joins != joining.end() && (gone == places.end() || groups[joins->group + 1] <= *gone)) {
+      PALPATE_ASSERT(groups[joins->group] < groups[joins->group + 1]);
       moveUpTo(groups[joins->group + 1]);
       joined.push_back(to++);
       changed.push_back(joins++->group);
     } else {
-      changed.push_back(groupOf(*gone));
+      changed.push_back(groupAt(*gone));
       moveUpTo(*gone++);
       ++from;
     }
@@ -143,22 +199,30 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
 
   const auto newSize = static_cast<std::uint32_t>(size() - places.size() + joining.size());
   PALPATE_ASSERT(to == newSize);
-  const std::size_t oldSize = size(), capacity = newSize + BoxArrays::kPadding;
-  if (m_order.capacity() < capacity) m_order.reserve(withSpare(capacity));
-  m_order.resize(std::max<std::size_t>(oldSize, newSize));
-  move(m_order.data(), moves);
+  const std::size_t most = std::max<std::size_t>(size(), newSize) + BoxArrays::kPadding;
+  const auto moveIn = [&](auto& buffer) {
+    if (buffer.capacity() < most) buffer.reserve(withSpare(most));
+    buffer.resize(most);
+    move(buffer.data(), moves);
+  };
+  moveIn(m_order);
   m_order.resize(newSize);
   for (std::size_t i = 0; i < joined.size(); ++i) m_order[joined[i]] = joining[i].element;
+  for (int k = 0; k < 3 && keepsBoxes; ++k) moveIn(m_boxes.lower[k]), moveIn(m_boxes.upper[k]);
+  m_boxes.resize(newSize);
 
-  // Where any slot begins, also one without own elements, a group begins, or all end.
+  // Where any slot begins, also one without own elements, a group begins, or all end. Groups that
+  // were empty before begin where the next one does, and none of them is joined.
   const std::uint32_t first = shifts.front().place, last = shifts.back().place;
+  auto shift = shifts.begin();  // of the last place, which is often near the next one
   const auto shifted = [&](std::uint32_t begin) {
     if (begin < first) return begin;
     if (begin >= last) return begin + shifts.back().by;
-    const auto next = std::upper_bound(
-        shifts.begin(), shifts.end(), begin,
-        [](std::uint32_t place, const Shift& shift) { return place < shift.place; });
-    return begin + std::prev(next)->by;
+    if (begin < shift->place || begin >= (shift + 1)->place)
+      shift = std::prev(std::upper_bound(
+          shifts.begin(), shifts.end(), begin,
+          [](std::uint32_t place, const Shift& behind) { return place < behind.place; }));
+    return begin + shift->by;
   };
   for (auto begin = std::lower_bound(groups.begin(), groups.end(), first); begin != groups.end();
        ++begin)
@@ -166,14 +230,14 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
   for (std::size_t block = 0; block < m_nodes.pool.used(); ++block)
     for (std::uint32_t& begin : m_nodes.pool[block].begin) begin = shifted(begin);
   for (const std::uint32_t g : changed) {
-    PALPATE_ASSERT(groups[g + 1] > groups[g]);
     const OctreeNode node = m_nodes.groupNodes[g];
     OctreeBlock& block = m_nodes.pool[blockOf(node)];
-    if (block.isLeaf(slotOf(node)))
-      block.child[slotOf(node)] = OctreeBlock::kLeaf | (groups[g + 1] - groups[g]);
+    if (!block.isLeaf(slotOf(node))) continue;
+    block.child[slotOf(node)] = OctreeBlock::kLeaf | (groups[g + 1] - groups[g]);
   }
-  m_boxes.resize(newSize);
-  m_stage = Stage::LaidOut;
+  for (const std::uint32_t g : changed)
+    if (groups[g] == groups[g + 1]) unlinkIfEmpty(m_nodes.groupNodes[g]);
+  m_stage = keepsBoxes ? Stage::Built : Stage::LaidOut;
   return moves;
 }
 
@@ -231,10 +295,7 @@ void Octree::refit(std::size_t first, std::size_t last) {
     const OctreeNode parent = m_nodes.parents[block];
     const std::uint32_t begin = pool[blockOf(parent)].begin[slotOf(parent)];
     if (begin != pool[block].begin[0]) {  // fitBlocks() widens the box of the parent's own elements
-      const auto own = std::lower_bound(m_nodes.groups.begin(), m_nodes.groups.end(), begin);
-      PALPATE_ASSERT(*own == begin);
-      pool[blockOf(parent)].setBox(
-          slotOf(parent), m_groupBoxes[static_cast<std::size_t>(own - m_nodes.groups.begin())]);
+      pool[blockOf(parent)].setBox(slotOf(parent), m_groupBoxes[groupAt(begin)]);
     }
     fitBlocks(pool.data(), m_nodes.parents.data(), block, block + 1);
     push(blockOf(parent));

@@ -25,7 +25,7 @@ namespace palpate {
 /// Slot i is the child in octant i (bit 0: x, 1: y, 2: z). The elements of a slot in use start at
 /// begin[i] of the tree's order. A leaf has `count(i)` elements. For any other slot, its own
 /// elements come first and end where the first element of its child block begins. The box of an
-/// empty slot overlaps nothing.
+/// empty slot overlaps nothing. Some slot of a child block is not empty.
 struct alignas(64) OctreeBlock {
   static constexpr std::uint32_t kLeaf = 0x80000000u;
 
@@ -108,7 +108,7 @@ struct OctreeNodes {
   BlockPool pool;
   Buffer<OctreeNode> parents;  ///< of each block
   /// One group for each leaf, and for the own elements of each other node. Group g has elements
-  /// [groups[g], groups[g + 1]) of the order.
+  /// [groups[g], groups[g + 1]) of the order. Groups are empty only after Octree::replace().
   Buffer<std::uint32_t> groups;
   Buffer<OctreeNode> groupNodes;  ///< the node of each group
   /// Part i of the build made blocks [partBlocks[i], partBlocks[i + 1]). Part 0 is the top, the
@@ -170,12 +170,15 @@ class Octree {
     std::uint32_t from, to, size;
   };
   /// Of a built octree: removes the elements at these places of the order, and adds others at the
-  /// ends of their groups. Both ascend. Each group must keep an element. As after build(), order()
-  /// is then new, and no box is known; nodes may hold elements that a build would put elsewhere.
-  /// Returns the moves of the elements that stay, for move().
-  /// Cost     moves of the order behind the first place, and one look at each node.
+  /// ends of their groups, which had elements. Both ascend, and together they are not empty; some
+  /// element is left. Groups may become empty. order() is then new, and nodes may hold elements
+  /// that a build would put elsewhere. Returns the moves of the elements that stay, for move().
+  /// keepsBoxes: boxes of elements that stay are known, too, and the caller calls refit() for all
+  /// groups of these places and elements. Otherwise no box is known, as after build().
+  /// Cost     moves of the order, and of the boxes, behind the first place, and one look at each
+  ///          node behind it.
   CountedVector<Move> replace(std::span<const std::uint32_t> places,
-                              std::span<const Joining> joining);
+                              std::span<const Joining> joining, bool keepsBoxes);
   /// Makes the moves that replace() returned, of elements in the old order.
   template <class T>
   static void move(T* elements, std::span<const Move> moves) {
@@ -187,6 +190,9 @@ class Octree {
     for (const Move& m : moves)
       if (m.to < m.from) std::copy_n(elements + m.from, m.size, elements + m.to);
   }
+  /// Of a built octree: a group with elements near a box, for an element that joins. It is found
+  /// from the root down, by the distances of the nodes' boxes.
+  std::uint32_t groupNear(const FloatBox&) const;
   /// Computes the boxes of all nodes from the groups' boxes.
   void fit(const Threads&);
   /// Of a built octree: the same for groups [first, last), whose boxes in groupBoxes() are new.
@@ -261,6 +267,8 @@ class Octree {
  private:
   static constexpr double kMaxLoosening = 1.5;
   enum class Stage { Empty, LaidOut, Built };
+  std::uint32_t groupAt(std::uint32_t place) const;
+  void unlinkIfEmpty(OctreeNode);
   [[noreturn]] static void throwNotBuilt();
 
   Stage m_stage = Stage::Empty;

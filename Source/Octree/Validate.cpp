@@ -32,8 +32,9 @@ class Validation {
     if (const auto twice = std::adjacent_find(ids.begin(), ids.end()); twice != ids.end())
       fail(0, "element " + std::to_string(*twice) + " is repeated in the order");
     for (std::size_t block = 0; block < m_blockVisited.size(); ++block)
-      if (!m_blockVisited[block])
-        fail(nodeOf(static_cast<std::uint32_t>(block), 0), "a block in use has no parent");
+      for (unsigned slot = 0; slot < kChildren && !m_blockVisited[block]; ++slot)
+        if (!m_octree.blocks()[block].isEmpty(slot))
+          fail(nodeOf(static_cast<std::uint32_t>(block), slot), "a node in use has no parent");
     return std::move(m_failures);
   }
 
@@ -65,14 +66,17 @@ class Validation {
     if (!block.isLeaf(slot)) {
       m_blockVisited[child] = true;
       if (m_octree.parent(child) != node) fail(node, "its child block refers to another parent");
+      bool isUsed = false;
       for (unsigned octant = 0; octant < kChildren; ++octant) {
         if (m_octree.blocks()[child].isEmpty(octant)) {
           if (!m_octree.blocks()[child].box(octant).empty())
             fail(nodeOf(child, octant), "an empty slot has a box");
         } else {
+          isUsed = true;
           box.add(visit(nodeOf(child, octant), cube.child(octant)));
         }
       }
+      if (!isUsed) fail(node, "all slots of its child block are empty");
     }
     const FloatBox fitted = block.box(slot);
     if (fitted.lower != box.lower || fitted.upper != box.upper)

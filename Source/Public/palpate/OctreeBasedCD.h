@@ -129,6 +129,8 @@ class PALPATE_EXPORT OctreeBasedCD {
   /// name them. Returns the ids of those. No other id changes, and what belongs to other elements
   /// stays: positions at both ends, disabled elements, tags, tracked contacts. Removed ids are not
   /// used again before setTriangles(): Docs/HowTo/Cuts.md.
+  /// Cost     of a small cut by its size; with the next detection, at most about that of a new
+  ///          object of what is left, and a pass over what is removed.
   /// rest: L, of the new vertices for restDistance; empty: newPositions.
   /// Errors   UnsupportedMethod for another type or an attached field; IndexOutOfRange, too, for an
   ///          id that is named twice or was removed; WrongPositionCount for rest; TooLarge.

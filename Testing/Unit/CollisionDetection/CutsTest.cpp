@@ -245,6 +245,158 @@ TEST_P(CutSequence, IsAsIfTheMeshWereHandedOverAnew) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, CutSequence, ::testing::Range(0, casesOf(8)));
 
+/// Cuts of any size and shape, some with several calls: the next ones of a random history.
+std::vector<Difference> anyCuts(Random& random, const Model<Triangle>& mesh,
+                                const std::vector<Triangle>& original) {
+  std::vector<Difference> cuts(1);
+  Difference& cut = cuts.front();
+  const Ids ids = mesh.ids();
+  const auto removeOneIn = [&](std::size_t every, bool again) {
+    for (const std::uint32_t id : ids) {
+      if (random() % every) continue;
+      cut.removed.push_back(id);
+      if (again) cut.added.push_back(mesh.elements[id]);
+    }
+  };
+  if (ids.size() < original.size() / 4) {  // back to where it began
+    cut.removed = ids;
+    cut.added = original;
+    return cuts;
+  }
+  const auto kind = random() / 2;
+  const bool again = random() % 2;
+  switch (kind / 4 % 9) {
+    case 0:
+      return {};
+    case 1:
+      return {randomCut(random, mesh)};
+    case 2:
+    case 3:
+      removeOneIn(std::array{200, 100, 50, 20}[kind % 4], again);
+      break;
+    case 4:
+      removeOneIn(2, again);
+      break;
+    case 5:
+      removeOneIn(1, again);
+      break;
+    case 6:  // in one call each
+      cuts.clear();
+      for (std::size_t i = 0; i < 12; ++i) {
+        Difference& one = cuts.emplace_back();
+        one.removed = {ids[i * ids.size() / 12]};
+        if (random() % 2) one.added = {mesh.elements[one.removed[0]]};
+      }
+      break;
+    case 7:  // triangles with consecutive ids
+      for (std::size_t i = random() % ids.size(), left = 1 + random() % 150;
+           i < ids.size() && left > 0; ++i, --left)
+        cut.removed.push_back(ids[i]);
+      break;
+    default:  // only added: one that is there a second time, and one that was removed
+      cut.added = {mesh.elements[ids[random() % ids.size()]], original[random() % original.size()]};
+  }
+  return cuts;
+}
+
+class AnyCuts : public ::testing::TestWithParam<int> {};
+
+/// Two sheets of one mesh, with itself and with a ball. The mesh moves as a whole, in part, slowly
+/// or not at all, so that its octree follows by each of its strategies.
+TEST_P(AnyCuts, AreAsIfTheMeshWereHandedOverAnew) {
+  Random random(static_cast<std::uint64_t>(100 + GetParam()));
+  constexpr std::array kMethods{Method::Auto, Method::Proximity, Method::Continuous,
+                                Method::Intersection};
+  constexpr double kEdge = 1.0 / 20;
+  PairSettings settings{.method = kMethods[GetParam() % 4],
+                        .thickness = 0.015,
+                        .contacts = GetParam() / 4 % 2 ? Contacts::All : Contacts::Distinct};
+  const bool isSlow = GetParam() / 2 % 2;
+  PairSettings withItself = settings;
+  if (GetParam() % 3) withItself.restDistance = 2.5 * kEdge;
+  const Mesh ball = sphere(8, 12, {0.5, 0.5, 0.1}, 0.2);
+  Mesh sheets = sheet(20, 0.1, 0);
+  const auto half = static_cast<std::uint32_t>(sheets.positions.size());
+  for (std::uint32_t v = 0; v < half; ++v)
+    sheets.positions.push_back(sheets.positions[v] + Vector3d(0, 0, 0.02));
+  for (std::size_t t = 0, count = sheets.triangles.size(); t < count; ++t) {
+    Triangle above = sheets.triangles[t];
+    for (std::uint32_t& v : above) v += half;
+    sheets.triangles.push_back(above);
+  }
+  Model<Triangle> mesh{sheets.positions, sheets.positions, sheets.positions, sheets.triangles, {}};
+  const auto setUp = [&](const Settings& how, const std::vector<Triangle>& triangles) {
+    OctreeBasedCD collisions(how);
+    const GeometryId a = collisions.addTriangleMesh(mesh.rest, triangles),
+                     b = addMesh(collisions, ball);
+    collisions.addCollisionPair(a, b, settings);
+    collisions.addCollisionPair(a, a, withItself);
+    return collisions;
+  };
+  OctreeBasedCD collisions = setUp(settingsOf(Engine::Octree, 1 + GetParam() % 3), mesh.elements);
+  const GeometryId a{0}, b{1};
+  std::size_t contacts = 0, rebuilt = 0, refitted = 0;
+  for (int step = 0; step < 24; ++step) {
+    if (step > 0) {
+      collisions.advance();
+      mesh.before = mesh.now;
+    }
+    // At first the mesh is as it was, so that slow pairs are kept.
+    const auto cuts =
+        step > 6 ? anyCuts(random, mesh, sheets.triangles) : std::vector<Difference>();
+    for (const Difference& cut : cuts) {
+      collisions.replaceTriangles(a, cut.removed, cut.added, cut.positions, cut.rest);
+      mesh.apply(cut.removed, cut.added, cut.positions, cut.rest);
+    }
+    const double motion = isSlow ? 2e-4 : 5e-3;
+    switch (random() % 4) {
+      case 0:
+      case 1:
+        for (Vector3d& p : mesh.now) p += randomPoint(random, -motion, motion);
+        if (step == 0) mesh.before = mesh.now;
+        collisions.setPositions(a, mesh.now);
+        break;
+      case 2: {
+        const std::size_t first = random() % (mesh.now.size() - 10);
+        for (std::size_t v = first; v < first + 10; ++v)
+          mesh.now[v] += randomPoint(random, -motion, motion);
+        if (step == 0) mesh.before = mesh.now;
+        collisions.setPositions(a, first, std::span(mesh.now).subspan(first, 10));
+        break;
+      }
+      default:
+        break;
+    }
+    collisions.detectCollision();
+    rebuilt += collisions.statistics().rebuiltOctrees;
+    refitted += collisions.statistics().refittedOctrees;
+    if (step % 5 == 4) {
+      EXPECT_EQ(collisions.octree().validate(), std::vector<std::string>{});
+    }
+    OctreeBasedCD anew = setUp(settingsOf(Engine::Octree), mesh.left());
+    anew.setPositions(a, mesh.before, mesh.now);
+    anew.detectCollision();
+    const Ids ids = mesh.ids();
+    Ids ballIds(ball.triangles.size());
+    std::iota(ballIds.begin(), ballIds.end(), 0u);
+    for (const GeometryId other : {a, b}) {
+      const CollisionData& found = collisions.collisionData(a, other);
+      const CollisionData truth =
+          renamed(anew.collisionData(a, other), ids, other == a ? ids : ballIds);
+      expectSameRows(Rows(found), Rows(truth));
+      contacts += Rows(found).contacts();
+    }
+    if (HasFailure()) FAIL() << "step " << step;
+  }
+  EXPECT_GT(rebuilt, 2u);
+  EXPECT_GT(refitted, 5u);
+  if (settings.method != Method::Intersection) {
+    EXPECT_GT(contacts, 1000u);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, AnyCuts, ::testing::Range(0, casesOf(24)));
+
 /// Surface triangles with the tetrahedra that they belong to.
 using Faces = std::set<std::pair<Triangle, std::uint32_t>>;
 
@@ -260,7 +412,8 @@ Faces facesOf(const TetrahedralSurface& surface, const Ids& tetrahedra) {
 TEST(CutSolids, AreAsIfHandedOverAnew) {
   for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(12)); ++seed) {
     Random random(seed);
-    const Solid start = cells(2, random);
+    const bool few = seed % 3 == 1;  // so that the topology is not computed anew
+    const Solid start = cells(few ? 4 : 2, random);
     Model<Tetrahedron> solid{
         start.positions, start.positions, start.positions, start.tetrahedra, {}};
     const Mesh ball = sphere(6, 8, {1.0, 1.0, 2.1}, 0.8);
@@ -289,7 +442,7 @@ TEST(CutSolids, AreAsIfHandedOverAnew) {
       std::vector<Tetrahedron> added;
       Positions positions;
       for (const std::uint32_t id : solid.ids()) {
-        if (random() % 8) continue;
+        if (random() % (few ? 150 : 8)) continue;
         gone.push_back(id);
         if (random() % 2) continue;
         const Tetrahedron& t = solid.elements[id];

@@ -131,6 +131,19 @@ class KeptAndSearched {
     triangles.insert(triangles.end(), added.begin(), added.end());
     m_positions[body].insert(m_positions[body].end(), positions.begin(), positions.end());
   }
+  /// Removes one triangle in `every`, from id `first` on. again: and adds the same ones.
+  void scatter(std::size_t body, std::size_t first, std::size_t last, std::size_t every,
+               bool again) {
+    std::vector<std::uint32_t> removed;
+    std::vector<Triangle> added;
+    for (std::size_t id = first; id < std::min(last, m_triangles[body].size()); id += every) {
+      const Triangle t = m_triangles[body][id];
+      if (t[0] == t[1]) continue;
+      removed.push_back(static_cast<std::uint32_t>(id));
+      if (again) added.push_back(t);
+    }
+    replace(body, removed, added, {});
+  }
   /// Vertices from this one on.
   void lift(std::size_t body, std::size_t first, double height) {
     for (std::size_t v = first; v < m_positions[body].size(); ++v)
@@ -351,6 +364,41 @@ TEST(KeptPairsOfTwoSheets, CutsKeepTheListsOfOtherElements) {
       ++frames, fewer += both.testsFewer();
     }
     EXPECT_GT(4 * fewer, 3 * frames) << threads << " threads";
+  }
+}
+
+/// Groups, blocks and whole parts of the octree become empty, or it is built anew.
+TEST(KeptPairsOfTwoSheets, ScatteredAndLargeCutsHaveTheAnswersOfASearch) {
+  for (const int threads : {1, 4}) {
+    Random random(17);
+    SlowScene scene = largeSheets(0.02, 0.008);
+    scene.pairs = {{0, 1}, {1, 1}};
+    scene.bodies[1] = sheetAt(48, 0.52, 1.0);
+    KeptAndSearched both(scene, threads);
+    both.setAsksStatistics(false);
+    int frames = 0, fewer = 0;
+    const auto detect = [&](std::size_t moved) {
+      if (moved < 2) both.move(random, moved, 0.001 * scene.edge);
+      both.detect();
+      ++frames, fewer += both.testsFewer();
+      EXPECT_EQ(both.kept().octree().validate(), std::vector<std::string>{});
+      both.advance();
+    };
+    for (const std::size_t every : {300u, 60u, 9u, 2u}) {
+      runUntilKept(both, random, scene.edge);
+      both.advance();
+      for (std::size_t cut = 0; cut < 6; ++cut) {
+        SCOPED_TRACE("every " + std::to_string(every) + ", cut " + std::to_string(cut));
+        if (cut == 5)
+          both.scatter(1, 400 * every, 400 * every + 500, 1, false);
+        else
+          both.scatter(cut % 2, cut, 100000, every, cut % 3 != 0);
+        detect(cut % 3);
+        detect(random() % 3);
+        if (HasFailure()) return;
+      }
+    }
+    EXPECT_GT(3 * fewer, frames) << threads << " threads";
   }
 }
 

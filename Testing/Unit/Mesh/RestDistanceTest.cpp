@@ -116,20 +116,20 @@ TEST(RestDistance, TakesMeshesWithoutEdges) {
 }
 
 TEST(RestDistance, AfterACutIsThatOfTheNewMesh) {
-  std::size_t kept = 0;
+  std::size_t kept = 0, anew = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     Random random(seed);
     Mesh mesh = testing::sheet(9, 0.3, 0);
     for (Eigen::Vector3d& p : mesh.positions) p += testing::randomPoint(random, -0.02, 0.02);
     MeshTopology topology(mesh.positions.size(), mesh.triangles);
     if (seed % 2) topology.disable(std::vector<std::uint32_t>{3, 40, 41, 100});
-    const double distance = testing::uniform(random, 0.05, 0.5);
+    const double distance = testing::uniform(random, 0.05, 0.35);
     IndexLists lists = verticesWithin(topology, mesh.positions, distance, Threads(1));
     for (int cut = 0; cut < 4; ++cut) {
       const auto first = static_cast<std::uint32_t>(topology.elements.size());
       std::vector<std::uint32_t> removed;
       for (std::uint32_t t = 0; t < first; ++t)
-        if (!topology.isRemoved(t) && random() % 40 == 0) removed.push_back(t);
+        if (!topology.isRemoved(t) && random() % (cut == 3 ? 4 : 80) == 0) removed.push_back(t);
       std::vector<Triangle> added;
       for (const std::uint32_t t : removed) {
         const auto [a, b, c] = topology.elements[t];
@@ -140,20 +140,21 @@ TEST(RestDistance, AfterACutIsThatOfTheNewMesh) {
       }
       ChangedLists changed;
       topology.cut(removed, added, mesh.positions.size(), [&](const EdgeChange& change) {
-        changed = verticesWithinAfterCut(topology, change, mesh.positions, distance, lists);
+        changed =
+            verticesWithinAfterCut(topology, change, mesh.positions, distance, lists, Threads(2));
       });
       const IndexLists truth = verticesWithin(topology, mesh.positions, distance, Threads(1));
-      kept += lists.size() - changed.vertices.size();
-      lists.reserveMore(truth.size() - lists.size(), changed.lists.itemCount());
-      for (std::size_t i = 0; i < changed.vertices.size(); ++i)
-        if (changed.vertices[i] < lists.size())
-          lists.replace(changed.vertices[i], changed.lists[i]);
-        else
-          lists.append(changed.lists[i]);
+      if (!changed.areAll) {
+        kept += lists.size() - changed.vertices.size();
+        lists.reserveMore(truth.size() - lists.size(), changed.lists.itemCount());
+      }
+      anew += changed.areAll;
+      replaceLists(lists, changed);
       expectSame(lists, truth);
     }
   }
   EXPECT_GT(kept, 1000u);
+  EXPECT_GT(anew, 50u);
 }
 
 }  // namespace

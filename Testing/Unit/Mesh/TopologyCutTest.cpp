@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <vector>
 
@@ -67,13 +68,16 @@ std::vector<Triangle> randomTriangles(Random& random, std::size_t count, std::si
 }
 
 TEST(TopologyCut, EqualsATopologyThatIsConstructedAnew) {
+  std::size_t large = 0, cuts = 0;
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     Random random(seed);
     const bool isBall = seed % 3 == 0;
     const testing::Mesh ball = testing::sphere(3, 4, {0, 0, 0}, 1);
     std::size_t vertices = isBall ? ball.positions.size() : 3 + random() % 20;
+    // Cuts of few triangles change the topology, and large ones construct it anew.
+    const std::uint64_t few = seed % 2 ? 5 : 60;
     std::vector<Triangle> all =
-        isBall ? ball.triangles : randomTriangles(random, random() % 40, vertices);
+        isBall ? ball.triangles : randomTriangles(random, random() % (8 * few), vertices);
     MeshTopology topology(vertices, all);
     std::vector<std::uint32_t> removed, disabled;
     for (int cut = 0; cut < 12; ++cut) {
@@ -85,14 +89,33 @@ TEST(TopologyCut, EqualsATopologyThatIsConstructedAnew) {
       }
       std::vector<std::uint32_t> gone;
       for (std::uint32_t t = 0; t < all.size(); ++t)
-        if (!topology.isRemoved(t) && random() % 5 == 0) gone.push_back(t);
+        if (!topology.isRemoved(t) && random() % few == 0) gone.push_back(t);
       vertices += random() % 3;
       std::vector<Triangle> added;
-      if (random() % 4) added = randomTriangles(random, random() % 10, vertices);
+      if (random() % 4) added = randomTriangles(random, random() % (50 / few + 2), vertices);
       // A triangle that is removed and added again is another one.
       for (const std::uint32_t t : gone)
         if (random() % 3 == 0) added.push_back(all[t]);
-      topology.cut(gone, added, vertices);
+      large += isLargeCut(gone.size() + added.size(), topology.count());
+      const MeshTopology before = topology;
+      EdgeChange change;
+      topology.cut(gone, added, vertices, [&](const EdgeChange& of) { change = of; });
+      // The edges that change are those that the lists of edges say.
+      const auto edgesOf = [](const MeshTopology& of) {
+        std::vector<Segment> edges;
+        of.forEachEdge([&](std::uint32_t e) { edges.push_back(of.edges[e]); });
+        std::sort(edges.begin(), edges.end());
+        return edges;
+      };
+      const auto were = edgesOf(before), are = edgesOf(topology);
+      const auto subtract = [](const auto& from, const auto& those) {
+        CountedVector<Segment> left;
+        std::ranges::set_difference(from, those, std::back_inserter(left));
+        return left;
+      };
+      EXPECT_EQ(change.gone, subtract(were, are));
+      EXPECT_EQ(change.added, subtract(are, were));
+      ++cuts;
       all.insert(all.end(), added.begin(), added.end());
       removed.insert(removed.end(), gone.begin(), gone.end());
       std::sort(removed.begin(), removed.end());
@@ -102,6 +125,8 @@ TEST(TopologyCut, EqualsATopologyThatIsConstructedAnew) {
       if (::testing::Test::HasFailure()) FAIL() << "seed " << seed << ", cut " << cut;
     }
   }
+  EXPECT_GT(large, cuts / 4);
+  EXPECT_LT(large, cuts * 3 / 4);
 }
 
 TEST(TopologyCut, RemovedElementsAreNowhere) {

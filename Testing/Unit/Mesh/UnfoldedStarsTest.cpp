@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 // Pairs that an unfolded star excludes are checked by the exact times of impact of all their
 // features, on every SIMD path.
@@ -40,12 +41,14 @@ std::vector<ElementPair> answered(const Step& step) {
   std::vector<FloatPoint> before(step.before.size()), now(before.size());
   toFloats(step.before, frame, before.data());
   toFloats(step.now, frame, now.data());
+  std::vector<std::uint32_t> order(step.topology.elements.size());
+  std::iota(order.begin(), order.end(), 0u);
   std::vector<Triangle> first;
   for (const std::string& path : simdPaths()) {
     useSimdPath(path);
     for (const int threads : {1, 3}) {
       UnfoldedStars stars;
-      stars.find(step.topology, step.topology.elements, before.data(), now.data(),
+      stars.find(step.topology, order, step.topology.elements, before.data(), now.data(),
                  Threads(threads));
       const std::vector<Triangle> found(stars.triangles(),
                                         stars.triangles() + step.topology.elements.size());

@@ -142,48 +142,96 @@ TEST(Octree, PartsThatAreFittedOneByOneEqualAWholeFit) {
   }
 }
 
-/// Elements leave and join nodes, again and again.
+/// Elements leave and join nodes, again and again. Nodes become empty, and whole blocks, too.
 TEST(OctreeReplace, LeavesAllOtherElementsInTheirNodes) {
   testing::Random random(4);
-  for (const bool nested : {false, true}) {
+  std::size_t emptied = 0, unlinked = 0;
+  for (int tree = 0; tree < 6; ++tree) {
+    const bool nested = tree % 2;
     Boxes boxes = nested ? testing::nestedBoxes(random, 5, 12, 100)
                          : testing::randomBoxes(random, 3000, 0.02);
     OctreeSettings settings;
     settings.maxElementsPerLeaf = 8;
-    BoxOctree tree;
-    tree.build(boxes, settings, Threads(1));
-    const Octree& octree = tree.octree;
+    BoxOctree of;
+    of.build(boxes, settings, Threads(1));
+    const Octree& octree = of.octree;
+    const auto blocks = [&] {
+      std::size_t count = 0;
+      for (OctreeNode node = 0; node < 8 * octree.pool().used(); ++node)
+        count += octree.firstChild(node) != 0;
+      return count;
+    };
     for (int round = 0; round < 20; ++round) {
       std::vector<std::uint32_t> ids(octree.order().begin(), octree.order().end()), places;
       std::vector<Octree::Joining> joining;
       std::vector<std::vector<std::uint32_t>> contents;
-      const auto groups = octree.groups();
-      for (std::uint32_t g = 0; g + 1 < groups.size(); ++g) {
+      const std::vector<std::uint32_t> groups(octree.groups().begin(), octree.groups().end());
+      const std::size_t linked = blocks();
+      // All elements of some groups that follow each other leave.
+      const std::size_t count = groups.size() - 1, from = random() % count,
+                        to = from + (round % 2 ? random() % (count / 10) : 0);
+      for (std::uint32_t g = 0; g < count; ++g) {
         auto& content = contents.emplace_back(ids.begin() + groups[g], ids.begin() + groups[g + 1]);
-        const bool joins = random() % 10 == 0;
+        if (content.empty()) continue;
+        const bool joins = random() % 10 == 0, leave = from <= g && g < to;
         for (std::uint32_t i = groups[g + 1]; i-- > groups[g];)
-          if (random() % 10 == 0 && (content.size() > 1 || joins)) {
+          if (random() % 10 == 0 || leave) {
             places.push_back(i);
             content.erase(content.begin() + (i - groups[g]));
           }
-        if (!joins) continue;
-        joining.push_back({g, static_cast<std::uint32_t>(boxes.size())});
-        content.push_back(joining.back().element);
-        boxes.push_back(boxes[ids[groups[g]]]);
+        if (joins) {
+          joining.push_back({g, static_cast<std::uint32_t>(boxes.size())});
+          content.push_back(joining.back().element);
+          boxes.push_back(boxes[ids[groups[g]]]);
+        }
+        emptied += content.empty();
       }
+      if (places.size() == ids.size()) break;
       std::sort(places.begin(), places.end());
       const std::uint64_t layout = octree.layout();
-      tree.octree.replace(places, joining);
-      EXPECT_FALSE(octree.isBuilt());
+      const bool keepsBoxes = random() % 2;
+      of.octree.replace(places, joining, keepsBoxes);
+      EXPECT_EQ(octree.isBuilt(), keepsBoxes);
       EXPECT_NE(octree.layout(), layout);
-      tree.fit(boxes, Threads(1));
+      if (keepsBoxes) {
+        for (std::size_t g = 0; g < count; ++g)
+          if (!std::ranges::equal(contents[g],
+                                  std::span(ids).subspan(groups[g], groups[g + 1] - groups[g])))
+            of.refit(boxes, g, g + 1);
+      } else {
+        of.fit(boxes, Threads(1));
+      }
       ASSERT_EQ(validate(octree, false), std::vector<std::string>{});
+      for (std::uint32_t i = 0; i < octree.size(); ++i) {
+        EXPECT_EQ(octree.boxes()[i].lower, boxes[octree.order()[i]].lower);
+        EXPECT_EQ(octree.boxes()[i].upper, boxes[octree.order()[i]].upper);
+      }
       for (std::size_t g = 0; g < contents.size(); ++g)
         EXPECT_TRUE(std::ranges::equal(
             contents[g], octree.order().subspan(octree.groups()[g],
                                                 octree.groups()[g + 1] - octree.groups()[g])));
+      unlinked += linked - blocks();
     }
   }
+  EXPECT_GT(emptied, 100u);
+  EXPECT_GT(unlinked, 20u);
+}
+
+/// A box joins a group that has elements, and mostly one whose box it overlaps.
+TEST(OctreeReplace, FindsGroupsThatAreNear) {
+  testing::Random random(5);
+  const Boxes boxes = testing::randomBoxes(random, 3000, 0.1);
+  BoxOctree tree;
+  tree.build(boxes, {}, Threads(1));
+  std::size_t overlapping = 0;
+  for (const FloatBox& box : boxes) {
+    const std::uint32_t group = tree.octree.groupNear(box);
+    const auto groups = tree.octree.groups();
+    ASSERT_LT(group + 1, groups.size());
+    ASSERT_LT(groups[group], groups[group + 1]);
+    overlapping += tree.octree.groupBoxes()[group].overlaps(box);
+  }
+  EXPECT_GT(overlapping, boxes.size() * 95 / 100);
 }
 
 }  // namespace

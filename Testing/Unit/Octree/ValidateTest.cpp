@@ -102,9 +102,13 @@ TEST(Validate, FindsFaultsOfTheLinks) {
                   [=](Tree& tree) { tree.child(tree.inner) = child; });
   expectFailure("its child block refers to another parent",
                 [](Tree& tree) { tree.child(0) = tree.child(tree.inner); });
-  expectFailure("a block in use has no parent", [](Tree& tree) {  // a leaf with the same elements
+  expectFailure("a node in use has no parent", [](Tree& tree) {  // a leaf with the same elements
     tree.child(tree.inner) =
         OctreeBlock::kLeaf | (tree.begin(tree.inner + 1) - tree.begin(tree.inner));
+  });
+  expectFailure("all slots of its child block are empty", [](Tree& tree) {
+    for (unsigned slot = 0; slot < kChildren; ++slot)
+      tree.child(tree.octree.firstChild(tree.inner) + slot) = OctreeBlock::kLeaf;
   });
 }
 
