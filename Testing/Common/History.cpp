@@ -298,9 +298,10 @@ void RandomHistory::cut(GeometryId id) {
     rest.push_back(atRest + m_unit * randomPoint(m_random, -0.02, 0.02));
     return first + static_cast<std::uint32_t>(positions.size()) - 1;
   };
+  const std::uint64_t every = m_random() % 2 ? 6 : 40;  // large cuts, and small ones
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const auto [a, b, c] = mesh.triangles[i];
-    if (m_random() % 6) {
+    if (m_random() % every) {
       left.push_back(mesh.triangles[i]);
       continue;
     }

@@ -416,7 +416,7 @@ TEST(CutSolids, AreAsIfHandedOverAnew) {
     const Solid start = cells(few ? 4 : 2, random);
     Model<Tetrahedron> solid{
         start.positions, start.positions, start.positions, start.tetrahedra, {}};
-    const Mesh ball = sphere(6, 8, {1.0, 1.0, 2.1}, 0.8);
+    const Mesh ball = sphere(6, 8, {1.0, 1.0, few ? 4.1 : 2.1}, 0.8);
     const PairSettings settings{.method = seed % 2 ? Method::Auto : Method::Proximity,
                                 .thickness = 0.05,
                                 .contacts = seed % 3 ? Contacts::Distinct : Contacts::All};
