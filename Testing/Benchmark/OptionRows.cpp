@@ -152,7 +152,104 @@ void optionRowsOf(Report& report, const scenes::Scene& scene, int count) {
           });
 }
 
+/// A cut by its share of a mesh.
+struct CutSize {
+  const char* name;
+  std::uint32_t every;  ///< of the triangles from `first` on, one in so many goes; 0: none
+  double first, last;   ///< shares of the triangles
+  bool again;           ///< those that went are added again
+};
+constexpr CutSize kCutSizes[] = {
+    {"none removed, one added", 0, 0.0, 0.0, true},
+    {"1 % in one place removed", 1, 0.5, 0.51, false},
+    {"1 % in one place replaced", 1, 0.5, 0.51, true},
+    {"1 % everywhere removed", 100, 0.0, 1.0, false},
+    {"1 % everywhere replaced", 100, 0.0, 1.0, true},
+    {"2 % everywhere removed", 50, 0.0, 1.0, false},
+    {"10 % everywhere removed", 10, 0.0, 1.0, false},
+    {"50 % everywhere removed", 2, 0.0, 1.0, false},
+    {"50 % in one place removed", 1, 0.0, 0.5, false},
+    {"all removed", 1, 0.0, 1.0, false},
+    {"all replaced", 1, 0.0, 1.0, true},
+};
+
+/// The first mesh of a scene is cut in a frame, beside an object to which what is left is handed
+/// anew in that frame.
+void cutRowsOf(Report& report, const scenes::Scene& scene, const PairSettings& settings,
+               const char* kind, int repetitions) {
+  constexpr int kFramesBefore = 4, kFramesAfter = 8;
+  for (const CutSize& size : kCutSizes) {
+    const std::vector<Triangle>& triangles = scene.meshes[0].triangles;
+    const auto place = [&](double share) {
+      return static_cast<std::size_t>(share * static_cast<double>(triangles.size()));
+    };
+    std::vector<std::uint32_t> removed;
+    std::vector<Triangle> added;
+    std::vector<bool> isGone(triangles.size());
+    for (std::size_t t = place(size.first); size.every > 0 && t < place(size.last);
+         t += size.every) {
+      removed.push_back(static_cast<std::uint32_t>(t));
+      isGone[t] = true;
+      if (size.again) added.push_back(triangles[t]);
+    }
+    if (size.every == 0) added.push_back(triangles[0]);
+    scenes::Scene rest = scene;
+    rest.meshes[0].triangles.clear();
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      if (!isGone[t]) rest.meshes[0].triangles.push_back(triangles[t]);
+    rest.meshes[0].triangles.insert(rest.meshes[0].triangles.end(), added.begin(), added.end());
+
+    std::vector<double> cutMs, anewMs, afterCut, afterAnew;
+    for (int repetition = 0; repetition < repetitions; ++repetition) {
+      Frames cut(scene, settings);
+      int frame = 0;
+      for (; frame < kFramesBefore; ++frame) {
+        cut.advance();
+        cut.detect(positionsOf(scene, frame));
+      }
+      cut.advance();
+      double start = now();
+      cut.detection().replaceTriangles(cut.id(0), removed, added, {});
+      cutMs.push_back(now() - start + cut.detect(positionsOf(scene, frame)));
+      start = now();
+      Frames anew(rest, settings);
+      anewMs.push_back(now() - start + anew.detect(positionsOf(scene, frame)));
+      std::vector<double> later[2];
+      for (int i = 0; i < kFramesAfter; ++i) {
+        const std::vector<Points> positions = positionsOf(scene, ++frame);
+        cut.advance(), anew.advance();
+        later[0].push_back(cut.detect(positions));
+        later[1].push_back(anew.detect(positions));
+      }
+      afterCut.push_back(median(later[0]));
+      afterAnew.push_back(median(later[1]));
+    }
+    const double cut = median(cutMs), anew = median(anewMs);
+    const double later = median(afterCut) / median(afterAnew);
+    const std::string name = std::string(kind) + ": " + size.name;
+    report.line({scene.name + ", " + name, milliseconds(cut), milliseconds(anew), times(cut / anew),
+                 times(later)});
+    report.row("cuts", scene.name, 1, name, "cut ms", cut);
+    report.row("cuts", scene.name, 1, name, "new object ms", anew);
+    report.row("cuts", scene.name, 1, name, "ratio", cut / anew);
+    report.row("cuts", scene.name, 1, name, "later frames", later);
+  }
+}
+
 }  // namespace
+
+void cutRows(Report& report, const RowOptions& options) {
+  report.heading(
+      "A cut and the next frame, and a new object of what is left with its first frame, ms; the "
+      "frames after both; 1 thread");
+  report.line({"", "cut", "new object", "ratio", "later frames"});
+  const scenes::Scene scene = scenes::clothOnBall();
+  if (!isWanted(scene.name, options.scenes)) return;
+  const int repetitions = options.quick ? 3 : 9;
+  cutRowsOf(report, scene, {.method = Method::Proximity, .thickness = scene.thickness}, "Proximity",
+            repetitions);
+  cutRowsOf(report, scene, {.thickness = scene.thickness}, "Auto", repetitions);
+}
 
 void optionRows(Report& report, const RowOptions& options) {
   report.heading("Frames, advance() included, without and with an option, ms; 1 thread");

@@ -130,32 +130,15 @@ void raceRows(Report& report, const RowOptions& options) {
 
 /// In the order in which they run.
 const std::vector<std::pair<std::string, void (*)(Report&, const RowOptions&)>> kTables = {
-    {"race", raceRows},
-    {"stages", stageRows},
-    {"frame", wholeFrameRows},
-    {"far", farTriangleRows},
-    {"rest", atRestRows},
-    {"tool", smallToolRows},
-    {"scale", scaleRows},
-    {"steady", steadyRows},
-    {"features", featureRows},
-    {"lines", lineRows},
-    {"shapes", shapeRows},
-    {"inside", insideRows},
-    {"rigid", rigidRows},
-    {"fieldframe", fieldFrameRows},
-    {"proxy", proxyRows},
-    {"coarse", coarseRows},
-    {"bounds", boundsRows},
-    {"continuous", continuousRows},
-    {"validity", validityRows},
-    {"resting", restingRows},
-    {"freemotion", freeMotionRows},
-    {"kept", keptRows},
-    {"options", optionRows},
-    {"queries", spatialRows},
-    {"fields", fieldRows},
-    {"simd", simdRows}};
+    {"race", raceRows},         {"stages", stageRows},          {"frame", wholeFrameRows},
+    {"far", farTriangleRows},   {"rest", atRestRows},           {"tool", smallToolRows},
+    {"scale", scaleRows},       {"steady", steadyRows},         {"features", featureRows},
+    {"lines", lineRows},        {"shapes", shapeRows},          {"inside", insideRows},
+    {"rigid", rigidRows},       {"fieldframe", fieldFrameRows}, {"proxy", proxyRows},
+    {"coarse", coarseRows},     {"bounds", boundsRows},         {"continuous", continuousRows},
+    {"validity", validityRows}, {"resting", restingRows},       {"freemotion", freeMotionRows},
+    {"kept", keptRows},         {"options", optionRows},        {"cuts", cutRows},
+    {"queries", spatialRows},   {"fields", fieldRows},          {"simd", simdRows}};
 
 }  // namespace
 

@@ -45,6 +45,7 @@ void restingRows(Report&, const RowOptions&);     ///< a sheet on another, partl
 void freeMotionRows(Report&, const RowOptions&);  ///< free motion beside Continuous, and its share
 void keptRows(Report&, const RowOptions&);        ///< slow frames with kept candidates
 void optionRows(Report&, const RowOptions&);   ///< options of a pair, cuts, budgets, saved states
+void cutRows(Report&, const RowOptions&);      ///< cuts of all sizes beside new objects
 void spatialRows(Report&, const RowOptions&);  ///< spatial queries beside other libraries
 void fieldRows(Report&, const RowOptions&);    ///< distance fields beside OpenVDB
 void simdRows(Report&, const RowOptions&);     ///< every path that this processor runs

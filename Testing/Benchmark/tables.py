@@ -161,6 +161,7 @@ TABLES = {
     "spatial": spatial,
     "types": types,
     "options": metrics("options", "1 thread"),
+    "cuts": metrics("cuts", "1 thread"),
     "free-motion": metrics("free motion", "1 thread", columns=["Continuous ms", "with free motion ms"]),
     "kept": metrics("kept pairs", "1 / 2 threads", columns=["searched ms", "kept ms"]),
     "simplify": metrics("simplify", "1 thread"),
