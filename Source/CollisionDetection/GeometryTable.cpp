@@ -511,6 +511,7 @@ void GeometryTable::apply(Cut& cut, const CutPreparation& prepare) {
   geometry.step.reserveCut(mesh, cut.positions.size(), cut.removed.size());
   body.tree.reserveCut(cut.removed.size());
   CountedVector<std::pair<std::uint32_t, Triangle>> gone;
+  gone.reserve(cut.removed.size());
   for (const std::uint32_t t : cut.removed) gone.push_back({t, mesh.topology.elements[t]});
   std::function<void(const EdgeChange&)> prepareEdges;
   if (prepare) prepareEdges = [&](const EdgeChange& change) { prepare(change, mesh.rest); };
