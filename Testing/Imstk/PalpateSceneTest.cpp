@@ -2,10 +2,14 @@
 #include "Scenes.h"
 
 #include <imstkPointToTetMap.h>
+#include <imstkTriangleToTetMap.h>
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <limits>
+#include <string>
+#include <thread>
 
 namespace {
 
@@ -108,6 +112,118 @@ TEST(PalpateScene, AToolIsHeldInsideAndRestartLetsItJump) {
   }
 }
 
+// The geometry of the tool is that which is drawn.
+TEST(PalpateScene, AToolIsHeldWhereItIsDrawn) {
+  for (const std::string kind : {"sphere", "turned box", "plane", "mesh"}) {
+    TestScene test;
+    const imstk::Quatd turn = imstk::Quatd(Eigen::AngleAxisd(0.3, Vec3d(1, 2, 3).normalized()));
+    std::shared_ptr<imstk::Geometry> geometry =
+        std::make_shared<imstk::Sphere>(Vec3d(0, 0, 0), 0.5);
+    if (kind == "turned box") {
+      geometry =
+          std::make_shared<imstk::OrientedBox>(Vec3d(0.02, 0, 0.01), Vec3d(0.2, 0.3, 0.4), turn);
+      geometry->rotate(Vec3d(0, 1, 0), 0.4, imstk::Geometry::TransformType::ConcatenateToTransform);
+    }
+    if (kind == "plane")
+      geometry = std::make_shared<imstk::Plane>(Vec3d(0, 0, 0), Vec3d(0.2, -1, 0.1));
+    if (kind == "mesh") geometry = cube({0, 0, 0}, 0.3);
+    const auto tool = test.tool(geometry);
+    const auto floor = test.floor(sheet({0, 0, 0}));
+    test.guardOnly(floor, tool);
+    test.palpateScene.showHeld(tool);
+    const auto at = [&] {
+      if (kind == "mesh")
+        return Vec3d(*positionsIn(dynamic_cast<imstk::PointSet&>(*geometry)).begin());
+      if (kind == "plane") return dynamic_cast<imstk::Plane&>(*geometry).getPosition();
+      return dynamic_cast<imstk::AnalyticalGeometry&>(*geometry).getPosition();
+    };
+    const auto put = [&](double height) {  // as a device does
+      const Vec3d way(0, height - at().y(), 0);
+      if (kind == "mesh") {
+        for (Vec3d& p : positionsIn(dynamic_cast<imstk::PointSet&>(*geometry))) p += way;
+      } else {
+        auto& shape = dynamic_cast<imstk::AnalyticalGeometry&>(*geometry);
+        shape.setPosition(shape.getPosition(imstk::Geometry::DataType::PreTransform) + way);
+      }
+    };
+    put(1.5);
+    test.scene->initialize();
+    test.step();
+    EXPECT_EQ(at().y(), 1.5) << kind;
+    double last = 1.5;
+    for (int i = 1; i <= 20; ++i) {
+      put(1.5 - 0.2 * i);
+      test.step();
+      EXPECT_LE(at().y(), last) << kind;
+      EXPECT_GT(at().y(), kind == "plane" ? 0.3 : kind == "mesh" ? -0.001 : 0.2) << kind;
+      last = at().y();
+    }
+    EXPECT_GT(test.palpateScene.held(), 0u) << kind;
+    EXPECT_LT(last, 0.7) << kind;
+    test.step(3);  // the program does not move it
+    EXPECT_EQ(test.palpateScene.held(), 0u) << kind;
+    EXPECT_EQ(at().y(), last) << kind;
+    put(2);
+    test.step();
+    EXPECT_EQ(test.palpateScene.held(), 0u) << kind;
+    EXPECT_NEAR(at().y(), 2, 1e-12) << kind;
+    EXPECT_TRUE(logged().empty()) << kind;
+  }
+}
+
+TEST(PalpateScene, WhatItSaysMayBeReadFromOtherThreads) {
+  TestScene test;
+  const auto falling = test.deformable("falling", triangle({0.1, 1, 0.1}, 0.2));
+  test.guardOnly(falling, test.floor(sheet({0, 0, 0})));
+  test.scene->initialize();
+  test.step();
+  particle(*falling) = Vec3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  test.step();
+  const std::string expected = test.palpateScene.error();
+  EXPECT_NE(expected, "");
+  std::atomic<bool> ends{false};
+  std::size_t looks = 0, others = 0;
+  std::thread other([&] {
+    while (!ends) {
+      ++looks;
+      others += test.palpateScene.error() == expected && !test.palpateScene.trusted() ? 0u : 1u;
+      test.palpateScene.restart();
+    }
+  });
+  for (int i = 0; i < 200 || looks < 1000; ++i) test.step();
+  ends = true;
+  other.join();
+  EXPECT_EQ(others, 0u);  // each step has this error: it never vanishes in between
+  EXPECT_EQ(logged().size(), 1u);
+}
+
+TEST(PalpateScene, ARestartInTheMiddleOfAStepIsOfTwoWholeSteps) {
+  TestScene test;
+  const auto sphere = std::make_shared<imstk::Sphere>(Vec3d(0.1, 3, 0.1), 0.5);
+  test.guardOnly(test.floor(sheet({0, 0, 0})), test.tool(sphere));
+  bool restarts = false;
+  imstk::connect<imstk::Event>(test.scene, &imstk::Scene::configureTaskGraph, [&](imstk::Event*) {
+    test.scene->getTaskGraph()->insertAfter(test.model->getSolveNode(),
+                                            std::make_shared<imstk::TaskNode>([&] {
+                                              if (restarts) test.palpateScene.restart();
+                                            }));
+  });
+  test.scene->initialize();
+  test.step();
+  test.palpateScene.restart();
+  restarts = true;
+  test.step();
+  restarts = false;
+  for (const double height : {-3.0, 3.0}) {
+    sphere->setPosition({0.1, height, 0.1});
+    test.step();
+    EXPECT_EQ(test.palpateScene.held(), 0u) << height;
+  }
+  sphere->setPosition({0.1, -3, 0.1});
+  test.step();
+  EXPECT_EQ(test.palpateScene.held(), 1u);
+}
+
 TEST(PalpateScene, AMovingMeshThatIsNoPbdObjectIsHeldAsOne) {
   TestScene test;
   const auto blade = triangle({0.1, 3, 0.1}, 0.2);
@@ -174,19 +290,37 @@ TEST(PalpateScene, ACellThatNamesAVertexTwiceIsRemoved) {
   EXPECT_TRUE(logged().empty());
 }
 
-TEST(PalpateScene, AMapWithoutParticlesIsRefused) {
-  TestScene test;
-  const auto solid = block(1, 1, 1, {-0.5, -1, -0.5}, {1, 1, 1});
-  const auto body = test.deformable("mapped", solid);
-  const auto surface = triangle({0, -0.1, 0}, 0.1);
-  body->setCollidingGeometry(surface);
-  body->setPhysicsToCollidingMap(std::make_shared<imstk::PointToTetMap>(solid, surface));
-  test.collide(body, test.floor(sheet({0, -2, 0})), {});
-  test.scene->initialize();
-  test.step(3);
-  ASSERT_FALSE(logged().empty());
-  EXPECT_NE(logged()[0].find("\"mapped\" does not collide"), std::string::npos);
-  EXPECT_NE(logged()[0].find("PointToTetMap"), std::string::npos);
+TEST(PalpateScene, AMapOfPointsToTetrahedraIsRefusedAndOneOfTrianglesIsNot) {
+  for (const bool ofTriangles : {false, true}) {
+    TestScene test;
+    const auto solid = block(1, 1, 1, {-0.5, 1, -0.5}, {1, 1, 1});
+    const auto surface = solid->extractSurfaceMesh();
+    std::shared_ptr<imstk::GeometryMap> map =
+        std::make_shared<imstk::PointToTetMap>(solid, surface);
+    if (ofTriangles) map = std::make_shared<imstk::TriangleToTetMap>(solid, surface);
+    const auto body = test.deformable("mapped", solid);
+    body->setCollidingGeometry(surface);
+    body->setPhysicsToCollidingMap(map);
+    const auto floor = test.floor(sheet({0, 0, 0}));
+    test.collide(body, floor, {});
+    // Other pairs of the scene are detected and guarded.
+    const auto falling = test.deformable("falling", triangle({0.1, 0.5, 0.1}, 0.2));
+    test.guardOnly(falling, floor);
+    test.scene->initialize();
+    test.setVelocity(*falling, {0, -1000, 0});
+    test.setVelocity(*body, {0, -1000, 0});
+    test.step(2);
+    EXPECT_GT(particle(*falling).y(), 0);
+    if (ofTriangles) {
+      for (const Vec3d& p : valuesOf(body->getPbdBody()->vertices)) EXPECT_GT(p.y(), 0);
+      EXPECT_TRUE(logged().empty());
+    } else {
+      EXPECT_LT(particle(*body).y(), -5);
+      ASSERT_FALSE(logged().empty());
+      EXPECT_NE(logged()[0].find("\"mapped\" does not collide"), std::string::npos);
+      EXPECT_NE(logged()[0].find("PointToTetMap"), std::string::npos);
+    }
+  }
 }
 
 TEST(PalpateScene, ACutSutureIsReplaced) {
@@ -300,12 +434,17 @@ TEST(PalpateScene, AToolThatIsHeldRestsWithTrust) {
   }
 }
 
-TEST(PalpateScene, OnlyInteractionsWithPalpateCDAreShared) {
+TEST(PalpateScene, AnInteractionNeedsAPbdObjectAndAHandler) {
   TestScene test;
   EXPECT_EQ(
       test.palpateScene.makeCollision(test.tool(sheet({0, 0, 0})), test.tool(sheet({0, 1, 0}))),
       nullptr);
   EXPECT_EQ(logged().size(), 1u);
+  const auto interaction = std::make_shared<imstk::PbdObjectCollision>(
+      test.deformable("cloth", sheet({0, 1, 0})), test.floor(sheet({0, 0, 0})));
+  interaction->setCollisionHandlingAB(nullptr);
+  EXPECT_FALSE(test.palpateScene.share(interaction));
+  EXPECT_EQ(logged().size(), 2u);
 }
 
 TEST(PalpateScene, MethodsHaveNames) {

@@ -1,6 +1,7 @@
 #include "iMSTK/CollisionStep.h"
 
 #include <palpate/ConstraintRows.h>
+#include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/StepGuard.h>
 
@@ -140,10 +141,12 @@ struct CollisionStep::Implementation {
 
   void add(const PairOfBodies& added) {
     const GeometryId a = body(added.a).id, b = body(added.b).id;
-    collisions.addCollisionPair(a, b,
-                                {.method = methodOf(added.settings.method),
-                                 .thickness = added.settings.thickness,
-                                 .restDistance = added.settings.restDistance});
+    collisions.addCollisionPair(
+        a, b,
+        {.method = methodOf(added.settings.method),
+         .thickness = added.settings.thickness,
+         .contacts = added.settings.all ? Contacts::All : Contacts::Distinct,
+         .restDistance = added.settings.restDistance});
     guard.setGuarded(a, b, added.settings.guarded);
   }
 
@@ -440,9 +443,25 @@ void CollisionStep::appendElements(int index, std::vector<StepElement>& a,
   }
 }
 
-std::size_t CollisionStep::hold() {
+std::size_t CollisionStep::hold(std::vector<int>& leftOut) {
   Implementation& all = *m_implementation;
-  const std::size_t held = all.guard.hold();
+  std::size_t held = 0;
+  for (bool isDone = false; !isDone;) try {
+      held = all.guard.hold();
+      isDone = true;
+    } catch (const Error& error) {
+      bool isLeftOut = false;
+      for (int i = 0; i < static_cast<int>(all.pairs.size()); ++i) {
+        const PairOfBodies& pair = all.pair(i);
+        if (error.code() != ErrorCode::ImpactRemains || !pair.settings.guarded || !mayCross(i) ||
+            (error.geometry() != all.body(pair.a).id && error.geometry() != all.body(pair.b).id))
+          continue;
+        setGuarded(i, false);
+        leftOut.push_back(i);
+        isLeftOut = true;
+      }
+      if (!isLeftOut) throw;
+    }
   if (held == 0) return 0;
   for (Body& body : all.bodies) {
     if (body.isPlaced()) {

@@ -72,6 +72,7 @@ class CollisionStep {
     Method method;
     double thickness, restDistance;
     bool guarded;
+    bool all;  ///< every pair of features is a contact, not the closest ones alone
   };
 
   explicit CollisionStep(int threads);
@@ -104,8 +105,9 @@ class CollisionStep {
   bool isCrossed(int pair, bool was);
   void appendRows(int pair, std::vector<StepRow>& rows) const;
   void appendElements(int pair, std::vector<StepElement>& a, std::vector<StepElement>& b) const;
-  /// Shortens the step; returns how many vertices and bodies.
-  std::size_t hold();
+  /// Shortens the step; returns how many vertices and bodies. Pairs that touched when the step
+  /// began, as the lips of a cut do, are not guarded from then on, and appended to leftOut.
+  std::size_t hold(std::vector<int>& leftOut);
   void stay(int body);      ///< a placed body ends the step where it began it
   void restoreFixedEnds();  ///< undoes hold() for bodies that nothing but the program moves
   void advance();

@@ -2,7 +2,9 @@
 
 #include "iMSTK/SceneStep.h"
 
+#include <imstkPbdContactConstraint.h>
 #include <imstkPbdModel.h>
+#include <imstkPbdModelConfig.h>
 #include <imstkPbdSolver.h>
 
 #include <algorithm>
@@ -13,34 +15,53 @@ namespace palpate {
 
 namespace {
 
+constexpr int kVelocitySweeps = 10;
+
 // Pushes until the gap is there. It takes back what it pushed too far in the step, and never pulls.
-class RowConstraint : public imstk::PbdConstraint {
+// A PbdContactConstraint, so that iMSTK's classes find its force.
+class RowConstraint : public imstk::PbdContactConstraint {
  public:
   RowConstraint(const ParticleRow& row, double gap)
-      : PbdConstraint(row.terms.size()), m_row(row), m_gap(gap) {
-    for (std::size_t i = 0; i < row.terms.size(); ++i) m_particles[i] = row.terms[i].particle;
+      : PbdContactConstraint(static_cast<int>(row.terms.size())), m_row(row), m_gap(gap) {
+    for (std::size_t i = 0; i < row.terms.size(); ++i) {
+      m_particles[i] = row.terms[i].particle;
+      m_dcdx[i] = row.terms[i].weight * row.normal;
+    }
+    m_compliance = 0;
   }
   const std::string getTypeName() const override { return "PalpateRowConstraint"; }
+
+  // Restitution starts from the velocity before the solver. Slower contacts rest.
+  void setBounce(imstk::PbdState& bodies, double restitution, double slowest, double dt) {
+    if (restitution <= 0 || dt == 0) return;
+    const double approach = -m_row.normal.dot(velocityIn(bodies, dt));
+    if (approach > slowest) m_bounce = restitution * approach;
+  }
 
   bool computeValueAndGradient(imstk::PbdState& bodies, double& c,
                                std::vector<imstk::Vec3d>& dcdx) override {
     c = -m_row.offset - m_gap;
     for (std::size_t i = 0; i < m_row.terms.size(); ++i) {
       const ParticleRow::Term& term = m_row.terms[i];
-      c += term.weight * m_row.normal.dot(bodies.getPosition(term.particle) + arm(bodies, term));
+      m_r[i] = arm(bodies, term);
+      c += term.weight * m_row.normal.dot(bodies.getPosition(term.particle) + m_r[i]);
       dcdx[i] = term.weight * m_row.normal;
     }
     return c < 0 || m_lambda > 0;
   }
 
-  void projectConstraint(imstk::PbdState& bodies, const double, const SolverType&) override {
+  void projectConstraint(imstk::PbdState& bodies, const double dt,
+                         const SolverType& type) override {
     double c = 0;
     const bool acts = computeValueAndGradient(bodies, c, m_dcdx);
+    const bool yields = type == SolverType::xPBD && dt > 0;
+    const double compliance = yields ? m_compliance / (dt * dt) : 0.0;
+    c += compliance * m_lambda;
     m_C = std::min(c, 0.0);  // for SceneStep
     if (!acts) return;
     const double mobility = mobilityIn(bodies, m_row.normal);
     if (mobility == 0) return;
-    const double change = std::max(-c / mobility, -m_lambda);
+    const double change = std::max(-c / (mobility + compliance), -m_lambda);
     m_lambda += change;
     for (const ParticleRow::Term& term : m_row.terms) {
       const imstk::Vec3d impulse = change * term.weight * m_row.normal;
@@ -53,28 +74,15 @@ class RowConstraint : public imstk::PbdConstraint {
     }
   }
 
-  // Coulomb: the tangential impulse is at most the coefficient times the normal one, m_lambda / dt.
+  // PbdModel calls each row once. The first corrects with all rows of its pair, so that the
+  // corners of a body agree.
   void correctVelocity(imstk::PbdState& bodies, const double dt) override {
-    if (m_friction == 0 || m_lambda == 0 || dt == 0) return;
-    imstk::Vec3d sliding = m_row.fixedDisplacement / dt;
-    for (const ParticleRow::Term& term : m_row.terms) {
-      sliding += term.weight * bodies.getVelocity(term.particle);
-      if (term.rigid)
-        sliding += term.weight * bodies.getAngularVelocity(term.particle).cross(arm(bodies, term));
-    }
-    sliding -= m_row.normal.dot(sliding) * m_row.normal;
-    const double speed = sliding.norm();
-    if (speed == 0) return;
-    const imstk::Vec3d tangent = sliding / speed;
-    const double along = mobilityIn(bodies, tangent);
-    if (along == 0) return;
-    const double impulse = std::min(speed / along, m_friction * m_lambda / dt);
-    for (const ParticleRow::Term& term : m_row.terms) {
-      const imstk::Vec3d change = -impulse * term.weight * tangent;
-      const imstk::Vec3d turn = turnBy(bodies, term, change);
-      bodies.getVelocity(term.particle) += bodies.getInvMass(term.particle) * change;
-      if (term.rigid) bodies.getAngularVelocity(term.particle) += turn;
-    }
+    if (m_rows == nullptr || dt == 0) return;
+    for (int sweep = 0; sweep < kVelocitySweeps; ++sweep)
+      for (const auto& row : *m_rows) static_cast<RowConstraint&>(*row).correct(bodies, dt);
+  }
+  void correctAll(const std::vector<std::unique_ptr<imstk::PbdConstraint>>& rows) {
+    m_rows = &rows;
   }
 
  private:
@@ -99,27 +107,77 @@ class RowConstraint : public imstk::PbdConstraint {
     }
     return mobility;
   }
+  // The relative velocity at the contact.
+  imstk::Vec3d velocityIn(const imstk::PbdState& bodies, double dt) const {
+    imstk::Vec3d velocity = m_row.fixedDisplacement / dt;
+    for (const ParticleRow::Term& term : m_row.terms) {
+      velocity += term.weight * bodies.getVelocity(term.particle);
+      if (term.rigid)
+        velocity += term.weight * bodies.getAngularVelocity(term.particle).cross(arm(bodies, term));
+    }
+    return velocity;
+  }
+  void push(imstk::PbdState& bodies, const imstk::Vec3d& impulse) const {
+    for (const ParticleRow::Term& term : m_row.terms) {
+      const imstk::Vec3d change = term.weight * impulse;
+      const imstk::Vec3d turn = turnBy(bodies, term, change);
+      bodies.getVelocity(term.particle) += bodies.getInvMass(term.particle) * change;
+      if (term.rigid) bodies.getAngularVelocity(term.particle) += turn;
+    }
+  }
+
+  // Newton's restitution along the normal. Coulomb's friction along the surface: its impulse is at
+  // most the coefficient times the normal one, m_lambda / dt.
+  void correct(imstk::PbdState& bodies, double dt) {
+    if (m_lambda == 0) return;
+    if (m_bounce > 0) {
+      const double missing = m_bounce - m_row.normal.dot(velocityIn(bodies, dt));
+      const double along = mobilityIn(bodies, m_row.normal);
+      const double change = along > 0 ? std::max(missing / along, -m_bounceImpulse) : 0.0;
+      m_bounceImpulse += change;
+      push(bodies, change * m_row.normal);
+    }
+    if (m_friction == 0) return;
+    imstk::Vec3d sliding = velocityIn(bodies, dt);
+    sliding -= m_row.normal.dot(sliding) * m_row.normal;
+    const double speed = sliding.norm();
+    const double along = speed > 0 ? mobilityIn(bodies, sliding / speed) : 0.0;
+    if (along == 0) return;
+    imstk::Vec3d impulse = m_frictionImpulse - sliding / along;
+    const double most = m_friction * m_lambda / dt;
+    if (impulse.norm() > most) impulse *= most / impulse.norm();
+    push(bodies, impulse - m_frictionImpulse);
+    m_frictionImpulse = impulse;
+  }
 
   ParticleRow m_row;
   double m_gap;
+  double m_bounce = 0;  // speed after the contact
+  double m_bounceImpulse = 0;
+  imstk::Vec3d m_frictionImpulse = imstk::Vec3d::Zero();
+  const std::vector<std::unique_ptr<imstk::PbdConstraint>>* m_rows = nullptr;  // of the first row
 };
 
 }  // namespace
 
-PalpateCH::PalpateCH(std::shared_ptr<PalpateCD> detection) : m_detection(std::move(detection)) {}
+PalpateCH::PalpateCH(std::shared_ptr<PalpateCD> detection) : m_detection(std::move(detection)) {
+  setRigidBodyCompliance(0);
+  setDeformableStiffnessA(1);
+  setDeformableStiffnessB(1);
+}
 PalpateCH::~PalpateCH() = default;
 
 void PalpateCH::handle(const std::vector<imstk::CollisionElement>&,
                        const std::vector<imstk::CollisionElement>&) {
-  m_rows.clear();
+  m_collisionConstraints.clear();
   m_owned.clear();
   const std::shared_ptr<SceneStep>& step = m_detection->step();
   if (step == nullptr || m_detection->pair() < 0 || !step->isEnabled(m_detection->pair())) return;
   imstk::PbdModel* model = step->modelOf(m_detection->pair());
   if (model == nullptr) return;
-  warnOfUnused(*step);
+  warnOfChanges(*step);
   appendRows();
-  model->getSolver()->addConstraints(&m_rows);
+  model->getSolver()->addConstraints(&m_collisionConstraints);
   step->addHandler(this);
 }
 
@@ -128,30 +186,37 @@ void PalpateCH::appendRows() {
   std::vector<ParticleRow> rows;
   step->appendRows(m_detection->pair(), rows);
   const double gap = step->gapOf(m_detection->pair());
-  for (const ParticleRow& row : rows) {
-    m_owned.push_back(std::make_unique<RowConstraint>(row, gap));
-    m_owned.back()->setFriction(getUseCorrectVelocity() ? getFriction() : 0.0);
-    m_rows.push_back(m_owned.back().get());
+  imstk::PbdModel& model = *step->modelOf(m_detection->pair());
+  const double dt = model.getTimeStep();
+  for (const ParticleRow& from : rows) {
+    auto row = std::make_unique<RowConstraint>(from, gap);
+    if (step->hasRigidBody(m_detection->pair())) row->setCompliance(getRigidBodyCompliance());
+    if (getUseCorrectVelocity()) {
+      row->setFriction(getFriction());
+      // What gravity gives in two steps does not bounce.
+      row->setBounce(model.getBodies(), getRestitution(),
+                     2 * model.getConfig()->m_gravity.norm() * dt, dt);
+    }
+    if (m_owned.empty()) row->correctAll(m_owned);
+    m_collisionConstraints.push_back(row.get());
+    m_owned.push_back(std::move(row));
   }
 }
 
 // Once for each handler.
-void PalpateCH::warnOfUnused(SceneStep& step) {
+void PalpateCH::warnOfChanges(SceneStep& step) {
   if (m_hasWarned) return;
-  const imstk::PbdCollisionHandling defaults;
-  std::string unused;
-  const auto add = [&](bool isSet, const char* name) {
-    if (isSet) unused += (unused.empty() ? "" : ", ") + std::string(name);
-  };
-  add(getRestitution() != defaults.getRestitution(), "restitution");
-  add(getDeformableStiffnessA() != defaults.getDeformableStiffnessA() ||
-          getDeformableStiffnessB() != defaults.getDeformableStiffnessB(),
-      "stiffness");
-  add(getRigidBodyCompliance() != defaults.getRigidBodyCompliance(), "compliance");
-  if (unused.empty()) return;
-  m_hasWarned = true;
-  step.note("PalpateCH of " + step.nameOf(m_detection->pair()) + " does not use its " + unused +
-            ": contacts are rigid and do not bounce.");
+  const std::string name = "PalpateCH of " + step.nameOf(m_detection->pair());
+  if (getDeformableStiffnessA() != 1 || getDeformableStiffnessB() != 1) {
+    step.note(name + " does not use its stiffness: contacts of deformable bodies are rigid.");
+    m_hasWarned = true;
+  }
+  if (getFriction() != 0 && !step.hasRigidBody(m_detection->pair())) {
+    step.note(name +
+              " takes its friction as Coulomb's coefficient, not as the share of the "
+              "sliding that a contact ends in a step.");
+    m_hasWarned = true;
+  }
 }
 
 }  // namespace palpate

@@ -6,6 +6,7 @@
 #include <palpate/imstk/PalpateCH.h>
 
 #include <imstkCollidingObject.h>
+#include <imstkCollisionHandling.h>
 #include <imstkPbdObject.h>
 #include <imstkPbdObjectCollision.h>
 #include <imstkScene.h>
@@ -100,16 +101,29 @@ std::shared_ptr<imstk::PbdObjectCollision> PalpateScene::makeCollision(
 
 bool PalpateScene::share(const std::shared_ptr<imstk::CollisionInteraction>& interaction,
                          const PalpateSettings& settings) {
-  const auto detection = std::dynamic_pointer_cast<PalpateCD>(interaction->getCollisionDetection());
-  if (detection == nullptr || interaction->getCollisionHandlingA() == nullptr) {
-    m_step->warn("An interaction is shared only with the detection PalpateCD and a handler.");
+  const auto handlerA = interaction->getCollisionHandlingA(),
+             handlerB = interaction->getCollisionHandlingB();
+  if (handlerA == nullptr) {
+    m_step->warn("An interaction without a handler is not shared.");
     return false;
+  }
+  auto detection = std::dynamic_pointer_cast<PalpateCD>(interaction->getCollisionDetection());
+  if (detection == nullptr) {
+    detection = std::make_shared<PalpateCD>();
+    for (const int side : {0, 1})
+      detection->setInput(interaction->getCollisionDetection()->getInput(side), side);
+    interaction->setCollisionDetection(detection);
+    handlerA->setInputCollisionData(detection->getCollisionData());
+    if (handlerB != nullptr) handlerB->setInputCollisionData(detection->getCollisionData());
   }
   detection->setStep(m_step);
   m_step->share(interaction, detection, settings);
   return true;
 }
 
+void PalpateScene::showHeld(const std::shared_ptr<imstk::CollidingObject>& object) {
+  m_step->showHeld(object);
+}
 void PalpateScene::setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius) {
   m_step->setRadius(geometry, radius);
 }

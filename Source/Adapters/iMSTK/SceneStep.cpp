@@ -28,6 +28,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 namespace palpate {
@@ -178,6 +179,8 @@ struct SceneStep::Body {
   // A rigid body where the step began, and where the last one ended: its pose in CollisionStep has
   // exactly the rotation of this quaternion.
   Placement start{}, end{};
+  std::shared_ptr<imstk::CollidingObject> shown{};  // held where it is drawn, too
+  std::optional<BodyPose> drawn{};                  // of a shape, where the last step put it
   double size = 0;  // L, of a fiftieth of its box, or half its mean edge if that is less
 
   std::shared_ptr<imstk::PointwiseMap> map() const {
@@ -208,23 +211,24 @@ struct SceneStep::Body {
     return {positions.data(), positions.size(), kept.data(),
             kept.size() / static_cast<std::size_t>(verticesPerCell), verticesPerCell};
   }
-  // The lowest cell that names all vertices of an element, or -1.
-  int cellWith(const StepElement& element) {
-    if (cells.empty()) return -1;
+  // The cells that name all vertices of an element, ascending; {-1} without cells.
+  std::vector<int> cellsWith(const StepElement& element) {
+    if (cells.empty()) return {-1};
     const auto corners = static_cast<std::size_t>(verticesPerCell);
     if (cellsAt.empty()) {
       cellsAt.resize(positions.size());
       for (std::size_t i = 0; i < cells.size(); ++i)
         cellsAt[static_cast<std::size_t>(cells[i])].push_back(static_cast<int>(i / corners));
     }
+    std::vector<int> found;
     for (const int index : cellsAt[static_cast<std::size_t>(element.ids[0])]) {
       const int* const cell = &cells[static_cast<std::size_t>(index) * corners];
       if (std::all_of(element.ids.begin(), element.ids.begin() + element.idCount, [&](int vertex) {
             return std::find(cell, cell + corners, vertex) != cell + corners;
           }))
-        return index;
+        found.push_back(index);
     }
-    return -1;
+    return found;
   }
   std::vector<Eigen::Vector3d> positionsOf(DataType type) const {
     const std::shared_ptr<imstk::VecDataArray<double, 3>> array = mesh->getVertexPositions(type);
@@ -238,6 +242,8 @@ struct SceneStep::Pair {
   std::weak_ptr<imstk::CollisionInteraction> interaction{};
   std::weak_ptr<PalpateCD> detection{};
   bool isNew = true, isCrossed = false;
+  bool isTouching = false;  // when the step began
+  bool isPicked = false;    // every cell that touches is an element
 };
 
 SceneStep::SceneStep(int threads) : m_step(std::make_unique<CollisionStep>(threads)) {}
@@ -251,10 +257,17 @@ std::string SceneStep::error() const {
 void SceneStep::note(const std::string& message) { LOG(WARNING) << "Palpate: " << message; }
 
 void SceneStep::warn(const std::string& message) {
-  const std::lock_guard<std::mutex> lock(m_errorLock);
-  m_error = message;
-  if (message != m_lastWarning) note(message);
+  m_stepError = message;
+  if (!m_isDetected) publishError();
+  if (message == m_lastWarning) return;
   m_lastWarning = message;
+  note(message);
+}
+
+// error() is that of a whole step, also while the next one runs.
+void SceneStep::publishError() {
+  const std::lock_guard<std::mutex> lock(m_errorLock);
+  m_error = m_stepError;
 }
 
 // Task graphs end the process on an exception.
@@ -271,6 +284,10 @@ bool SceneStep::attempt(F&& f) {
 
 void SceneStep::setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius) {
   m_radii[geometry.get()] = radius;
+}
+
+void SceneStep::showHeld(const std::shared_ptr<imstk::CollidingObject>& object) {
+  m_shown.insert(object);
 }
 
 void SceneStep::share(const std::shared_ptr<imstk::CollisionInteraction>& interaction,
@@ -300,6 +317,7 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
                     ? BodyRole::Rigid
                     : BodyRole::Particles;
   body.name = object == nullptr ? geometry->getTypeName() : object->getName();
+  if (m_shown.count(object) != 0) body.shown = object;
   if (body.role == BodyRole::Particles && body.map() == nullptr &&
       body.object->getPhysicsGeometry() != geometry) {
     const auto map = body.object->getPhysicsToCollidingMap();
@@ -337,12 +355,12 @@ int SceneStep::bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
   return static_cast<int>(m_bodies.size()) - 1;
 }
 
-int SceneStep::addPairOfBodies(int a, int b, const PalpateSettings& settings) {
+int SceneStep::addPairOfBodies(int a, int b, const PalpateSettings& settings, bool isPicked) {
   const Body &first = m_bodies[static_cast<std::size_t>(a)],
              &second = m_bodies[static_cast<std::size_t>(b)];
   return m_step->addPair(first.id, second.id,
                          {methodOf(settings, first.verticesPerCell, second.verticesPerCell),
-                          settings.thickness, settings.restDistance, settings.guarded});
+                          settings.thickness, settings.restDistance, settings.guarded, isPicked});
 }
 
 void SceneStep::addSharedPairs() {
@@ -355,7 +373,7 @@ void SceneStep::addSharedPairs() {
       pair.bodyA = bodyOf(detection->getInput(0), handler->getInputObjectA());
       pair.bodyB = bodyOf(detection->getInput(1), handler->getInputObjectB());
       setDefaults(pair);
-      pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, pair.settings);
+      pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, pair.settings, false);
       m_pairs.push_back(pair);
       detection->setPair(static_cast<int>(m_pairs.size()) - 1);
     });
@@ -409,7 +427,8 @@ int SceneStep::addPair(const std::shared_ptr<imstk::Geometry>& a,
                        const std::shared_ptr<imstk::Geometry>& b, const PalpateSettings& settings) {
   const bool isAdded = attempt([&] {
     Pair pair{-1, bodyOf(a, nullptr), bodyOf(b, nullptr), settings};
-    pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, settings);
+    pair.isPicked = true;
+    pair.id = addPairOfBodies(pair.bodyA, pair.bodyB, settings, true);
     m_pairs.push_back(pair);
   });
   return isAdded ? static_cast<int>(m_pairs.size()) - 1 : -1;
@@ -418,7 +437,7 @@ int SceneStep::addPair(const std::shared_ptr<imstk::Geometry>& a,
 // Passes the positions now. At a step's start also `before`: where the last step ended, or for what
 // something else moved since, where iMSTK's step began.
 void SceneStep::read(Body& body, bool startsStep) {
-  const bool rests = startsStep && m_restarts > 0;
+  const bool rests = startsStep && m_isRestarted;
   if (body.isPlaced()) {
     BodyPose before = m_step->poseBefore(body.id);
     if (body.role == BodyRole::Rigid) {
@@ -433,6 +452,7 @@ void SceneStep::read(Body& body, bool startsStep) {
     } else if (startsStep) {
       body.pose = poseOf(*body.geometry, DataType::PostTransform);
       if (rests) before = body.pose;
+      if (body.shown != nullptr && body.pose == body.drawn) body.pose = before;  // not moved since
     } else {
       return;
     }
@@ -478,12 +498,13 @@ void SceneStep::read(Body& body, bool startsStep) {
 
 void SceneStep::detect() {
   end(false);
-  {
-    const std::lock_guard<std::mutex> lock(m_errorLock);
-    m_error.clear();
-  }
+  m_stepError.clear();
   m_isDetected = true;
   m_handlers.clear();
+  // One step less, unless another thread restarts in between.
+  int restarts = m_restarts;
+  m_isRestarted = restarts > 0;
+  if (m_isRestarted) m_restarts.compare_exchange_strong(restarts, restarts - 1);
   m_hasAnswer = attempt([&] {
     for (Body& body : m_bodies) read(body, true);
     for (std::size_t i = 0; i < m_pairs.size(); ++i) {
@@ -495,7 +516,6 @@ void SceneStep::detect() {
     m_step->detect();
   });
   m_isTrusted = m_hasAnswer && m_step->trusted();
-  if (m_restarts > 0) --m_restarts;
 }
 
 // Makes the particles and poses of iMSTK those that the guard left. Returns whether a pose was
@@ -539,6 +559,35 @@ bool SceneStep::write(Body& body, bool last) {
   return true;
 }
 
+// Moves the geometry of a fixed body to where the guard held it.
+void SceneStep::draw(Body& body) {
+  if (body.shown == nullptr || body.role != BodyRole::Fixed) return;
+  if (body.mesh != nullptr) {
+    const std::vector<Eigen::Vector3d>& held = m_step->now(body.id);
+    if (held == body.positions) return;
+    const std::shared_ptr<imstk::VecDataArray<double, 3>> array = body.mesh->getVertexPositions();
+    std::copy(held.begin(), held.end(), array->getPointer());
+    body.mesh->postModified();
+  } else {
+    const BodyPose& held = m_step->poseNow(body.id);
+    body.drawn.reset();
+    if (held == poseOf(*body.geometry, DataType::PostTransform)) return;
+    auto& shape = dynamic_cast<imstk::AnalyticalGeometry&>(*body.geometry);
+    const imstk::Mat4d& outer = shape.getTransform();
+    const imstk::Mat3d rotation = shape.getRotation();
+    shape.setPosition((outer.inverse() * held.translation.homogeneous()).head<3>());
+    // A plane has its normal beside its orientation.
+    const auto* const plane = dynamic_cast<imstk::Plane*>(&shape);
+    if (plane == nullptr)
+      shape.setOrientation(imstk::Quatd(imstk::Mat3d(rotation.transpose() * held.rotation)));
+    else
+      dynamic_cast<imstk::Plane&>(shape).setNormal(
+          shape.getOrientation(DataType::PreTransform).inverse() * held.rotation.col(1));
+    body.drawn = poseOf(*body.geometry, DataType::PostTransform);
+  }
+  body.shown->updateGeometries();
+}
+
 // iMSTK's solver projects internal constraints last, and leaves rows violated.
 void SceneStep::project() {
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
@@ -546,7 +595,7 @@ void SceneStep::project() {
     for (PalpateCH* handler : m_handlers) {
       imstk::PbdModel& model = *modelOf(handler->pair());
       const double most = kViolationLeft * gapOf(handler->pair());
-      for (imstk::PbdConstraint* row : handler->rows()) {
+      for (imstk::PbdConstraint* row : handler->getConstraints()) {
         row->projectConstraint(model.getBodies(), model.getTimeStep(),
                                model.getConfig()->m_solverType);
         isViolated |= row->getConstraintC() < -most;
@@ -556,12 +605,29 @@ void SceneStep::project() {
   }
 }
 
-void SceneStep::hold() {
+// Returns how many vertices and bodies.
+std::size_t SceneStep::hold() {
   project();
+  std::vector<int> touching;
+  const std::size_t held = hold(touching);
+  for (std::size_t i = 0; i < m_pairs.size(); ++i) {
+    Pair& pair = m_pairs[i];
+    const bool touches = std::find(touching.begin(), touching.end(), pair.id) != touching.end();
+    if (touches != pair.isTouching)
+      note(nameOf(static_cast<int>(i)) + (touches
+                                              ? " touch: they are not guarded until they are apart."
+                                              : " are apart: they are guarded from now on."));
+    pair.isTouching = touches;
+  }
+  return held;
+}
+
+std::size_t SceneStep::hold(std::vector<int>& touching) {
+  std::size_t held = 0;
   for (int round = 0;; ++round) {
     for (Body& body : m_bodies) read(body, false);
-    m_held = m_step->hold();
-    if (m_held == 0) return;
+    held = m_step->hold(touching);
+    if (held == 0) return held;
     if (m_handlers.empty() || round == kRounds) break;
     // The solver moved bodies to where the rows do not see what they touch.
     m_step->restoreFixedEnds();
@@ -573,17 +639,22 @@ void SceneStep::hold() {
   for (int i = 1; i <= kPlacements; ++i) {
     bool isRounded = false;
     for (Body& body : m_bodies) isRounded |= write(body, i == kPlacements);
-    if (!isRounded) return;
-    m_step->hold();
+    if (!isRounded) return held;
+    m_step->hold(touching);
   }
   for (Body& body : m_bodies) write(body, false);
+  return held;
 }
 
 void SceneStep::end(bool guarded) {
   if (!m_isDetected) return;
-  m_isDetected = false;
-  m_held = 0;
-  if (guarded && m_hasAnswer) attempt([&] { hold(); });
+  std::size_t held = 0;
+  if (guarded && m_hasAnswer)
+    attempt([&] {
+      held = hold();
+      for (Body& body : m_bodies) draw(body);
+    });
+  m_held = held;
   for (Body& body : m_bodies)
     if (body.role == BodyRole::Rigid) {
       const imstk::PbdBody& pbd = *body.object->getPbdBody();
@@ -591,8 +662,9 @@ void SceneStep::end(bool guarded) {
     }
   m_step->advance();
   if (guarded) attempt([&] { findCrossedPairs(); });
-  const std::lock_guard<std::mutex> lock(m_errorLock);
-  if (m_error.empty()) m_lastWarning.clear();
+  if (m_stepError.empty()) m_lastWarning.clear();
+  publishError();
+  m_isDetected = false;
 }
 
 void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a,
@@ -603,32 +675,41 @@ void SceneStep::appendElements(int pair, std::vector<imstk::CollisionElement>& a
     m_step->appendElements(m_pairs[static_cast<std::size_t>(pair)].id, sides[0], sides[1]);
     const imstk::CellTypeId types[] = {IMSTK_VERTEX, IMSTK_EDGE, IMSTK_TRIANGLE};
     const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+    // An element for each cell, of a pair that is not picked for the lowest one alone.
     const auto convert = [&](int body, const StepElement& from, bool otherIsPoint) {
+      std::vector<imstk::CollisionElement> elements;
       if (from.idCount == 0) {
         imstk::PointDirectionElement element;
         element.pt = from.point;
         element.dir = from.direction;
         element.penetrationDepth = from.depth;
-        return imstk::CollisionElement(element);
-      }
-      if (from.idCount == 1 && otherIsPoint) {
+        elements.emplace_back(element);
+      } else if (from.idCount == 1 && otherIsPoint) {
         imstk::PointIndexDirectionElement element;
         element.ptIndex = from.ids[0];
         element.dir = from.direction;
         element.penetrationDepth = from.depth;
-        return imstk::CollisionElement(element);
+        elements.emplace_back(element);
+      } else {
+        imstk::CellIndexElement element;
+        for (int i = 0; i < from.idCount; ++i)
+          element.ids[i] = from.ids[static_cast<std::size_t>(i)];
+        element.idCount = from.idCount;
+        element.cellType = types[from.idCount - 1];
+        for (const int cell : m_bodies[static_cast<std::size_t>(body)].cellsWith(from)) {
+          element.parentId = cell;
+          elements.emplace_back(element);
+          if (!found.isPicked) break;
+        }
       }
-      imstk::CellIndexElement element;
-      for (int i = 0; i < from.idCount; ++i) element.ids[i] = from.ids[static_cast<std::size_t>(i)];
-      element.idCount = from.idCount;
-      element.cellType = types[from.idCount - 1];
-      element.parentId = m_bodies[static_cast<std::size_t>(body)].cellWith(from);
-      return imstk::CollisionElement(element);
+      return elements;
     };
-    for (std::size_t i = 0; i < sides[0].size(); ++i) {
-      a.push_back(convert(found.bodyA, sides[0][i], sides[1][i].idCount == 0));
-      b.push_back(convert(found.bodyB, sides[1][i], sides[0][i].idCount == 0));
-    }
+    for (std::size_t i = 0; i < sides[0].size(); ++i)
+      for (const auto& ofA : convert(found.bodyA, sides[0][i], sides[1][i].idCount == 0))
+        for (const auto& ofB : convert(found.bodyB, sides[1][i], sides[0][i].idCount == 0)) {
+          a.push_back(ofA);
+          b.push_back(ofB);
+        }
   });
 }
 
@@ -671,6 +752,12 @@ void SceneStep::appendRows(int pair, std::vector<ParticleRow>& rows) {
 double SceneStep::gapOf(int pair) const {
   const PalpateSettings& settings = m_pairs[static_cast<std::size_t>(pair)].settings;
   return settings.gap < 0 ? 0.5 * settings.thickness : settings.gap;
+}
+
+bool SceneStep::hasRigidBody(int pair) const {
+  const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+  return m_bodies[static_cast<std::size_t>(found.bodyA)].role == BodyRole::Rigid ||
+         m_bodies[static_cast<std::size_t>(found.bodyB)].role == BodyRole::Rigid;
 }
 
 imstk::PbdModel* SceneStep::modelOf(int pair) const {

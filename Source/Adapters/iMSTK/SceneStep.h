@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -52,6 +53,7 @@ class SceneStep {
   ~SceneStep();
 
   void setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius);
+  void showHeld(const std::shared_ptr<imstk::CollidingObject>& object);
   /// An interaction to be added by addSharedPairs().
   void share(const std::shared_ptr<imstk::CollisionInteraction>& interaction,
              const std::shared_ptr<PalpateCD>& detection, const PalpateSettings& settings);
@@ -76,6 +78,7 @@ class SceneStep {
   double gapOf(int pair) const;
   bool isEnabled(int pair) const;
   std::string nameOf(int pair) const;
+  bool hasRigidBody(int pair) const;
   imstk::PbdModel* modelOf(int pair) const;  ///< null: no PbdObject
   /// A handler with rows in this step.
   void addHandler(PalpateCH* handler) { m_handlers.push_back(handler); }
@@ -93,11 +96,14 @@ class SceneStep {
   bool attempt(F&& f);
   int bodyOf(const std::shared_ptr<imstk::Geometry>& geometry,
              const std::shared_ptr<imstk::CollidingObject>& object);
-  int addPairOfBodies(int a, int b, const PalpateSettings& settings);
+  int addPairOfBodies(int a, int b, const PalpateSettings& settings, bool isPicked);
   void read(Body& body, bool startsStep);
   bool write(Body& body, bool last);
+  void draw(Body& body);
   void project();
-  void hold();
+  std::size_t hold();
+  std::size_t hold(std::vector<int>& touching);
+  void publishError();
   void findCrossedPairs();
   void setDefaults(Pair& pair);
 
@@ -106,14 +112,16 @@ class SceneStep {
   std::vector<Pair> m_pairs;
   std::vector<Pair> m_newPairs;
   std::unordered_map<const imstk::Geometry*, double> m_radii;
+  std::set<std::shared_ptr<imstk::CollidingObject>> m_shown;
   std::vector<PalpateCH*> m_handlers;
-  bool m_isDetected = false, m_hasAnswer = false;
-  // Read and set from other threads.
+  bool m_isDetected = false, m_hasAnswer = false, m_isRestarted = false;
+  // Read and set from other threads, as m_error.
   std::atomic<int> m_restarts{0};
   std::atomic<bool> m_isTrusted{false};
   std::atomic<std::size_t> m_held{0};
   mutable std::mutex m_errorLock;
-  std::string m_error, m_lastWarning;
+  std::string m_error;
+  std::string m_stepError, m_lastWarning;  // of the step's thread
 };
 
 }  // namespace palpate

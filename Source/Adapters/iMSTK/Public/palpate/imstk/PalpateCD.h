@@ -15,9 +15,11 @@ namespace palpate {
 /// The detection "PalpateCD" of imstk::CDObjectFactory, for surface, tetrahedral, line and point
 /// meshes, Sphere, Capsule, Cylinder, OrientedBox and Plane, in either order, and for one mesh with
 /// itself. A PalpateScene shares its work among interactions. Without one, as in a picker, it is an
-/// OctreeBasedCD of its own, whose step begins at the positions of the last update().
+/// OctreeBasedCD of its own, whose step begins at the positions of the last update(), and every
+/// cell that touches is an element.
 /// Elements of meshes: a CellIndex for each, of one vertex, of two vertices (edge), or of three
-///          (triangle). parentId is the lowest cell of the mesh that has these vertices. Of a
+///          (triangle). parentId is the lowest cell of the mesh that has these vertices; without a
+///          PalpateScene there is an element for each of these cells. Of a
 ///          shape: a PointDirection, with a PointIndexDirection for a vertex, or a CellIndex for an
 ///          edge or triangle. Two shapes: a PointDirection for each.
 /// Depth    positive where they overlap. `dir` of a side is the direction in which it leaves.

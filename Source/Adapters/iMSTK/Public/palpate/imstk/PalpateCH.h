@@ -16,19 +16,22 @@ namespace palpate {
 /// are within a thickness and do not touch. Vertices that a PointwiseMap maps move the particles
 /// they come from. Rigid PbdObjects move and turn. Other objects do not move.
 /// Friction of PbdObjectCollision::setFriction(): Coulomb's coefficient, on the velocities of the
-///          step; iMSTK's own handler takes the number as the share of the sliding that a contact
-///          ends. An object that no solver moves slides as the program moves it. None with
-///          setUseCorrectVelocity(false).
-/// Unused   restitution, stiffness and compliance: a warning names those that were set.
+///          step. For deformable bodies iMSTK's own handler takes the number as the share of the
+///          sliding that a contact ends: a warning says so. An object that no solver moves slides
+///          as the program moves it.
+/// Restitution: the share of the speed of approach with which bodies part, of contacts that are
+///          faster than gravity makes a body in two steps.
+/// Compliance: of pairs with a rigid PbdObject, 0 by default. The guard keeps bodies apart.
+/// Unused   stiffness, 1 by default: a warning names it if it was set.
+///          With setUseCorrectVelocity(false) there is no friction and no restitution.
 class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
  public:
   explicit PalpateCH(std::shared_ptr<PalpateCD> detection);
   ~PalpateCH() override;
   IMSTK_TYPE_NAME(PalpateCH)
 
-  /// Those of this step, in the order of palpate::appendRows().
-  const std::vector<imstk::PbdConstraint*>& rows() const { return m_rows; }
-  /// For the scene's step: adds rows of the last detection.
+  /// For the scene's step: adds rows of the last detection to getConstraints(), in the order of
+  /// palpate::appendRows().
   void appendRows();
   int pair() const { return m_detection->pair(); }
 
@@ -37,12 +40,11 @@ class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
               const std::vector<imstk::CollisionElement>& elementsB) override;
 
  private:
-  void warnOfUnused(SceneStep& step);
+  void warnOfChanges(SceneStep& step);
 
   std::shared_ptr<PalpateCD> m_detection;
   bool m_hasWarned = false;
   std::vector<std::unique_ptr<imstk::PbdConstraint>> m_owned;
-  std::vector<imstk::PbdConstraint*> m_rows;
 };
 
 }  // namespace palpate

@@ -52,12 +52,12 @@ struct PalpateSettings {
 ///          prediction. A PbdObject that something else moved in between begins where it is.
 /// Guard    runs once in each step, after the solver and before iMSTK computes velocities, when the
 ///          first interaction calls CCDAlgorithm::updatePreviousTimestepGeometry(). It moves the
-///          particles and rigid bodies of PbdObjects. Other objects are held inside Palpate only:
-///          their geometries stay where your program put them, and the next step begins where they
-///          were held. All PbdObjects must share one PbdModel.
+///          particles and rigid bodies of PbdObjects. Other objects are held inside Palpate only,
+///          but for showHeld(): their geometries stay where your program put them, and the next
+///          step begins where they were held. All PbdObjects must share one PbdModel.
 /// Crossing pairs at a step's start are named in iMSTK's log, and not guarded until they are apart.
 /// Cuts     a geometry whose cells or number of vertices changed is replaced before the detection.
-/// Errors   are logged by iMSTK as warnings, each once in a row; error() has the last. A step whose
+/// Errors   are logged by iMSTK as warnings, each once in a row; error() has the last step's. A step whose
 ///          detection failed has no contacts and no guard.
 class PALPATE_EXPORT PalpateScene {
  public:
@@ -71,13 +71,18 @@ class PALPATE_EXPORT PalpateScene {
       const std::shared_ptr<imstk::CollidingObject>& a,
       const std::shared_ptr<imstk::CollidingObject>& b, const PalpateSettings& settings = {});
 
-  /// Takes in an interaction of any class that was made with the detection "PalpateCD", and keeps
-  /// its handler. False, with a warning, for another detection or without a handler.
+  /// Takes in an interaction of any class, as NeedleInteraction, and keeps its handler. A PalpateCD
+  /// replaces its detection. False, with a warning, without a handler.
   bool share(const std::shared_ptr<imstk::CollisionInteraction>& interaction,
              const PalpateSettings& settings = {});
 
   /// L, of the lines or points of a geometry. Call it before the scene is initialized.
   void setRadius(const std::shared_ptr<imstk::Geometry>& geometry, double radius);
+
+  /// The guard moves the colliding geometry of an object that no solver moves to where it holds it,
+  /// and updates its visual geometry. Your program sets its place anew in each step, as from a
+  /// device; otherwise it stays there. Call it before the scene is initialized.
+  void showHeld(const std::shared_ptr<imstk::CollidingObject>& object);
 
   /// The next two steps begin where all objects then are, PbdObjects as always. Call it with
   /// Scene::reset(), which acts at the end of the next step, and when an object that is no
@@ -89,7 +94,7 @@ class PALPATE_EXPORT PalpateScene {
   bool trusted() const;
   /// The number of vertices and bodies that the last guard held back.
   std::size_t held() const;
-  /// The last error, or empty if the last step had none.
+  /// Of the last step that ended, or empty.
   std::string error() const;
 
  private:
