@@ -1,7 +1,8 @@
 #!/bin/bash
 # CMake/simulators.sh: tests the adapter for iMSTK with iMSTK 7.0: packages, iMSTK, the adapter and Testing/Imstk.
 # It builds the part of iMSTK that the tests need, from ../shared/imstk or the folder IMSTK_KIT, into build/imstk. With
-# iMSTK_DIR it takes an installation instead. The preset release, into which it builds, keeps PALPATE_WITH_IMSTK.
+# iMSTK_DIR it takes an installation instead. The preset release, into which it builds, keeps PALPATE_WITH_IMSTK. Scenes of
+# hundreds of steps take some minutes more: ctest --test-dir build/release -L long -R Imstk.Trials
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -21,5 +22,5 @@ else
   options=(-DiMSTK_DIR="$kit/cmake" -DIMSTK_KIT_BUILD="$PWD/build/imstk")
 fi
 cmake --preset release -DPALPATE_WITH_IMSTK=ON "${options[@]}"
-cmake --build --preset release --parallel "$(nproc)" --target Imstk
+cmake --build --preset release --parallel "$(nproc)" --target Imstk ImstkByHand palpate_imstk_trials
 ctest --test-dir build/release -L '^Imstk$' --output-on-failure

@@ -13,6 +13,7 @@ mkdir -p ../Pictures
 [[ ! -f ../Data/Budgets.csv ]] || "$python" budgets.py ../Data/Budgets.csv ../Pictures/Budgets
 "$python" performance.py ../Data/Performance.csv ../Pictures
 "$python" stability.py ../Data/Stability.csv ../Pictures/Stability
+"$python" forceCurve.py ../Data/ForceCurve.csv ../Pictures/ForceCurve
 "$python" smoothNormals.py ../Data/SmoothNormals.csv ../Pictures/SmoothNormals
 if [[ -f diagrams.py ]]; then
   "$python" diagrams.py

@@ -10,6 +10,11 @@
 #include <memory>
 #include <vector>
 
+// iMSTK's are macros, too.
+#define IMSTK_VERTEX 0
+#define IMSTK_EDGE 1
+#define IMSTK_TRIANGLE 2
+
 namespace imstk {
 template <class T, int N>
 class VecDataArray {  // as iMSTK's, getPointer() is not const
@@ -32,12 +37,16 @@ using SurfaceMesh = CellMesh<3>;
 using LineMesh = CellMesh<2>;
 struct Capsule {
   Eigen::Vector3d position;
-  double getRadius() { return 2; }
-  double getLength() { return 20; }
+  double radius, length;
+  void setPosition(const Eigen::Vector3d& p) { position = p; }
+  void setRadius(double r) { radius = r; }
+  void setLength(double l) { length = l; }
+  double getRadius() { return radius; }
+  double getLength() { return length; }
   Eigen::Vector3d getPosition() { return position; }
   Eigen::Quaterniond getOrientation() { return Eigen::Quaterniond::Identity(); }
 };
-enum CellTypeId { IMSTK_VERTEX, IMSTK_EDGE, IMSTK_TRIANGLE };
+using CellTypeId = int;
 struct CellIndexElement {
   int ids[4] = {-1, -1, -1, -1};
   int idCount = 0;

@@ -3,13 +3,33 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 palpate::PalpateScene addCollisions(const std::shared_ptr<imstk::Scene>& scene,
                                     const std::shared_ptr<imstk::PbdObject>& liver,
                                     const std::shared_ptr<imstk::PbdObject>& suture,
                                     const std::shared_ptr<imstk::PbdObject>& cloth,
                                     const std::shared_ptr<imstk::CollidingObject>& tool);
 
+void callInEachStep(const std::shared_ptr<imstk::Scene>& scene,
+                    const std::shared_ptr<imstk::PbdObject>& liver,
+                    const std::function<void()>& step);
+
 namespace {
+
+TEST(Guide, ItsLoopMovesPositionsBeforeVelocities) {
+  TestScene test;
+  const auto body = test.deformable("body", triangle({0, 0, 0}, 1));
+  int steps = 0;
+  callInEachStep(test.scene, body, [&] {
+    ++steps;
+    for (Vec3d& p : valuesOf(body->getPbdBody()->vertices)) p.x() += 0.01;
+  });
+  test.scene->initialize();
+  test.step(3);
+  EXPECT_EQ(steps, 3);
+  EXPECT_NEAR(velocity(*body).x(), 3 * 0.01 / test.config().m_dt, 1e-9);  // each adds its own
+}
 
 TEST(Guide, ItsSceneKeepsTheBodiesApart) {
   TestScene test;

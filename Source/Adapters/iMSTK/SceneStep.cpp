@@ -573,16 +573,14 @@ void SceneStep::draw(Body& body) {
     body.drawn.reset();
     if (held == poseOf(*body.geometry, DataType::PostTransform)) return;
     auto& shape = dynamic_cast<imstk::AnalyticalGeometry&>(*body.geometry);
-    const imstk::Mat4d& outer = shape.getTransform();
-    const imstk::Mat3d rotation = shape.getRotation();
-    shape.setPosition((outer.inverse() * held.translation.homogeneous()).head<3>());
-    // A plane has its normal beside its orientation.
-    const auto* const plane = dynamic_cast<imstk::Plane*>(&shape);
-    if (plane == nullptr)
-      shape.setOrientation(imstk::Quatd(imstk::Mat3d(rotation.transpose() * held.rotation)));
+    shape.setPosition((shape.getTransform().inverse() * held.translation.homogeneous()).head<3>());
+    // A plane has a normal in its orientation's frame.
+    if (auto* const plane = dynamic_cast<imstk::Plane*>(&shape))
+      plane->setNormal(shape.getOrientation(DataType::PreTransform).inverse() *
+                       held.rotation.col(1));
     else
-      dynamic_cast<imstk::Plane&>(shape).setNormal(
-          shape.getOrientation(DataType::PreTransform).inverse() * held.rotation.col(1));
+      shape.setOrientation(
+          imstk::Quatd(imstk::Mat3d(shape.getRotation().transpose() * held.rotation)));
     body.drawn = poseOf(*body.geometry, DataType::PostTransform);
   }
   body.shown->updateGeometries();
