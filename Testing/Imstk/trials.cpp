@@ -22,7 +22,7 @@ namespace {
 using trials::Trial;
 
 struct Result {
-  std::size_t stepsThatCross = 0, untrusted = 0, errors = 0;
+  std::size_t judged = 0, stepsThatCross = 0, untrusted = 0, errors = 0;
   std::pair<int, std::size_t> first;  ///< step with crossings, and how many
   double fastest = 0;                 ///< at the end
   double milliseconds = 0;            ///< of a step
@@ -42,6 +42,7 @@ Result run(Trial& trial, bool isJudged) {
       result.errors += trial.test.palpateScene.error().empty() ? 0 : 1;
     }
     if (!isJudged || (step % trial.judgedEvery != 0 && step + 1 != trial.steps)) continue;
+    ++result.judged;
     const std::size_t count = trial.judge();
     if (count != 0 && result.stepsThatCross++ == 0) result.first = {step, count};
   }
@@ -79,9 +80,8 @@ void printTimes(const std::string& name) {
     const Result ours = run(*scene.make(true), false);
     const auto own = scene.make(false);
     const Result theirs = run(*own, true);
-    const int judged = (own->steps + own->judgedEvery - 1) / own->judgedEvery;
-    std::printf("| %s | %.2f | %.2f | %zu of %d |\n", scene.title, ours.milliseconds,
-                theirs.milliseconds, theirs.stepsThatCross, judged);
+    std::printf("| %s | %.2f | %.2f | %zu of %zu |\n", scene.title, ours.milliseconds,
+                theirs.milliseconds, theirs.stepsThatCross, theirs.judged);
     std::fflush(stdout);
   }
 }
