@@ -83,6 +83,48 @@ TEST(Classes, APickerPicksEachCellThatASphereTouchesOnce) {
   EXPECT_GT(cells, 1000u);
 }
 
+TEST(Classes, APickerPicksEachCellThatASurfaceIntersectsOnce) {
+  std::size_t cells = 0;
+  for (int i = 0; i < 30; ++i) {
+    const auto mesh = sheet({0, 0, 0}, 8), blade = sheet({0.03, 0.01, 0.02}, 5, 1.3);
+    for (Vec3d& p : positionsIn(*mesh)) p.y() = 0.2 * std::sin(5 * p.x() + i) * std::cos(3 * p.z());
+    for (Vec3d& p : positionsIn(*blade))
+      p.y() = 0.3 * std::cos(4 * p.x() - i) * std::sin(2 * p.z() + i);
+    const auto cornersOf = [](imstk::SurfaceMesh& of, const Eigen::Vector3i& cell) {
+      std::array<Vector, 3> corners;
+      for (int k = 0; k < 3; ++k)
+        corners[static_cast<size_t>(k)] = (*of.getVertexPositions())[cell[k]].cast<Real>();
+      return corners;
+    };
+    const auto pierces = [](const std::array<Vector, 3>& edges, const std::array<Vector, 3>& t) {
+      const auto volume = [](const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
+        return (b - a).cross(c - a).dot(d - a);
+      };
+      for (int k = 0; k < 3; ++k) {
+        const Vector &p = edges[static_cast<size_t>(k)],
+                     &q = edges[static_cast<size_t>((k + 1) % 3)];
+        const Real sides[] = {volume(p, q, t[0], t[1]), volume(p, q, t[1], t[2]),
+                              volume(p, q, t[2], t[0])};
+        if (volume(t[0], t[1], t[2], p) * volume(t[0], t[1], t[2], q) < 0 &&
+            sides[0] * sides[1] > 0 && sides[1] * sides[2] > 0)
+          return true;
+      }
+      return false;
+    };
+    std::set<int> expected, found;
+    for (int a = 0; a < mesh->getNumCells(); ++a)
+      for (const Eigen::Vector3i& b : valuesOf(blade->getCells())) {
+        const auto x = cornersOf(*mesh, (*mesh->getCells())[a]), y = cornersOf(*blade, b);
+        if (pierces(x, y) || pierces(y, x)) expected.insert(a);
+      }
+    for (const imstk::PickData& data : picked(mesh, blade))
+      EXPECT_TRUE(found.insert(data.cellId).second) << i << ": cell " << data.cellId << " twice";
+    for (const int cell : expected) EXPECT_EQ(found.count(cell), 1u) << i << ": cell " << cell;
+    cells += expected.size();
+  }
+  EXPECT_GT(cells, 200u);
+}
+
 TEST(Classes, APickerPicksCellsOfEveryMeshByEveryShape) {
   const auto line = std::make_shared<imstk::LineMesh>();
   line->initialize(positionArray({{-1, 0, 0}, {0, 0, 0}, {1, 0, 0}}),

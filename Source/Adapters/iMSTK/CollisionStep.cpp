@@ -68,9 +68,10 @@ struct Body {
   double radius;
   std::string name;
   GeometryId id{};
-  ShapeMeasures measures{};              // of a shape
-  bool isPlane = false;                  // without bounds
-  std::vector<Eigen::Vector3d> local{};  // of a rigid mesh
+  ShapeMeasures measures{};                               // of a shape
+  bool isPlane = false;                                   // without bounds
+  std::vector<Eigen::Vector3d> local{};                   // of a rigid mesh
+  std::vector<std::array<std::uint32_t, 3>> triangles{};  // of a triangle mesh
   std::vector<Eigen::Vector3d> before{}, now{};
   BodyPose poseBefore{}, poseNow{};
   // Where the program put a fixed body in the last step and in this one. What holds it back does
@@ -125,7 +126,8 @@ struct CollisionStep::Implementation {
         added.id = collisions.addLineMesh(positionsOf(mesh), cellsOf<2>(mesh), added.radius);
         break;
       case 3:
-        added.id = collisions.addTriangleMesh(positionsOf(mesh), cellsOf<3>(mesh));
+        added.triangles = cellsOf<3>(mesh);
+        added.id = collisions.addTriangleMesh(positionsOf(mesh), added.triangles);
         break;
       default:
         added.id = collisions.addTetrahedralMesh(positionsOf(mesh), cellsOf<4>(mesh));
@@ -235,6 +237,7 @@ void CollisionStep::replaceMesh(int index, const MeshArrays& mesh) {
   Body& body = all.body(index);
   if (body.verticesPerCell == 3) {
     all.collisions.setTriangles(body.id, positionsOf(mesh), cellsOf<3>(mesh));
+    body.triangles = cellsOf<3>(mesh);
   } else if (body.verticesPerCell == 4) {
     all.collisions.setTetrahedra(body.id, positionsOf(mesh), cellsOf<4>(mesh));
   } else {
@@ -431,7 +434,17 @@ void CollisionStep::appendElements(int index, std::vector<StepElement>& a,
     append({contact.edgeA[0], contact.edgeA[1], contact.edgeA[1]},
            {contact.edgeB[0], contact.edgeB[1], contact.edgeB[1]}, contact.normal,
            contact.distance);
-  const bool shapeIsA = all.body(all.pair(index).a).isShape();
+  const Body &bodyA = all.body(all.pair(index).a), &bodyB = all.body(all.pair(index).b);
+  // Contacts stand for some of the triangles that intersect.
+  if (all.pair(index).settings.all) {
+    const auto corners = [&](const Body& body, std::uint32_t triangle) {
+      return body.verticesPerCell == 4 ? all.collisions.surface(body.id).triangles[triangle]
+                                       : body.triangles[triangle];
+    };
+    for (const ElementPair& pair : contacts.intersectingTriangles())
+      append(corners(bodyA, pair.a), corners(bodyB, pair.b), Eigen::Vector3d::Zero(), 0.0);
+  }
+  const bool shapeIsA = bodyA.isShape();
   for (const ShapeContact& contact : contacts.shape()) {
     (shapeIsA ? b : a)
         .push_back(element(contact.vertices, contact.point, contact.normal, -contact.distance));
