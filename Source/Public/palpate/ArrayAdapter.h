@@ -116,8 +116,10 @@ struct CellTypes {
 
 /// Appends a pair of cells for each contact: one to `a` for the first geometry, one to `b` for the
 /// second. A vertex, point or triangle is given by its index (idCount 1), an edge or segment by its
-/// two vertices (idCount 2). Contacts with shapes are not included.
-/// Order    vertexTriangle(), triangleVertex(), edgeEdge().
+/// two vertices (idCount 2). Contacts with shapes are not included. If the pair's settings name
+/// Method::Intersection, all pairs of triangles that intersect follow: a contact may stand for
+/// several of them.
+/// Order    vertexTriangle(), triangleVertex(), edgeEdge(), intersectingTriangles().
 /// Needs    an Element with ids[4], idCount and cellType.
 template <class Element, class CellType>
 void appendCells(const CollisionData& contacts, const CellTypes<CellType>& types,
@@ -152,6 +154,12 @@ void appendCells(const CollisionData& contacts, const CellTypes<CellType>& types
   for (const EdgeEdgeContact& contact : contacts.edgeEdge()) {
     a.push_back(edge(contact.edgeA));
     b.push_back(edge(contact.edgeB));
+  }
+  const Validity validity = contacts.validity();
+  if (validity.method != Method::Intersection || validity.reason != MethodReason::Requested) return;
+  for (const ElementPair& pair : contacts.intersectingTriangles()) {
+    a.push_back(cell(types.triangle, pair.a));
+    b.push_back(cell(types.triangle, pair.b));
   }
 }
 

@@ -89,6 +89,30 @@ TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   }
 }
 
+TEST(ArrayAdapter, CellsOfIntersectionHaveAllPairsThatIntersect) {
+  Random random(83);
+  const TestGeometry first = testGeometry(sheet(6, 0.5, 0.3)),
+                     second = testGeometry(soup(random, 60, 0.1));
+  for (const Method method : {Method::Intersection, Method::Auto}) {
+    const CollisionData contacts = answer(first, second, {.method = method, .thickness = 0});
+    const std::span<const ElementPair> pairs = contacts.intersectingTriangles();
+    EXPECT_GT(pairs.size(), 10u);
+    std::vector<CellElement> a, b;
+    appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
+                a, b);
+    const std::size_t ofContacts = contacts.vertexTriangle().size() +
+                                   contacts.triangleVertex().size() + contacts.edgeEdge().size();
+    ASSERT_EQ(a.size(), ofContacts + (method == Method::Intersection ? pairs.size() : 0));
+    ASSERT_EQ(b.size(), a.size());
+    for (std::size_t i = ofContacts; i < a.size(); ++i) {
+      EXPECT_EQ(a[i].cellType, CellKind::Triangle);
+      EXPECT_EQ(b[i].cellType, CellKind::Triangle);
+      EXPECT_EQ(a[i].ids[0], static_cast<int>(pairs[i - ofContacts].a));
+      EXPECT_EQ(b[i].ids[0], static_cast<int>(pairs[i - ofContacts].b));
+    }
+  }
+}
+
 TEST(ArrayAdapter, FlatArraysAreTriplesAndElements) {
   const std::vector<double> coordinates{0, 1, 2, 3, 4, 5};
   const std::span<const Vector3d> positions = positionsOf(coordinates);
