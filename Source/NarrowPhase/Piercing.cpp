@@ -83,12 +83,12 @@ std::optional<Eigen::Vector3d> betweenInteriors(const Eigen::Vector3d& p, const 
 bool isConvex(const PlacedMesh& mesh, std::uint32_t edge) {
   const auto both = mesh.topology.edgeTriangles[edge];
   if (both.size() != 2) return false;
-  const auto [a, b, c] = mesh.corners(both[0]);
-  const auto [p, q, r] = mesh.corners(both[1]);
-  if (windingNormal(a, b, c).cross(windingNormal(p, q, r)).norm() < kTouchAngle) return false;
+  const Corners s = mesh.corners(both[0]), t = mesh.corners(both[1]);
+  if (windingNormal(s[0], s[1], s[2]).cross(windingNormal(t[0], t[1], t[2])).norm() < kTouchAngle)
+    return false;
   const auto& corners = mesh.topology.elements[both[1]];
   return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t v) {
-    return !holds(mesh.topology.edges[edge], v) && sideOf({a, b, c}, mesh.at[v]) < 0;
+    return !holds(mesh.topology.edges[edge], v) && sideOf(s, mesh.at[v]) < 0;
   });
 }
 
