@@ -222,6 +222,16 @@ class ExactContacts {
       addRidge(surface, ofB, e, {crossed, u}, oracle::root(oracle::dot(apart, apart)), {}, below);
     }
   }
+  /// Whether the closest points of two segments are certainly not between the ends of both. Spares
+  /// rational arithmetic.
+  static bool certainlyNotBetweenEnds(const Vector3d& p, const Vector3d& q, const Vector3d& r,
+                                      const Vector3d& s) {
+    const Vector3d u = q - p, v = s - r, from = r - p, normal = u.cross(v);
+    const double square = normal.squaredNorm(), size = std::max(u.norm(), v.norm()) + from.norm();
+    if (!(square > 1e-6 * size * size * size * size)) return false;
+    const double ofU = from.cross(v).dot(normal) / square, ofV = from.cross(u).dot(normal) / square;
+    return std::min(ofU, ofV) < -1e-6 || std::max(ofU, ofV) > 1 + 1e-6;
+  }
   /// Adds the nearest ridge that an edge has crossed, of those at the corners of triangles.
   /// wayOut: the normal of the edge's end, of any length; nothing: any ridge may lead out.
   void addRidge(const Moving& surface, bool ofB, const Segment& edge,
@@ -240,6 +250,10 @@ class ExactContacts {
             if (other != corner) ridges.insert(sorted(corner, other));
     std::vector<Near> near;
     for (const Segment& ridge : ridges) {
+      if (certainlyNotBetweenEnds(ofB ? m_b[edge[0]] : m_a[edge[0]],
+                                  ofB ? m_b[edge[1]] : m_a[edge[1]], surface[ridge[0]],
+                                  surface[ridge[1]]))
+        continue;
       if (m_self && (holds({ridge[0], ridge[1], ridge[1]}, edge[0]) ||
                      holds({ridge[0], ridge[1], ridge[1]}, edge[1])))
         continue;
