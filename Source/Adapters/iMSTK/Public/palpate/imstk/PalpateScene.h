@@ -42,7 +42,9 @@ struct PalpateSettings {
   /// Self-collision: nearer features along edges, at rest, do not touch. With the thickness chosen
   /// by default, 0 is twice that.
   double restDistance = 0.0;
-  bool guarded = true;  ///< whether the end of the step holds back what would pass through
+  /// Whether the end of the step holds back what would pass through. False for a needle, which is
+  /// meant to pass.
+  bool guarded = true;
 };
 
 /// One OctreeBasedCD for all interactions of an iMSTK scene. Each geometry is added once. One task
