@@ -154,25 +154,6 @@ TEST(Classes, APickerPicksCellsOfEveryMeshByEveryShape) {
   EXPECT_EQ(vertices, (std::set<int>{0, 2}));
 }
 
-/// A block of tissue with a surface, mapped point by point.
-std::shared_ptr<imstk::PbdObject> tissueIn(TestScene& test,
-                                           const std::shared_ptr<imstk::TetrahedralMesh>& solid) {
-  const auto object = std::make_shared<imstk::PbdObject>("tissue");
-  const auto surface = solid->extractSurfaceMesh();
-  object->setPhysicsGeometry(solid);
-  object->setCollidingGeometry(surface);
-  object->setVisualGeometry(surface);
-  object->setPhysicsToCollidingMap(std::make_shared<imstk::PointwiseMap>(solid, surface));
-  object->setDynamicalModel(test.model);
-  test.scene->addSceneObject(object);
-  for (int i = 0; i < solid->getNumVertices(); ++i)
-    if (solid->getVertexPosition(i).y() == -1) object->getPbdBody()->fixedNodeIds.push_back(i);
-  object->getPbdBody()->uniformMassValue = 0.02;
-  test.config().enableFemConstraint(imstk::PbdFemConstraint::MaterialType::NeoHookean, 2000, 0.4,
-                                    object->getPbdBody()->bodyHandle);
-  return object;
-}
-
 /// Where the line x = x0, z = z0 crosses the surface: the triangles, from above to below.
 std::vector<int> trianglesBelow(imstk::SurfaceMesh& surface, double x, double z) {
   std::map<Real, int, std::greater<>> found;
@@ -199,7 +180,7 @@ std::vector<int> trianglesBelow(imstk::SurfaceMesh& surface, double x, double z)
 TEST(Classes, ANeedlePuncturesWhatItsTipMeetsAndSuturesIt) {
   TestScene test;
   const auto solid = block(4, 1, 4, {-1, -0.3, -1}, {2, 0.3, 2});
-  const auto tissue = tissueIn(test, solid);
+  const auto tissue = test.tissue(solid, 2000, 0.02);
   for (int i = 0; i < solid->getNumVertices(); ++i)
     if (std::abs(solid->getVertexPosition(i).x()) == 1)
       tissue->getPbdBody()->fixedNodeIds.push_back(i);
@@ -278,7 +259,7 @@ TEST(Classes, ANeedlePuncturesWhatItsTipMeetsAndSuturesIt) {
 
 TEST(Classes, ANeedleThatDoesNotPunctureIsHandledAsARigidBody) {
   TestScene test;
-  const auto tissue = tissueIn(test, block(4, 1, 4, {-1, -1, -1}, {2, 1, 2}));
+  const auto tissue = test.tissue(block(4, 1, 4, {-1, -1, -1}, {2, 1, 2}), 2000, 0.02);
   const auto line = std::make_shared<imstk::LineMesh>();
   line->initialize(positionArray({{-0.5, 0, 0}, {0, 0, 0}, {0.5, 0, 0}}),
                    cellArray<2>({{0, 1}, {1, 2}}));
@@ -358,7 +339,7 @@ TEST(Classes, ATissueWhoseCellsAreRemovedLetsFallWhatLayOnThem) {
   TestScene test;
   test.config().m_gravity = {0, -10, 0};
   const auto solid = block(3, 1, 3, {-1.5, -1, -1.5}, {3, 1, 3});
-  const auto tissue = tissueIn(test, solid);
+  const auto tissue = test.tissue(solid, 2000, 0.02);
   for (int i = 0; i < solid->getNumVertices(); ++i) tissue->getPbdBody()->fixedNodeIds.push_back(i);
   const auto removal = std::make_shared<imstk::PbdObjectCellRemoval>(
       tissue, imstk::PbdObjectCellRemoval::OtherMeshUpdateType::Collision);

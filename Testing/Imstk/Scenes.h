@@ -189,6 +189,25 @@ struct TestScene {
   }
   imstk::PbdModelConfig& config() const { return *model->getConfig(); }
 
+  /// NeoHookean tissue with a surface, mapped point by point. Vertices at y = -1 are fixed.
+  std::shared_ptr<imstk::PbdObject> tissue(const std::shared_ptr<imstk::TetrahedralMesh>& solid,
+                                           double young, double mass) {
+    const auto object = std::make_shared<imstk::PbdObject>("tissue");
+    const auto surface = solid->extractSurfaceMesh();
+    object->setPhysicsGeometry(solid);
+    object->setCollidingGeometry(surface);
+    object->setVisualGeometry(surface);
+    object->setPhysicsToCollidingMap(std::make_shared<imstk::PointwiseMap>(solid, surface));
+    object->setDynamicalModel(model);
+    scene->addSceneObject(object);
+    for (int i = 0; i < solid->getNumVertices(); ++i)
+      if (solid->getVertexPosition(i).y() == -1) object->getPbdBody()->fixedNodeIds.push_back(i);
+    object->getPbdBody()->uniformMassValue = mass;
+    config().enableFemConstraint(imstk::PbdFemConstraint::MaterialType::NeoHookean, young, 0.4,
+                                 object->getPbdBody()->bodyHandle);
+    return object;
+  }
+
   std::shared_ptr<imstk::PbdObject> deformable(const std::string& name,
                                                std::shared_ptr<imstk::PointSet> mesh) {
     const auto object = std::make_shared<imstk::PbdObject>(name);

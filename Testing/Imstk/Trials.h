@@ -182,23 +182,6 @@ struct Trial {
     moving.push_back(object);
     return object;
   }
-  std::shared_ptr<imstk::PbdObject> tissue(const std::shared_ptr<imstk::TetrahedralMesh>& solid,
-                                           double young, double mass) {
-    const auto object = std::make_shared<imstk::PbdObject>("tissue");
-    const auto surface = solid->extractSurfaceMesh();
-    object->setPhysicsGeometry(solid);
-    object->setCollidingGeometry(surface);
-    object->setVisualGeometry(surface);
-    object->setPhysicsToCollidingMap(std::make_shared<imstk::PointwiseMap>(solid, surface));
-    object->setDynamicalModel(test.model);
-    test.scene->addSceneObject(object);
-    for (int i = 0; i < solid->getNumVertices(); ++i)
-      if (solid->getVertexPosition(i).y() == -1) object->getPbdBody()->fixedNodeIds.push_back(i);
-    object->getPbdBody()->uniformMassValue = mass;
-    test.config().enableFemConstraint(imstk::PbdFemConstraint::MaterialType::NeoHookean, young, 0.4,
-                                      object->getPbdBody()->bodyHandle);
-    return object;
-  }
   double fastest() const {
     double speed = 0;
     for (const auto& object : moving)
@@ -242,7 +225,7 @@ inline std::unique_ptr<Trial> clothOnCapsule(bool palpate, int kind) {
 
 inline std::unique_ptr<Trial> threadOnOrgan(bool palpate) {
   auto trial = std::make_unique<Trial>(palpate);
-  const auto organ = trial->tissue(block(6, 3, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
+  const auto organ = trial->test.tissue(block(6, 3, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
   std::vector<Vec3d> nodes;
   std::vector<Eigen::Vector2i> segments;
   for (int i = 0; i <= 60; ++i) nodes.push_back({-0.9 + 0.03 * i, 0.15, 0.3 * std::sin(0.2 * i)});
@@ -272,7 +255,7 @@ inline std::unique_ptr<Trial> threadOnOrgan(bool palpate) {
 /// A rigid needle that a program leads to and fro over tissue, and into it.
 inline std::unique_ptr<Trial> needleAtTissue(bool palpate) {
   auto trial = std::make_unique<Trial>(palpate);
-  const auto organ = trial->tissue(block(6, 3, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
+  const auto organ = trial->test.tissue(block(6, 3, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
   const auto line = std::make_shared<imstk::LineMesh>();
   line->initialize(positionArray({{0, 0.6, 0}, {0, 0.3, 0}, {0, 0, 0}}),
                    cellArray<2>({{0, 1}, {1, 2}}));
@@ -387,7 +370,7 @@ inline std::unique_ptr<Trial> toolAndTissue(bool palpate, const Press& press = {
   trial->test.config().m_iterations = press.iterations;
   trial->test.config().m_gravity = Vec3d::Zero();
   trial->test.config().m_linearDampingCoeff = 0.03;
-  const auto organ = trial->tissue(block(6, 4, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
+  const auto organ = trial->test.tissue(block(6, 4, 6, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
   const std::string kind = press.tool;
   std::shared_ptr<imstk::Geometry> geometry = std::make_shared<imstk::Capsule>(
       Vec3d(0, 0, 0), 0.2, 0.6, imstk::Quatd::FromTwoVectors(Vec3d(0, 1, 0), Vec3d(1, 0, 0)));
