@@ -21,11 +21,6 @@ constexpr std::size_t kElementsPerSlice = 64, kMostSlices = 4096;
 
 constexpr std::uint32_t kNoGroup = 0xffffffffu;
 
-void sortUnique(CountedVector<std::uint32_t>& ids) {
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-}
-
 void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
                    Buffer<FloatPoint>& floats, const Threads& threads) {
   resizeSparingly(floats, positions.size());

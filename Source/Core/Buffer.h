@@ -72,6 +72,13 @@ void insertSorted(CountedVector<T>& vector, const Items& items, Precedes&& prece
   }
 }
 
+/// Sorts items and keeps one of each.
+template <class T>
+void sortUnique(CountedVector<T>& items) {
+  std::sort(items.begin(), items.end());
+  items.erase(std::unique(items.begin(), items.end()), items.end());
+}
+
 /// Gives back most of the memory beyond the contents. Without memory for a smaller copy it does
 /// nothing.
 template <class T, class Allocator>

@@ -261,10 +261,6 @@ ChangedLists verticesWithinAfterCut(const MeshTopology& topology, const EdgeChan
   constexpr double kRings = 16.0;
   // Searches around a cut take about as long as so many of all.
   constexpr std::size_t kCostOfSearch = 4;
-  const auto sortUnique = [](CountedVector<std::uint32_t>& ids) {
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
-  };
   const auto endsOf = [&](const CountedVector<Segment>& edges) {
     CountedVector<std::uint32_t> ends;
     for (const Segment& edge : edges) ends.insert(ends.end(), edge.begin(), edge.end());

@@ -14,12 +14,6 @@ namespace {
 
 using Ids = CountedVector<std::uint32_t>;
 
-template <class T>
-void sortUnique(CountedVector<T>& list) {
-  std::sort(list.begin(), list.end());
-  list.erase(std::unique(list.begin(), list.end()), list.end());
-}
-
 template <class F>
 void forEachEdge(const Triangle& t, F&& f) {
   for (std::size_t i = 0; i < 3; ++i) {
