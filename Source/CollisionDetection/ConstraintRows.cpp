@@ -1,7 +1,7 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/StepRows.h"
 #include "Mesh/PointMotion.h"
@@ -153,8 +153,8 @@ double offsetOf(const ShapeContact& contact, const Vector3d& normal, const Rigid
 /// Whether the ends of the step are those for which the pair's answer holds. Positions now may have
 /// been corrected since.
 bool isInStep(const PairRecord& record) {
-  if (!record.dataVersion.isValid()) return false;
-  const PairRecord::State& state = record.dataVersion.state();
+  if (!record.last.version.isValid()) return false;
+  const PairState& state = record.last.version.state();
   const auto isOf = [](const BodyState& found, const Geometry& geometry) {
     return found.elements.topology == geometry.body.revisions.elements.topology &&
            found.before == geometry.body.mesh.before.state() &&

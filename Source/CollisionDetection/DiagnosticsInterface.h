@@ -13,23 +13,9 @@
 #include <vector>
 
 // Functions that this module calls and the module Diagnostics defines. Diagnostics includes this
-// module; nothing else in this module depends on Diagnostics. Its files CandidatesByBruteForce.cpp,
-// DetectionByBruteForce.cpp, Problem.cpp and Audit.cpp define them.
+// module; nothing else in this module depends on Diagnostics. Its files Problem.cpp and Audit.cpp
+// define them.
 namespace palpate {
-
-/// Lists all element pairs whose boxes in double overlap when each is inflated by half the
-/// thickness; sorted. This is the reference for the octree's candidate pairs. For self-collision it
-/// lists pairs with a < b that share no vertex.
-void findCandidatesByBruteForce(const MeshPair&, Buffer<ElementPair>& out);
-
-/// Finds the same as a frame for one pair, by testing every feature against every other.
-/// intersections: receives the contacts that Auto takes from Intersection.
-void detectPairByBruteForce(const PairRecord&, ContactBuffers& contacts,
-                            ContactBuffers& intersections);
-
-/// Finds the contacts of these vertices of the pair's first geometry, by the method of its plan.
-void detectVerticesByBruteForce(const PairRecord&, std::span<const std::uint32_t> vertices,
-                                ContactBuffers& contacts);
 
 /// The complete input of a detection at this moment.
 CollisionProblem problemOf(const Settings&, const GeometryTable&, const PairTable&);

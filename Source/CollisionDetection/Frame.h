@@ -2,17 +2,14 @@
 
 #include <palpate/FrameStatistics.h>
 
-#include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/PairResults.h"
 #include "CollisionDetection/PairTable.h"
-#include "CollisionDetection/PairWork.h"
-#include "Octree/Traversal.h"
+#include "Search/JobRunner.h"
+#include "Search/PairResults.h"
 #include "Core/Threads.h"
 #include "Core/Trace.h"
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -23,46 +20,34 @@ namespace palpate {
 class Frame {
  public:
   using BatchFunction = void (*)(void* context, const CollisionPair&, std::span<const ElementPair>);
+  /// What a frame needs besides pairs. trace: null for none.
+  struct Context {
+    const Threads& threads;
+    Engine engine;
+    FrameStatistics& statistics;
+    Trace* trace = nullptr;
+  };
+
   /// Passes the candidates of each pair to a function, batch by batch, one call at a time.
   void forEach(std::span<PairRecord* const>, const Threads&, BatchFunction, void* context);
-  /// Writes the contacts of each pair, sorted, to PairRecord::next.
-  /// trace: null for none.
-  void detect(std::span<PairRecord* const>, const Threads&, FrameStatistics&, Trace* trace);
+  /// Writes the answer of each pair, sorted, to PairRecord::found.
+  void detect(std::span<PairRecord* const>, const Context&);
   /// The same for a few pairs at a time in the given order, with track(), until the thread's
-  /// deadline is over. The rest is PairRecord::isUnfinished.
-  void detectInTime(std::uint64_t step, std::span<PairRecord* const>, const Threads&,
-                    FrameStatistics&, Trace*);
-  /// Writes the same results, found by testing every feature against every other.
-  void detectByBruteForce(std::span<PairRecord* const>, FrameStatistics&, Trace*);
-  /// Takes the contacts of a pair over into the step with this number (PairRecord::track()).
-  void track(PairRecord& record, std::uint64_t step) { record.track(step, m_match); }
+  /// deadline is over. The rest is Urgency::isUnfinished.
+  void detectInTime(std::uint64_t step, std::span<PairRecord* const>, const Context&);
+  /// Writes the answer of each search.
+  void detect(std::span<const Search>, const Context&);
+  /// Takes the contacts of a pair over into the step with this number.
+  void track(PairRecord& record, std::uint64_t step) {
+    record.memory.tracker.follow(record.momentIn(step), record.isCurrent(), m_match);
+  }
+  JobRunner& jobs() { return m_jobs; }
 
  private:
-  struct Pair {
-    PairRecord* record;
-    PairWork work;
-    std::size_t firstJob, jobCount = 0;
-    bool runs = false;  ///< in the present round
-  };
-  /// The pair of a job, by its index in m_pairs, and the job's number in it.
-  struct Place {
-    std::size_t pair, job;
-  };
-  template <class Start>
-  void start(std::span<PairRecord* const>, const Threads&, Start&&);
-  Jobs jobsOf(const Pair& pair) const {
-    return std::span(m_jobs).subspan(pair.firstJob, pair.jobCount);
-  }
-  void runRounds(const Threads&, Trace*);
-  void addTimes(double wall, FrameStatistics&) const;
-  void join(Pair&, const FrameJoin&);
+  std::size_t start(std::span<PairRecord* const>, const Context&);
+  void join(std::size_t, PairRecord&, const Context&);
 
-  std::vector<Pair> m_pairs;
-  std::vector<Place> m_places;  ///< of the jobs in use
-  std::vector<std::unique_ptr<JobScratch>>
-      m_jobs;  ///< those in use first, those of a pair together
-  Buffer<NodePair> m_nodePairs;
-  TraversalStack m_stack;
+  JobRunner m_jobs;
   PairResults m_results;
   ContactMatch m_match;
 };

@@ -98,6 +98,11 @@ struct Geometry : CountedObject {
   std::size_t freeMotionCount() const {
     return body.shape || body.isField() ? 1 : body.mesh.topology.vertexCount;
   }
+  /// Whether nothing but cuts changed the elements since the last detection.
+  bool isCut() const {
+    const CutsSince& cuts = step.cutsSinceDetection();
+    return cuts.after == body.revisions.elements && cuts.before != cuts.after;
+  }
   bool meets(const Geometry& other) const {
     return (filter.groups & other.filter.mask) && (other.filter.groups & filter.mask);
   }

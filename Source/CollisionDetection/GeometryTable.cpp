@@ -1,6 +1,6 @@
 #include "CollisionDetection/GeometryTable.h"
 
-#include "CollisionDetection/KeptPairs.h"
+#include "Search/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
 #include "Mesh/TetrahedraCut.h"
@@ -579,7 +579,7 @@ void GeometryTable::setTags(GeometryId id, std::span<const std::uint32_t> tags) 
 }
 
 void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads,
-                                  Trace* trace) {
+                                  Trace* trace, bool (*isDue)(const Geometry&)) {
   double spread = 0;
   for (const auto& geometry : m_geometries)
     spread = std::max(spread, geometry->body.tree.sampleFrame(
@@ -589,7 +589,7 @@ void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads&
   for (const auto& geometry : m_geometries) {
     const Body& body = geometry->body;
     const Revision topology = body.revisions.elements.topology;
-    if (!geometry->skipsOctree &&
+    if (!geometry->skipsOctree && (!isDue || isDue(*geometry)) &&
         !(geometry->mayLag && body.tree.laggedTo(body.mesh, topology, scale)) &&
         (!body.tree.isCurrent(body.mesh, topology, scale) ||
          body.tree.needsDops(body.mesh, settings.bounds)))

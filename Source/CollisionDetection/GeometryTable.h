@@ -102,7 +102,8 @@ class GeometryTable {
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
   /// Updates the octrees to the positions now, or to the whole step (GeometryOctree::setSwept()).
-  void updateOctrees(const OctreeSettings&, const Threads&, Trace* = nullptr);
+  void updateOctrees(const OctreeSettings&, const Threads&, Trace* = nullptr,
+                     bool (*isDue)(const Geometry&) = nullptr);
   /// Whether one thread made the last update. Its cache then has the data.
   bool wasUpdatedByOneThread() const { return m_wasUpdatedByOneThread; }
 

@@ -51,7 +51,7 @@ std::uint32_t GuardedParts::partOf(GeometryId id, std::uint32_t vertex) const {
   return vertex < body->nodeCount() ? partOf(*body, vertex) : kNone;
 }
 
-void GuardedParts::start(const GeometryTable& geometries, const GuardedPairs& pairs,
+void GuardedParts::start(const GeometryTable& geometries, SeparateSearches pairs,
                          const GuardSettings& settings) {
   m_geometries.clear();
   for (const auto& pair : pairs)

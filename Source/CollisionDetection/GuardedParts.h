@@ -46,7 +46,7 @@ class GuardedParts {
     bool moves(std::uint32_t node) const;  ///< before the step is shortened
   };
 
-  void start(const GeometryTable&, const GuardedPairs&, const GuardSettings&);
+  void start(const GeometryTable&, SeparateSearches, const GuardSettings&);
   void clear() noexcept { m_bodies.clear(); }  ///< forgets the geometries
 
   std::span<const Body> bodies() const { return m_bodies; }  ///< by ascending id

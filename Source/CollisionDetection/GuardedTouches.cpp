@@ -93,16 +93,17 @@ class TouchFinder {
               std::vector<GuardedTouch>& out)
       : m_parts(parts), m_fractions(fractions), m_out(out) {}
 
-  void find(const PairRecord& record) {
-    const Geometry &a = *record.a, &b = *record.b;
+  void find(const SeparateSearch& search) {
+    const Geometry &a = *search.a, &b = *search.b;
+    const CollisionData& data = search.found.data;
     const auto addAll = [&](const auto& list, const Geometry& first, const Geometry& second) {
       for (const auto& contact : list) add(Placed{contact, first, second});
     };
-    addAll(record.data.vertexTriangle(), a, b);
-    addAll(record.data.triangleVertex(), b, a);
-    addAll(record.data.edgeEdge(), a, b);
-    addAll(record.data.shape(), a.body.shape ? b : a, a.body.shape ? a : b);
-    addAll(record.data.shapeShape(), a, b);
+    addAll(data.vertexTriangle(), a, b);
+    addAll(data.triangleVertex(), b, a);
+    addAll(data.edgeEdge(), a, b);
+    addAll(data.shape(), a.body.shape ? b : a, a.body.shape ? a : b);
+    addAll(data.shapeShape(), a, b);
   }
 
  private:
@@ -190,12 +191,12 @@ class TouchFinder {
 
 }  // namespace
 
-void findTouches(const GuardedPairs& pairs, const GuardedParts& parts,
+void findTouches(SeparateSearches pairs, const GuardedParts& parts,
                  std::span<const double> fractions, std::vector<GuardedTouch>& out) {
   PALPATE_ASSERT(fractions.size() == parts.nodeCount());
   out.clear();
   for (const auto& pair : pairs)
-    if (pair->collides()) TouchFinder(parts, fractions, out).find(*pair);
+    if (pair->a->meets(*pair->b)) TouchFinder(parts, fractions, out).find(*pair);
 }
 
 }  // namespace palpate

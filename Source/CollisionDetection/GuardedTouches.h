@@ -30,7 +30,7 @@ struct GuardedTouch {
 
 /// Writes the touches among the pairs' contacts. fractions: of their steps, by part. Throws
 /// ImpactRemains if no part of a touch is free and has a fraction above 0.
-void findTouches(const GuardedPairs&, const GuardedParts&, std::span<const double> fractions,
+void findTouches(SeparateSearches, const GuardedParts&, std::span<const double> fractions,
                  std::vector<GuardedTouch>& out);
 
 }  // namespace palpate

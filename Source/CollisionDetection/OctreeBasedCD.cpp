@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
+#include "Search/BruteForce.h"
 #include "DistanceField/FieldContacts.h"
 #include "Bodies/InputChecks.h"
 #include "Core/Stopping.h"
@@ -294,7 +295,7 @@ PairStatistics OctreeBasedCD::pairStatistics(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
   const StandardFloatingPoint standard;
   m_implementation->countCandidates();
-  return all.pairs.at(all.geometries, a, b).statistics;
+  return all.pairs.at(all.geometries, a, b).found.statistics;
 }
 
 bool OctreeBasedCD::has(GeometryId geometry) const {
@@ -319,7 +320,7 @@ Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
 
 void OctreeBasedCD::update() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->withinLimit([&] { all->update(true); });
+  all->withinLimit([&] { all->update(Implementation::UpdateFor::User); });
 }
 
 void OctreeBasedCD::detectCollision() {
@@ -401,24 +402,24 @@ std::shared_ptr<const Snapshot> OctreeBasedCD::latestSnapshot() const {
 const CollisionData& OctreeBasedCD::collisionData(GeometryId a, GeometryId b) const {
   const Implementation& all = read();
   const PairRecord& record = all.pairs.inOrder(all.geometries, a, b);
-  if (!record.hasData)
+  if (!record.last.isThere)
     throw Error(ErrorCode::NotAvailable,
                 nameOf(*record.a, *record.b) + " has no results yet: call detectCollision() first",
                 a);
-  return record.data;
+  return record.last.data;
 }
 
 void OctreeBasedCD::setUserData(GeometryId a, GeometryId b, const ContactKey& key,
                                 std::uint64_t data) {
   const Implementation::ChangeGuard all(m_implementation);
   PairRecord& record = all->pairs.inOrder(all->geometries, a, b);
-  if (!record.tracker ||
-      !record.tracker->setUserData(CollisionData::Contents::of(record.data), key, data))
+  const auto& tracker = record.memory.tracker.tracker;
+  if (!tracker || !tracker->setUserData(CollisionData::Contents::of(record.last.data), key, data))
     throw Error(ErrorCode::NotAvailable,
                 nameOf(*record.a, *record.b) +
-                    (record.tracker ? ": the last detection has no contact with this key"
-                                    : ": no detection has tracked contacts: "
-                                      "PairSettings::trackContacts is not set"),
+                    (tracker ? ": the last detection has no contact with this key"
+                             : ": no detection has tracked contacts: "
+                               "PairSettings::trackContacts is not set"),
                 a);
 }
 

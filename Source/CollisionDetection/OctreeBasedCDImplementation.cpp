@@ -40,12 +40,8 @@ OctreeBasedCD::Implementation::~Implementation() {
 void OctreeBasedCD::Implementation::countCandidates() {
   const std::lock_guard lock(filling);
   for (const auto& record : pairs.records()) {
-    if (!std::exchange(record->countIsPending, false)) continue;
-    const Geometry &a = *record->a, &b = *record->b;
-    const std::size_t count =
-        record->kept.countCandidates(a.body.mesh.topology, a.step.cutsSinceDetection(),
-                                     b.body.mesh.topology, b.step.cutsSinceDetection());
-    record->statistics.candidatePairs += count;
+    const std::size_t count = record->memory.kept.countCandidates(*record);
+    record->found.statistics.candidatePairs += count;
     statistics.candidatePairs += count;
   }
 }
@@ -54,11 +50,12 @@ void OctreeBasedCD::Implementation::releaseMemory() {
   countCandidates();
   frame = Frame();
   freeMotions = FreeMotionSearch();
+  unfollowed.clear();
   for (const auto& geometry : geometries.all()) {
     geometry->body.tree.releaseMemory();
     geometry->step.releaseMemory();
   }
-  for (const auto& record : pairs.records()) record->releaseMemory();
+  for (const auto& record : pairs.records()) record->releaseMemory(true);
   querySource->releaseScratch();
   latestSnapshot.releaseMemory();
   holdsSpare = false;
@@ -79,17 +76,27 @@ void OctreeBasedCD::Implementation::setStatistics(FrameStatistics next) {
   statistics = std::move(next);
 }
 
-void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairRecord>> records,
-                                           bool explicitly, bool detecting, bool skips,
+void OctreeBasedCD::Implementation::update(UpdateFor purpose, Trace* traced) {
+  const bool isFrame = purpose == UpdateFor::Frame;
+  markSkippedOctrees(isFrame && octreesState != geometries.state());
+  update(
+      purpose,
+      [&] {
+        for (const auto& record : pairs.records()) expectPlan(*record, isFrame);
+      },
+      traced);
+}
+
+void OctreeBasedCD::Implementation::update(UpdateFor purpose,
+                                           const std::function<void()>& expectPlans,
                                            Trace* traced) {
   const MemoryScope memory(MemoryStage::Octrees);
   using Update = LooseOctree::Update;
-  const bool isFrame = detecting && records.data() == pairs.records().data();
-  if (!isFrame) countCandidates();
+  if (purpose != UpdateFor::Frame) countCandidates();
   octreesState = 0;
   shownOctrees.trees.clear();  // they are invalid until the update is complete
   if (!hasUpdates) updates = {};
-  const bool isFirst = explicitly || !std::exchange(hasUpdates, true);
+  const bool isFirst = purpose == UpdateFor::User || !std::exchange(hasUpdates, true);
   for (const auto& geometry : geometries.all()) {
     if (isFirst) geometry->body.tree.lastUpdate = Update::Unchanged;
     geometry->body.tree.setSwept(false);
@@ -97,23 +104,7 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   }
   Stopwatch watch;
   const TraceSpan span(traced, "update");
-  // Plans measure placed bodies with their octrees.
-  bool anyIsPlaced = false;
-  for (const auto& geometry : geometries.all())
-    if (geometry->body.isPlaced() && geometry->body.tree.isLagging()) {
-      geometry->mayLag = false;
-      anyIsPlaced = true;
-    }
-  if (anyIsPlaced) geometries.updateOctrees(settings.octree, threads, traced);
-  for (const auto& record : records) {
-    planStep(*record, detecting);
-    if (record->plan.swept())
-      for (Geometry* geometry : {record->a, record->b}) geometry->body.tree.setSwept(true);
-  }
-  if (isFrame)
-    planKeptPairs(geometries, records, settings);
-  else
-    for (const auto& geometry : geometries.all()) geometry->mayLag = false;
+  expectPlansAndLag(purpose, expectPlans, traced);
   updates.milliseconds.boxes += watch.lap();
   geometries.updateOctrees(settings.octree, threads, traced);
   const double wall = watch.lap();
@@ -133,24 +124,48 @@ void OctreeBasedCD::Implementation::update(std::span<const std::unique_ptr<PairR
   updates.milliseconds.boxes += wall * share;
   updates.milliseconds.octree += wall * (1 - share);
   updateOctreeView();
+  const bool skips = std::any_of(geometries.all().begin(), geometries.all().end(),
+                                 [](const auto& geometry) { return geometry->skipsOctree; });
   if (!skips && !anyOctreeLags()) octreesState = geometries.state();
 #ifdef PALPATE_VALIDATE
   PALPATE_ASSERT(shownOctrees.view.validate().empty());
 #endif
-  if (explicitly) setStatistics(updates);
+  if (purpose == UpdateFor::User) setStatistics(updates);
 }
 
-bool OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
+/// Updates those octrees on which the plans of others depend.
+void OctreeBasedCD::Implementation::expectPlansAndLag(UpdateFor purpose,
+                                                      const std::function<void()>& expectPlans,
+                                                      Trace* traced) {
+  const auto updateSome = [&](bool (*isDue)(const Geometry&)) {
+    const auto all = geometries.all();
+    if (std::any_of(all.begin(), all.end(), [&](const auto& each) { return isDue(*each); }))
+      geometries.updateOctrees(settings.octree, threads, traced, isDue);
+  };
+  // The motion of placed bodies is measured with their octrees.
+  for (const auto& geometry : geometries.all())
+    if (geometry->body.isPlaced()) geometry->mayLag = false;
+  updateSome([](const Geometry& g) { return g.body.isPlaced() && g.body.tree.isLagging(); });
+  expectPlans();
+  if (purpose != UpdateFor::Frame) {
+    for (const auto& geometry : geometries.all()) geometry->mayLag = false;
+    return;
+  }
+  planKeptCandidates(geometries, pairs.records(), settings);
+  // A cut that needs a new octree ends lists, so that others must not lag.
+  updateSome([](const Geometry& geometry) { return geometry.mayLag && geometry.isCut(); });
+  reviewCuts(pairs.records());
+}
+
+void OctreeBasedCD::Implementation::markSkippedOctrees(bool maySkip) {
   for (const auto& geometry : geometries.all()) geometry->skipsOctree = false;
-  if (!maySkip) return false;
+  if (!maySkip) return;
   for (const auto& record : pairs.records())
     if (needsNoOctree(*record)) record->a->skipsOctree = true;
   for (const auto& record : pairs.records()) {
     if (!needsNoOctree(*record)) record->a->skipsOctree = false;
     if (record->support->kind != PairKind::Proxy) record->b->skipsOctree = false;
   }
-  return std::any_of(geometries.all().begin(), geometries.all().end(),
-                     [](const auto& geometry) { return geometry->skipsOctree; });
 }
 
 bool OctreeBasedCD::Implementation::anyOctreeLags() const {
@@ -172,8 +187,7 @@ void OctreeBasedCD::Implementation::updateOctreeView() {
 std::span<PairRecord* const> OctreeBasedCD::Implementation::outdatedPairs() {
   selectedPairs.clear();
   for (const auto& record : pairs.records())
-    if (record->collides() && !record->dataVersion.isCurrent(record->state()))
-      selectedPairs.push_back(record.get());
+    if (record->collides() && !record->isCurrent()) selectedPairs.push_back(record.get());
   return selectedPairs;
 }
 
@@ -181,78 +195,73 @@ const Threads& OctreeBasedCD::Implementation::threadsFor(
     std::span<PairRecord* const> records) const {
   constexpr std::size_t kFew = 16384;
   std::size_t found = 0;
-  for (const PairRecord* record : records) found += record->candidateCount;
+  for (const PairRecord* record : records) found += record->found.candidateCount;
   return geometries.wasUpdatedByOneThread() && found < kFew ? singleThread : threads;
 }
 
 bool OctreeBasedCD::Implementation::updateProxies(std::span<PairRecord* const> records) {
   const MemoryScope memory(MemoryStage::Octrees);
   bool built = false;
-  for (PairRecord* record : records)
-    if (record->support->kind == PairKind::Proxy)
-      built |= record->updateProxy(pairs.records(), threads);
+  for (PairRecord* record : records) {
+    if (record->support->kind != PairKind::Proxy) continue;
+    ProxyMemory& own = record->memory.proxy;
+    built |= own.update(*record, pairs.records(), threads);
+    record->question->proxy = own.proxy.get();
+  }
   return built;
 }
 
-void OctreeBasedCD::Implementation::detect(const GuardedPairs& guarded) {
-  const MemoryScope memory(MemoryStage::Pairs);
-  update(guarded, false, true, markSkippedOctrees(false));
-  FrameStatistics unused;
-  selectedPairs.clear();
-  for (const auto& record : guarded)
-    if (record->collides() && !record->dataVersion.isCurrent(record->state()))
-      selectedPairs.push_back(record.get());
-  if (settings.engine == Engine::Octree)
-    frame.detect(selectedPairs, threads, unused, nullptr);
-  else
-    frame.detectByBruteForce(selectedPairs, unused, nullptr);
-  for (PairRecord* record : selectedPairs) record->commit();
+Frame::Context OctreeBasedCD::Implementation::context(FrameStatistics& next, Trace* traced) const {
+  const Threads& all = settings.engine == Engine::Octree ? threads : singleThread;
+  return {all, settings.engine, next, traced};
 }
 
-void OctreeBasedCD::Implementation::prepare(std::span<PairRecord* const> records,
-                                            StopScope::Token token, Trace* traced) {
-  bool mustUpdate = false;
+void OctreeBasedCD::Implementation::detect(SeparateSearches all) {
+  const MemoryScope memory(MemoryStage::Pairs);
+  markSkippedOctrees(false);
+  update(UpdateFor::SeparateSearches, [&] {
+    for (const auto& own : all) expectPlan(*own);
+  });
+  outdatedSearches.clear();
+  for (const auto& own : all)
+    if (own->a->meets(*own->b) && !own->version.isCurrent(own->state())) {
+      own->version.invalidate();
+      outdatedSearches.push_back(own->search());
+    }
+  FrameStatistics unused;
+  frame.detect(outdatedSearches, context(unused, nullptr));
+  for (const auto& own : all)
+    if (own->a->meets(*own->b)) own->version.commit(own->state());
+}
+
+void OctreeBasedCD::Implementation::completePlans(std::span<PairRecord* const> records,
+                                                  StopScope::Token token) {
   for (PairRecord* record : records) {
-    record->isUnfinished = token && token->isOver();
-    if (record->isUnfinished) continue;
-    planByFieldIfProven(*record, settings.engine);
-    record->trust.start(record->pair.settings, record->a->inStep(), record->b->inStep(),
-                        record->plan);
-    mustUpdate |= reviewKeptPairs(*record);
+    bool& isUnfinished = record->memory.urgency.isUnfinished;
+    isUnfinished = token && token->isOver();
+    if (!isUnfinished) completePlan(*record, settings.engine);
   }
-  if (!mustUpdate) return;
-  geometries.updateOctrees(settings.octree, threads, traced);
-  updateOctreeView();
-  if (!anyOctreeLags()) octreesState = geometries.state();
 }
 
 void OctreeBasedCD::Implementation::findContacts(std::span<PairRecord* const> records,
                                                  FrameStatistics& next, Trace* traced) {
-  if (!isTimed())
-    return settings.engine == Engine::Octree ? frame.detect(records, threads, next, traced)
-                                             : frame.detectByBruteForce(records, next, traced);
-  const auto end = std::find_if(records.begin(), records.end(),
-                                [](const PairRecord* record) { return record->isUnfinished; });
-  const auto prepared = records.first(static_cast<std::size_t>(end - records.begin()));
-  const std::uint64_t step = geometries.stepNumber();
-  if (settings.engine == Engine::Octree)
-    return frame.detectInTime(step, prepared, threads, next, traced);
-  for (PairRecord* record : prepared) {
-    record->isUnfinished = !endsInTime([&] {
-      checkTime();
-      frame.detectByBruteForce({&record, 1}, next, traced);
-    });
-    if (!record->isUnfinished) frame.track(*record, step);
-  }
+  if (!isTimed()) return frame.detect(records, context(next, traced));
+  const auto end = std::find_if(records.begin(), records.end(), [](const PairRecord* record) {
+    return record->memory.urgency.isUnfinished;
+  });
+  frame.detectInTime(geometries.stepNumber(),
+                     records.first(static_cast<std::size_t>(end - records.begin())),
+                     context(next, traced));
 }
 
 void OctreeBasedCD::Implementation::listUnfinished(std::span<PairRecord* const> records) {
   const PairRecord* const exceeding = findExceeding(records);
   unfinishedPairs.clear();
   for (const auto& record : pairs.records()) {
-    if (!record->isUnfinished) continue;
-    const Validity& kept = CollisionData::Contents::of(record->data).validity;  // makes it
-    unfinishedPairs.push_back({record->pair.a, record->pair.b, record->distanceBound, kept.age + 1,
+    const Urgency& urgency = record->memory.urgency;
+    if (!urgency.isUnfinished) continue;
+    const Validity& kept = CollisionData::Contents::of(record->last.data).validity;  // makes it
+    unfinishedPairs.push_back({record->pair.a, record->pair.b, urgency.distanceBound, kept.age + 1,
                                record.get() == exceeding});
   }
 }
@@ -260,12 +269,10 @@ void OctreeBasedCD::Implementation::listUnfinished(std::span<PairRecord* const> 
 void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> records,
                                                    FrameStatistics& next) noexcept {
   const PairRecord* const exceeding = findExceeding(records);
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    PairRecord& record = *records[i];
-    record.yields = &record == exceeding;
-    if (!record.isUnfinished) continue;
-    record.trust = trustBefore[i];
-    record.keepLastAnswer(geometries.stepNumber());
+  for (PairRecord* record : records) {
+    Urgency& urgency = record->memory.urgency;
+    urgency.yields = record == exceeding;
+    if (urgency.isUnfinished) record->keepLastAnswer(geometries.stepNumber());
   }
   next.unfinishedPairs.swap(unfinishedPairs);
   unfinishedPairs.swap(statistics.unfinishedPairs);  // for its memory
@@ -273,59 +280,59 @@ void OctreeBasedCD::Implementation::keepUnfinished(std::span<PairRecord* const> 
 
 void OctreeBasedCD::Implementation::commit(std::span<PairRecord* const> records) noexcept {
   for (PairRecord* record : records) {
-    if (record->isUnfinished) continue;
-    record->commit();
-    CollisionData::Contents::of(record->data).validity.advanceMayBeMissing =
+    if (record->memory.urgency.isUnfinished) continue;
+    record->commit(geometries.stepNumber());
+    CollisionData::Contents::of(record->last.data).validity.advanceMayBeMissing =
         record->a->step.setsAddUp() || record->b->step.setsAddUp();
-    reviewLists(*record);
-    record->workedPairs = record->searchedCandidates + record->statistics.featurePairs;
+  }
+  for (const auto& record : pairs.records()) {
+    if (!record->collides() && !record->isCurrent()) record->commit(geometries.stepNumber());
+    record->memory.tracker.keep(record->last.data);
   }
 }
 
 void OctreeBasedCD::Implementation::reviewMemory() {
   const MemoryUse& held = statistics.memory;
   BurstMemory::Work work{0, statistics.contacts + statistics.intersectingTriangles};
-  for (const auto& record : pairs.records()) work.pairs += record->workedPairs;
+  for (const auto& record : pairs.records()) work.pairs += record->memory.kept.workedPairs();
   if (!burst.isOver(work, held.pairs + held.narrowPhase + held.results)) return;
   countCandidates();
   frame = Frame();
-  for (const auto& record : pairs.records()) record->releaseBurst();
+  for (const auto& record : pairs.records()) record->releaseMemory(false);
   statistics.memory = budget->now();
 }
 
+/// The settings that find the passages of a pair, and nothing else.
+static PairSettings passagesOf(PairSettings settings) {
+  settings.thickness = settings.freeMotionReach = 0.0;
+  settings.reportCrossings = true;
+  settings.rememberSides = settings.smoothNormals = false;
+  settings.method = Method::Continuous;  // not Auto, which looks for more than passages
+  return settings;
+}
+
 void OctreeBasedCD::Implementation::followSides() {
-  unfollowed.clear();
+  std::size_t count = 0;
   for (const auto& record : pairs.records()) {
-    record->startSides(geometries.stepNumber());
-    if (!record->sides || !record->collides() || record->dataVersion.isCurrent(record->state()))
-      continue;
-    if (!record->atEnd) record->atEnd = std::make_unique<PairRecord>();
-    unfollowed.push_back(std::move(record->atEnd));
-    PairRecord& own = *unfollowed.back();
-    own.guarded = record.get();
-    own.a = record->a;
-    own.b = record->b;
-    own.pair = record->pair;
-    own.pair.settings.thickness = own.pair.settings.freeMotionReach = 0.0;
-    own.pair.settings.reportCrossings = true;
-    own.pair.settings.rememberSides = own.pair.settings.smoothNormals = false;
-    own.pair.settings.method = Method::Continuous;  // not Auto, which looks for more than passages
-    own.support = supportOf(Method::Continuous, own.a->body.mesh.topology.type,
-                            own.b->body.mesh.topology.type, own.a == own.b);
-    own.settingsRevision = record->settingsRevision;
-    own.dataVersion.invalidate();
+    SidesMemory& memory = record->memory.sides;
+    memory.startStep(record->momentIn(geometries.stepNumber()));
+    if (!memory.sides || !record->collides() || record->isCurrent()) continue;
+    if (count == unfollowed.size()) unfollowed.push_back(std::make_unique<SeparateSearch>());
+    SeparateSearch& own = *unfollowed[count++];
+    own.set(*record, passagesOf(record->pair.settings), false);
+    own.version.invalidate();
   }
-  if (unfollowed.empty()) return;
-  detect(unfollowed);
-  for (const auto& own : unfollowed) {
-    PairRecord& record = *pairs.records()[own->guarded->index];
-    record.sides->follow(record.meshes(), own->data.crossings());
+  if (count == 0) return;
+  const SeparateSearches all = std::span(unfollowed).first(count);
+  detect(all);
+  for (const auto& own : all) {
+    PairRecord& record = *pairs.records()[own->of->index];
+    record.memory.sides.sides->follow(record.meshes(), own->found.data.crossings());
   }
-  for (auto& own : unfollowed) {
-    PairRecord& record = *pairs.records()[own->guarded->index];
-    record.sides->commit();
-    record.dataVersion.invalidate();  // the sides are not those of the last detection
-    record.atEnd = std::move(own);
+  for (const auto& own : all) {
+    PairRecord& record = *pairs.records()[own->of->index];
+    record.memory.sides.sides->commit();
+    record.last.version.invalidate();  // the sides are not those of the last detection
   }
 }
 
@@ -334,39 +341,37 @@ bool OctreeBasedCD::Implementation::detect(StopScope::Token token) {
   Trace* const traced = trace ? &*trace : nullptr;
   if (traced) traced->startFrame();
   const TraceSpan span(traced, "detectCollision");
-  for (const auto& record : pairs.records()) record->countIsPending = record->isUnfinished = false;
-  update(false, true, traced);
-  for (const auto& record : pairs.records()) record->startSides(geometries.stepNumber());
+  for (const auto& record : pairs.records()) {
+    const PairMoment moment = record->momentIn(geometries.stepNumber());
+    record->memory.forEach([&](auto& part) { part.startStep(moment); });
+  }
+  update(UpdateFor::Frame, traced);
   FrameStatistics next = updates;
   const auto records = outdatedPairs();
   for (const auto& record : pairs.records()) {
-    record->statistics = {};
-    if (record->dataVersion.isCurrent(record->state()))
-      planByFieldIfProven(*record, settings.engine);
+    record->found.statistics = {};
+    if (record->isCurrent()) planByFieldIfProven(*record, settings.engine);
   }
-  if (token) {
-    orderByUrgency(selectedPairs);
-    trustBefore.clear();
-    for (const PairRecord* record : records) trustBefore.push_back(record->trust);
-  }
-  prepare(records, token, traced);
+  if (token) orderByUrgency(selectedPairs);
+  completePlans(records, token);
   Stopwatch watch;
   const bool built = updateProxies(records);
   if (built) next.milliseconds.octree += watch.lap();
   {
     const StopScope scope(token);
     findContacts(records, next, traced);
-    next.freeMotionUnfinished = !freeMotions.find(geometries, pairs, settings.engine, threads);
+    next.freeMotionUnfinished =
+        !freeMotions.find(geometries, pairs, settings.engine, threads, frame.jobs());
   }
   {
     const MemoryScope results(MemoryStage::Results);
     watch.lap();
     // With a deadline, pairs of other answers were tracked one by one.
     for (const auto& record : pairs.records())
-      if (!token || !record->collides() || record->dataVersion.isCurrent(record->state()))
+      if (!token || !record->collides() || record->isCurrent())
         frame.track(*record, geometries.stepNumber());
     for (PairRecord* record : records)
-      if (!record->isUnfinished) record->addTags();
+      if (!record->memory.urgency.isUnfinished) record->addTags();
     if (token) listUnfinished(records);
     next.milliseconds.order += watch.lap();
   }
@@ -375,13 +380,9 @@ bool OctreeBasedCD::Implementation::detect(StopScope::Token token) {
   freeMotions.commit(geometries);
   commit(records);
   for (const auto& record : pairs.records()) {
-    if (!record->collides() && !record->dataVersion.isCurrent(record->state()))
-      record->commitEmpty();
-    if (record->tracker && record->tracker->keeps())
-      record->tracker->commit(CollisionData::Contents::of(record->data));
-    const CollisionData& data = record->data;
-    record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
-    next.contacts += record->statistics.contacts;
+    const CollisionData& data = record->last.data;
+    record->found.statistics.contacts = data.validity().atImpact + data.validity().atEnd;
+    next.contacts += record->found.statistics.contacts;
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
   for (const auto& geometry : geometries.all()) geometry->step.recordDetection(geometry->body.mesh);

@@ -52,14 +52,14 @@ struct OctreeBasedCD::Implementation {
   bool hasUpdates = false;
   LooseOctree::State shownOctrees;  ///< what octree() shows
   std::vector<PairRecord*> selectedPairs;
-  std::vector<Trust> trustBefore;               ///< of selectedPairs, of a detection with a budget
   std::vector<UnfinishedPair> unfinishedPairs;  ///< of the detection that runs
   BurstMemory burst;
   AuditRecord audit;
   std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
   std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
-  GuardedPairs unfollowed;                   ///< scratch of followSides()
+  std::vector<Search> outdatedSearches;      ///< of the SeparateSearches that are detected
+  std::vector<std::unique_ptr<SeparateSearch>> unfollowed;  ///< scratch of followSides()
   LatestSnapshot latestSnapshot;
   /// geometries.state() for which all octrees hold; 0: for none.
   std::atomic<std::uint64_t> octreesState = 0;
@@ -128,17 +128,16 @@ struct OctreeBasedCD::Implementation {
     });
   }
 
-  /// Updates the octrees. The next frame's statistics include updates for queries.
-  /// records: pairs that are planned. explicitly: the user called update(). The statistics are
-  /// published at once, and count as rebuilt or refitted only the trees that this call changed.
-  /// detecting: plans include the motion of all pairs. Otherwise they include only the motion on
-  /// which candidates depend. traced: of a detection, or null.
-  void update(bool explicitly = false, bool detecting = false, Trace* traced = nullptr) {
-    update(pairs.records(), explicitly, detecting,
-           markSkippedOctrees(detecting && octreesState != geometries.state()), traced);
-  }
-  void update(std::span<const std::unique_ptr<PairRecord>> records, bool explicitly, bool detecting,
-              bool skips, Trace* traced = nullptr);
+  /// Why octrees are updated. The user's explicit call publishes the statistics at once, which then
+  /// count as rebuilt or refitted only the trees that it changed. The statistics of a frame include
+  /// updates for queries.
+  enum class UpdateFor : std::uint8_t { Queries, User, Frame, SeparateSearches };
+  /// Updates the octrees. expectPlans(): asks what boxes have to enclose. traced: of a detection,
+  /// or null.
+  void update(UpdateFor, const std::function<void()>& expectPlans, Trace* traced = nullptr);
+  /// The same with the expected plans of the table's pairs. Only those of a frame include the
+  /// motion of all; others include the motion on which candidates depend.
+  void update(UpdateFor = UpdateFor::Queries, Trace* traced = nullptr);
 
   bool needsNoOctree(const PairRecord& record) const {
     return record.pair.settings.freeMotionReach == 0.0 &&
@@ -146,9 +145,10 @@ struct OctreeBasedCD::Implementation {
   }
 
   /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
-  /// update them later. Returns whether there are any.
-  bool markSkippedOctrees(bool maySkip);
+  /// update them later.
+  void markSkippedOctrees(bool maySkip);
 
+  void expectPlansAndLag(UpdateFor, const std::function<void()>& expectPlans, Trace*);
   void updateOctreeView();
   bool anyOctreeLags() const;
 
@@ -162,15 +162,16 @@ struct OctreeBasedCD::Implementation {
 
   bool updateProxies(std::span<PairRecord* const> records);
 
-  /// For a StepGuard. Results and statistics of the table's pairs stay as they are.
-  void detect(const GuardedPairs& guarded);
+  /// Results and statistics of the table's pairs stay as they are.
+  void detect(SeparateSearches);
 
   /// Returns whether everything was finished. The token ends the search for contacts and for free
   /// motions, and nothing else.
   bool detect(StopScope::Token);
 
-  /// Completes the plans of pairs. Those for which no time is left become PairRecord::isUnfinished.
-  void prepare(std::span<PairRecord* const> records, StopScope::Token, Trace*);
+  /// Completes the plans of pairs. Those for which no time is left become Urgency::isUnfinished.
+  void completePlans(std::span<PairRecord* const> records, StopScope::Token);
+  Frame::Context context(FrameStatistics&, Trace*) const;
   void findContacts(std::span<PairRecord* const> records, FrameStatistics&, Trace*);
   /// records: all that had to be found, in the order of urgency. The first call lists those that
   /// are unfinished, and may throw; the second keeps their last answers.
@@ -271,7 +272,7 @@ class OctreeBasedCD::Implementation::GuardSource : public StepSource {
   GeometryTable& geometries() const override { return read().geometries; }
   const PairTable& pairs() const override { return read().pairs; }
   const Threads& threads() const override { return read().threads; }
-  void detect(const GuardedPairs& guarded) override { read().detect(guarded); }
+  void detect(SeparateSearches searches) override { read().detect(searches); }
 
  private:
   Implementation& read() const {

@@ -107,16 +107,19 @@ double distanceBoundOf(const PairRecord& record) {
 }
 
 void orderByUrgency(std::span<PairRecord*> records) {
-  for (PairRecord* record : records) record->distanceBound = distanceBoundOf(*record);
+  for (PairRecord* record : records)
+    record->memory.urgency.distanceBound = distanceBoundOf(*record);
   const std::int64_t highest = highestPriority(records);
   const auto rank = [highest](const PairRecord& record) {
-    const Validity& last = record.data.validity();
-    const std::int64_t age = record.yields ? 0 : last.age, priority = record.pair.settings.priority;
-    const bool isLower = record.yields || priority < highest;
+    const Validity& last = record.last.data.validity();
+    const std::int64_t age = record.memory.urgency.yields ? 0 : last.age,
+                       priority = record.pair.settings.priority;
+    const bool isLower = record.memory.urgency.yields || priority < highest;
     const bool isApart =
-        last.atEnd + last.atImpact == 0 && record.data.intersectingTriangles().empty();
-    const double distance = std::min(record.distanceBound, std::numeric_limits<double>::max());
-    return std::tuple(isLower, -age, -priority, isApart, distance - record.plan.motion,
+        last.atEnd + last.atImpact == 0 && record.last.data.intersectingTriangles().empty();
+    const double distance =
+        std::min(record.memory.urgency.distanceBound, std::numeric_limits<double>::max());
+    return std::tuple(isLower, -age, -priority, isApart, distance - record.question->plan.motion,
                       record.index);
   };
   std::sort(records.begin(), records.end(),
@@ -127,7 +130,7 @@ const PairRecord* findExceeding(std::span<PairRecord* const> records) {
   const std::int64_t highest = highestPriority(records);
   const auto unfinished =
       std::find_if(records.begin(), records.end(),
-                   [](const PairRecord* record) { return record->isUnfinished; });
+                   [](const PairRecord* record) { return record->memory.urgency.isUnfinished; });
   if (unfinished == records.end()) return nullptr;
   const auto isHighest = [highest](const PairRecord* record) {
     return record->pair.settings.priority == highest;

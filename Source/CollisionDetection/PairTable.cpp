@@ -1,6 +1,7 @@
 #include "CollisionDetection/PairTable.h"
 
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
+#include "Tracking/SmoothNormals.h"
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Core/Assert.h"
@@ -18,60 +19,20 @@ std::string nameOf(const GeometryLabel& a, const GeometryLabel& b) {
   return "pair (" + a.number() + ", " + b.number() + ")";
 }
 
-FieldContacts PairRecord::fieldContacts(const PlacedField& placed) {
-  PALPATE_ASSERT(usesField());
-  if (!fieldScratch) fieldScratch = std::make_unique<FieldScratch>();
-  const MeshPair both = meshes();
-  return {mesh().body.mesh, placed, both.settings.contacts, both.thicknessAtEnd(), *fieldScratch};
+void PairRecord::ask(const PairPlan& plan) {
+  const SurfaceProxy* const proxy =
+      plan.kind == PairKind::AttachedProxy ? b->proxy.get() : memory.proxy.proxy.get();
+  question.emplace(
+      Question{pair, a->body, b->body, a->inStep(), b->inStep(), filters, plan, proxy});
 }
 
-bool PairRecord::updateProxy(std::span<const std::unique_ptr<PairRecord>> others,
-                             const Threads& threads) {
-  PALPATE_ASSERT(support->kind == PairKind::Proxy);
-  const ProxyState state{b->body.revisions.elements, b->body.mesh.now.bodyRevision()};
-  const ProxySettings wanted{pair.settings.thickness + a->body.mesh.largestRadius,
-                             pair.settings.allowedError, pair.settings.proxy.widestNormalCone};
-  const auto isCurrent = [&](const PairRecord& record) {
-    return record.proxy && record.b == b && record.proxySettings == wanted &&
-           record.proxyVersion.isCurrent(state);
-  };
-  if (isCurrent(*this)) return false;
-  if (proxyVersion.isValid() && proxyVersion.state().elements.topology == state.elements.topology &&
-      proxyVersion.state().positions != state.positions)
-    throw Error(ErrorCode::UnsupportedMethod,
-                nameOf(*a, *b) + ": Method::Proxy is for a rigid body, and the positions of " +
-                    nameOf(*b) +
-                    " were changed; move it by setTransform(), or set its elements again",
-                b->body.id);
-  const auto shared = std::find_if(others.begin(), others.end(),
-                                   [&](const auto& record) { return isCurrent(*record); });
-  const bool builds = shared == others.end();
-  proxy = builds ? std::make_shared<const SurfaceProxy>(b->body.mesh, wanted, threads)
-                 : (*shared)->proxy;
-  proxySettings = wanted;
-  proxyVersion.commit(state);
-  return builds;
-}
-
-void PairRecord::track(std::uint64_t step, ContactMatch& scratch) {
-  using Contents = CollisionData::Contents;
-  const bool changes = !dataVersion.isCurrent(state());
-  if (changes && !collides()) Contents::of(next) = {};
-  if (!pair.settings.trackContacts) {
-    tracker.reset();
-    if (changes && collides()) Contents::of(next).tracked = {};
-    return;
-  }
-  if (!tracker) tracker = std::make_unique<ContactTracker>();
-  const bool begins = tracker->startStep(step, Contents::of(data));
-  if (!changes) {
-    if (begins) tracker->keep();
-  } else if (collides() || tracker->hadContacts(Contents::of(data))) {
-    Contents& contents = Contents::of(next);
-    contents.tracked.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
-    tracker->track(meshes(), collides(), {a->body.revisions.elements, b->body.revisions.elements},
-                   Contents::of(data), contents, scratch);
-  }
+void PairRecord::finish(const Threads& threads) {
+  memory.sides.follow(*question, found);
+  if (pair.settings.smoothNormals)
+    findSmoothNormals(meshes(), question->plan.kind == PairKind::MeshAndShape, threads,
+                      found.contents());
+  else
+    found.contents().smooth = {};
 }
 
 /// Of a shape or of a field that is a geometry. Bodies that a field or proxy stands for have none.
@@ -80,9 +41,9 @@ static std::uint32_t tagOfWhole(const Body& body) {
 }
 
 void PairRecord::addTags() {
-  if (dataVersion.isCurrent(state())) return;
+  if (isCurrent()) return;
   const TriangleMesh &ofA = a->body.mesh, &ofB = b->body.mesh;
-  CollisionData::Contents& contents = CollisionData::Contents::of(next);
+  CollisionData::Contents& contents = found.contents();
   for (auto& list : contents.tags) list.clear();
   if (ofA.tags.empty() && ofB.tags.empty()) return;
   const auto add = [&](ContactKind kind, const auto& list, const auto& tagsOfContact) {
@@ -100,7 +61,7 @@ void PairRecord::addTags() {
     return ContactTags{ofA.tagOfEdge(c.edgeA), ofB.tagOfEdge(c.edgeB)};
   });
   add(ContactKind::Shape, contents.shape, [&](const ShapeContact& c) {
-    const TriangleMesh& elements = mesh().body.mesh;
+    const TriangleMesh& elements = question->mesh().mesh;
     const bool ofSecond = &elements == &ofB;
     const std::uint32_t tag = c.element == ShapeElement::Vertex ? elements.tagOfVertex(c.id)
                               : c.element == ShapeElement::Edge
@@ -112,17 +73,6 @@ void PairRecord::addTags() {
   add(ContactKind::ShapeShape, contents.shapeShape, [&](const auto&) {
     return ContactTags{tagOfWhole(a->body), tagOfWhole(b->body)};
   });
-}
-
-void PairRecord::startSides(std::uint64_t step) {
-  if (!pair.settings.rememberSides) {
-    sides.reset();
-    atEnd.reset();
-    return;
-  }
-  if (!sides) sides = std::make_unique<SideMemory>();
-  sides->startStep(step);
-  if (!collides()) sides->forget();
 }
 
 void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
@@ -181,58 +131,43 @@ void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
     }
     all.push_back({passage, corners});
   }
-  startSides(step);
-  sides->set(step, all);
+  memory.sides.startStep(momentIn(step));
+  memory.sides.sides->set(step, all);
 }
 
-void PairRecord::followSides() {
-  CollisionData::Contents& contents = CollisionData::Contents::of(next);
-  contents.rememberedSides.clear();
-  if (!sides) return;
-  sides->follow(meshes(), contents.crossings);
-  const bool anyAtEnd = contents.validity.atEnd > 0;
-  sides->apply(meshes(), contents);
-  if (sides->changesContacts()) contents.step.endRows.clear();
-  std::size_t atImpact = 0;
-  forEachTimed(contents, [&](const auto& contacts) {
-    for (const auto& contact : contacts) atImpact += !anyAtEnd || contact.timeOfImpact < 1.0;
-  });
-  countContacts(atImpact, contents);
-  if (!pair.settings.reportCrossings) contents.crossings.clear();
-}
-
-void PairRecord::commit() noexcept {
-  PALPATE_ASSERT(next.validity().atImpact + next.validity().atEnd ==
-                 sizeOf(CollisionData::Contents::of(next)));
-  std::swap(data, next);
-  CollisionData::Contents& contents = CollisionData::Contents::of(data);
-  contents.step.elementsOfSecond = !contents.shape.empty() && &mesh() == b;
+void PairRecord::commit(std::uint64_t step) noexcept {
+  PALPATE_ASSERT(found.data.validity().atImpact + found.data.validity().atEnd ==
+                 sizeOf(found.contents()));
+  std::swap(last.data, found.data);
+  CollisionData::Contents& contents = CollisionData::Contents::of(last.data);
+  contents.step.elementsOfSecond = !contents.shape.empty() && &question->mesh() == &b->body;
   linkData();
-  if (tracker) tracker->hold(CollisionData::Contents::of(next));
-  hasData = true;
-  dataTopologies = topologies();
-  if (sides) sides->commit();
-  dataVersion.commit(state());
+  last.isThere = true;
+  last.topologies = topologies();
+  const PairMoment moment = momentIn(step);
+  memory.forEach([&](auto& part) { part.commit(moment); });
+  if (!collides()) memory.forEach([](auto& part) { part.forget(); });
+  last.version.commit(state());
 }
 
 void PairRecord::linkData() noexcept {
   using Contents = CollisionData::Contents;
-  if (!Contents::isIn(data)) return;
-  Contents& contents = Contents::of(data);
+  if (!Contents::isIn(last.data)) return;
+  Contents& contents = Contents::of(last.data);
   contents.step.record = this;
   contents.step.radii = a->body.mesh.largestRadius + b->body.mesh.largestRadius;
   contents.step.timeTolerance = pair.settings.continuous.timeTolerance;
 }
 
 void PairRecord::keepLastAnswer(std::uint64_t step) {
-  using Contents = CollisionData::Contents;
-  Contents& answer = Contents::of(data);
-  const bool isOutdated = hasData && dataTopologies != topologies();
-  if (tracker) tracker->skip(step, isOutdated, answer);
-  if (isOutdated || !hasData) {
+  CollisionData::Contents& answer = CollisionData::Contents::of(last.data);
+  PairMoment moment = momentIn(step);
+  moment.isOutdated = last.isThere && last.topologies != topologies();
+  memory.forEach([&](auto& part) { part.skip(moment); });
+  if (moment.isOutdated || !last.isThere) {
     const std::uint32_t age = answer.validity.age;
     answer = {};
-    answer.validity.method = plan.method;
+    answer.validity.method = question->plan.method;
     answer.validity.age = age;
   }
   answer.crossings.clear();
@@ -241,54 +176,27 @@ void PairRecord::keepLastAnswer(std::uint64_t step) {
   validity.sideMayBeWrong = true;
   validity.reason = MethodReason::OutOfTime;
   ++validity.age;
-  hasData = true;
-  dataTopologies = topologies();
-  dataVersion.invalidate();
+  last.isThere = true;
+  last.topologies = topologies();
+  last.version.invalidate();
 }
 
-void PairRecord::releaseBurst() {
-  next = {};
-  if (!keeps && !gathers) kept.releaseMemory();
-  fieldScratch.reset();
-  releaseResults();
-}
-
-void PairRecord::releaseMemory() {
-  next = {};
-  kept.releaseMemory();
-  fieldScratch.reset();
-  releaseResults();
-}
-
-void PairRecord::releaseResults() {
-  CollisionData::Contents& contents = CollisionData::Contents::of(data);
+void PairRecord::releaseMemory(bool all) {
+  found.data = {};
+  found.fieldScratch.reset();
+  CollisionData::Contents& contents = CollisionData::Contents::of(last.data);
   forEachTimed(contents, [](auto& list) { releaseSpare(list); });
-  if (tracker) tracker->releaseMemory(contents);
-  if (sides) sides->releaseMemory();
-  atEnd.reset();
   releaseSpare(contents.intersectingTriangles);
-}
-
-void PairRecord::commitEmpty() noexcept {
-  commit();
-  trust.forget();
+  memory.forEach([&](auto& part) { part.release(last.data, all); });
 }
 
 void PairRecord::takeOver(PairRecord& former) noexcept {
   PALPATE_ASSERT(a == former.a && b == former.b);
   if (pair.settings.restDistance == former.pair.settings.restDistance)
-    nearAtRest = std::move(former.nearAtRest);
-  kept = std::move(former.kept);
-  keptElements = former.keptElements;
-  slowFrames = former.slowFrames;
-  recentSpeed = former.recentSpeed;
-  searchedCandidates = former.searchedCandidates;
-  pauseFrames = former.pauseFrames;
-  nextPause = former.nextPause;
-  fieldScratch = std::move(former.fieldScratch);
-  if (former.proxy && proxySettings == former.proxySettings && proxyVersion.isValid() &&
-      former.proxyVersion.isCurrent(proxyVersion.state()))
-    proxy = std::move(former.proxy);
+    filters.nearAtRest = std::move(former.filters.nearAtRest);
+  found.fieldScratch = std::move(former.found.fieldScratch);
+  memory.kept.takeOver(former.memory.kept);
+  memory.proxy.takeOver(former.memory.proxy);
 }
 
 namespace {
@@ -327,14 +235,14 @@ IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
 }
 
 void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
-  m_byIds.find(keyOf(id, id))->second->nearAtRest = std::move(lists);
+  m_byIds.find(keyOf(id, id))->second->filters.nearAtRest = std::move(lists);
 }
 
 ChangedLists PairTable::changeNearAtRest(GeometryId id, const EdgeChange& change,
                                          std::span<const Eigen::Vector3d> rest,
                                          const Threads& threads) {
   PairRecord& record = *m_byIds.at(keyOf(id, id));
-  IndexLists& now = record.nearAtRest;
+  IndexLists& now = record.filters.nearAtRest;
   ChangedLists changed = verticesWithinAfterCut(record.a->body.mesh.topology, change, rest,
                                                 record.pair.settings.restDistance, now, threads);
   if (!changed.areAll) now.reserveMore(rest.size() - now.size(), changed.lists.itemCount());
@@ -342,7 +250,7 @@ ChangedLists PairTable::changeNearAtRest(GeometryId id, const EdgeChange& change
 }
 
 void PairTable::setNearAtRest(GeometryId id, ChangedLists& changed) noexcept {
-  replaceLists(m_byIds.find(keyOf(id, id))->second->nearAtRest, changed);
+  replaceLists(m_byIds.find(keyOf(id, id))->second->filters.nearAtRest, changed);
 }
 
 void PairTable::add(GeometryTable& geometries, GeometryId a, GeometryId b,
@@ -364,12 +272,12 @@ PairRecord& PairTable::add(Geometry& first, Geometry& second, const PairSettings
   record->a = &first;
   record->b = &second;
   record->support = &support;
-  planWithoutMotion(*record);
+  record->ask(planWithoutMotion(*record));
   record->settingsRevision = m_revisions.next();
   const bool takesOver = former && former->pair.settings.restDistance == settings.restDistance;
   if (settings.restDistance > 0.0 && !takesOver)
-    record->nearAtRest = verticesWithin(first.body.mesh.topology, first.body.mesh.rest,
-                                        settings.restDistance, threads);
+    record->filters.nearAtRest = verticesWithin(first.body.mesh.topology, first.body.mesh.rest,
+                                                settings.restDistance, threads);
   record->index = m_records.size();
   const auto reserve = [](auto& vector) {
     if (vector.size() == vector.capacity()) vector.reserve(2 * vector.size() + 1);
@@ -415,19 +323,16 @@ void PairTable::set(GeometryTable& geometries, GeometryId a, GeometryId b,
                     const PairSettings& settings, const Threads& threads) {
   PairRecord& record = at(geometries, a, b);
   const SupportedPairs& support = checkPair(*record.a, *record.b, settings);
-  if (record.predicate) checkPredicate(record, support);
+  if (record.filters.predicate) checkPredicate(record, support);
   if (record.pair.settings.restDistance != settings.restDistance && settings.restDistance > 0.0)
-    record.nearAtRest = verticesWithin(record.a->body.mesh.topology, record.a->body.mesh.rest,
-                                       settings.restDistance, threads);
+    record.filters.nearAtRest = verticesWithin(
+        record.a->body.mesh.topology, record.a->body.mesh.rest, settings.restDistance, threads);
   // Nothing below throws.
-  if (settings.method != Method::Proxy) {
-    record.proxy.reset();
-    record.proxyVersion.invalidate();
-  }
+  if (settings.method != Method::Proxy) record.memory.proxy.forgetBody();
   PALPATE_ASSERT(m_records[record.index].get() == &record);
   record.pair.settings = m_pairs[record.index].settings = settings;
   record.support = &support;
-  planWithoutMotion(record);
+  record.ask(planWithoutMotion(record));
   record.settingsRevision = m_revisions.next();
 }
 
@@ -453,7 +358,7 @@ void PairTable::setPredicate(const GeometryTable& geometries, GeometryId a, Geom
                              ContactPredicate predicate) {
   PairRecord& record = inOrder(geometries, a, b);
   if (predicate) checkPredicate(record, *record.support);
-  record.predicate = std::move(predicate);
+  record.filters.predicate = std::move(predicate);
   record.settingsRevision = m_revisions.next();
 }
 

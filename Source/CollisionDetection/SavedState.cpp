@@ -1,7 +1,7 @@
 // Part of CollisionDetection/OctreeBasedCDImplementation.h: saved states.
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
 #include "CollisionDetection/ProblemDescription.h"
 #include "Validity/TrustDescription.h"
 #include "Tracking/TrackingDescription.h"
@@ -16,12 +16,46 @@
 
 namespace palpate {
 
+template <class File>
+void Urgency::describe(File& file, PairRecord&, const auto&) {
+  description::fieldOf(file, yields);
+}
+
+template <class File>
+void TrustMemory::describe(File& file, PairRecord&, const auto& revisions) {
+  trust.describe(file, revisions);
+}
+
+template <class File>
+void TrackerMemory::describe(File& file, PairRecord& record, const auto& revisions) {
+  description::optionalOf(file, tracker, [&](ContactTracker& each) {
+    each.describe(file, revisions, CollisionData::Contents::of(record.last.data),
+                  record.last.version.isValid());
+  });
+}
+
+template <class File>
+void SidesMemory::describe(File& file, PairRecord& record, const auto&) {
+  description::optionalOf(file, sides,
+                          [&](SideMemory& each) { each.describe(file, record.a == record.b); });
+}
+
+template <class File>
+void ProxyMemory::describe(File& file, PairRecord&, const auto& revisions) {
+  for (double* value : {&m_settings.reach, &m_settings.allowedError, &m_settings.normalCone})
+    file.real(*value);
+  description::derivedOf(file, m_version, [&](State& state) {
+    revisions[1].elementsOf(file, state.elements);
+    revisions[1].bodyOf(file, state.positions);
+  });
+}
+
 namespace {
 
 using namespace description;
 
 constexpr std::string_view kStateTitle = "palpate-state";
-constexpr std::uint32_t kStateVersion = 3;
+constexpr std::uint32_t kStateVersion = 4;
 
 using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;
@@ -257,7 +291,7 @@ void describeContents(File& file, Contents& c) {
 }
 
 template <class File>
-void describeState(File& file, PairRecord::State& state, const PairRecord& record,
+void describeState(File& file, PairState& state, const PairRecord& record,
                    const PairStates& states) {
   states[0].stateOf(file, state.a);
   states[1].stateOf(file, state.b);
@@ -268,32 +302,22 @@ void describeState(File& file, PairRecord::State& state, const PairRecord& recor
 /// All but the geometries, settings and predicate.
 template <class File>
 void describePair(File& file, PairRecord& record, const PairStates& states) {
-  for (bool* flag : {&record.hasData, &record.yields, &record.sidesAreKnown, &record.byBodies})
+  LastAnswer& last = record.last;
+  for (bool* flag : {&last.isThere, &record.found.sidesAreKnown, &record.found.byBodies})
     fieldOf(file, *flag);
-  derivedOf(file, record.dataVersion,
-            [&](PairRecord::State& state) { describeState(file, state, record, states); });
-  for (std::size_t i = 0; i < 2; ++i) states[i].topologyOf(file, record.dataTopologies[i]);
-  bool hasContents = Contents::isIn(record.data);
+  derivedOf(file, last.version,
+            [&](PairState& state) { describeState(file, state, record, states); });
+  for (std::size_t i = 0; i < 2; ++i) states[i].topologyOf(file, last.topologies[i]);
+  bool hasContents = Contents::isIn(last.data);
   fieldOf(file, hasContents);
   if (hasContents) {
-    Contents& contents = Contents::of(record.data);
+    Contents& contents = Contents::of(last.data);
     describeContents(file, contents);
     if constexpr (File::kReads) record.linkData();
     if constexpr (File::kReads)
-      if (record.dataTopologies == record.topologies()) checkIds(file, contents, states);
+      if (last.topologies == record.topologies()) checkIds(file, contents, states);
   }
-  record.trust.describe(file, states);
-  optionalOf(file, record.tracker, [&](ContactTracker& tracker) {
-    tracker.describe(file, states, Contents::of(record.data), record.dataVersion.isValid());
-  });
-  optionalOf(file, record.sides,
-             [&](SideMemory& sides) { sides.describe(file, record.a == record.b); });
-  ProxySettings& proxy = record.proxySettings;
-  for (double* value : {&proxy.reach, &proxy.allowedError, &proxy.normalCone}) file.real(*value);
-  derivedOf(file, record.proxyVersion, [&](PairRecord::ProxyState& state) {
-    states[1].elementsOf(file, state.elements);
-    states[1].bodyOf(file, state.positions);
-  });
+  record.memory.forEach([&](auto& part) { part.describe(file, record, states); });
 }
 
 /// The pairs for whose states free motions hold. recordOf(pair): null if there is none any more;
@@ -399,7 +423,8 @@ std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
   for (const auto& record : pairs.records()) {
     CollisionProblem::Pair pair{static_cast<std::uint32_t>(record->pair.a),
                                 static_cast<std::uint32_t>(record->pair.b), record->pair.settings,
-                                record->pair.settings.method, static_cast<bool>(record->predicate)};
+                                record->pair.settings.method,
+                                static_cast<bool>(record->filters.predicate)};
     pairLine(file, pair, kVersion);
     describePair(file, *record, {revisionsOf(*record->a), revisionsOf(*record->b)});
   }
@@ -472,13 +497,13 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
                           threads);
     });
     if (pair.predicate) {
-      if (!same || !same->predicate)
+      if (!same || !same->filters.predicate)
         throw Error(ErrorCode::NotAvailable,
                     name + " has no contact predicates: " + nameOf(*record.a, *record.b) +
                         " must have the one that it had",
                     record.pair.a);
       checked([&] {
-        restored.setPredicate(geometries, record.pair.a, record.pair.b, same->predicate);
+        restored.setPredicate(geometries, record.pair.a, record.pair.b, same->filters.predicate);
       });
     }
     states.push_back({revisionsOf(a), revisionsOf(b)});
@@ -505,10 +530,10 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
   geometries.restore(all, lastId, stepNumber);
   if (pool) latestSnapshot.setPool(std::move(pool));
   for (const auto& record : pairs.records()) {
-    planWithoutMotion(*record);
-    const CollisionData& data = record->data;
-    record->statistics.contacts = data.validity().atImpact + data.validity().atEnd;
-    next.contacts += record->statistics.contacts;
+    record->ask(planWithoutMotion(*record));
+    const CollisionData& data = record->last.data;
+    record->found.statistics.contacts = data.validity().atImpact + data.validity().atEnd;
+    next.contacts += record->found.statistics.contacts;
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
   freeMotions.known().swap(known);

@@ -29,7 +29,8 @@ PairSettings settingsOf(const PairRecord& guarded) {
 }
 
 /// Brings pairs up to date with those of the table.
-void updatePairs(const PairTable& table, const GuardSettings& settings, GuardedPairs& pairs) {
+void updatePairs(const PairTable& table, const GuardSettings& settings,
+                 std::vector<std::unique_ptr<SeparateSearch>>& pairs) {
   std::size_t count = 0;
   for (const auto& record : table.records()) {
     if (settings.isLeftOut(record->pair.a, record->pair.b)) continue;
@@ -40,18 +41,9 @@ void updatePairs(const PairTable& table, const GuardSettings& settings, GuardedP
                         nameOf(*geometry) + ", which is a distance field; leave the pair out",
                     geometry->body.id);
     if (count == pairs.size()) pairs.emplace_back();
-    std::unique_ptr<PairRecord>& own = pairs[count++];
-    if (!own || own->guarded != record.get() || own->a != record->a || own->b != record->b) {
-      own = std::make_unique<PairRecord>();
-      own->guarded = record.get();
-      own->a = record->a;
-      own->b = record->b;
-    }
-    own->pair = {record->pair.a, record->pair.b, settingsOf(*record)};
-    own->support = supportOf(Method::Continuous, own->a->body.mesh.topology.type,
-                             own->b->body.mesh.topology.type, own->a == own->b);
-    PALPATE_ASSERT(own->support);
-    own->settingsRevision = record->settingsRevision;
+    std::unique_ptr<SeparateSearch>& own = pairs[count++];
+    if (!own) own = std::make_unique<SeparateSearch>();
+    own->set(*record, settingsOf(*record), true);
   }
   pairs.resize(count);
 }
@@ -61,7 +53,7 @@ void updatePairs(const PairTable& table, const GuardSettings& settings, GuardedP
 struct StepGuard::Implementation {
   std::shared_ptr<StepSource> source;
   GuardSettings settings;
-  GuardedPairs pairs;
+  std::vector<std::unique_ptr<SeparateSearch>> pairs;
   GuardedParts parts;
   GuardedFractions fractions;
   std::vector<HeldVertex> held;

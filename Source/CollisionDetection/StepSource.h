@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/GeometryTable.h"
 #include "CollisionDetection/PairTable.h"
+#include "CollisionDetection/SeparateSearch.h"
 #include "Core/Threads.h"
 
 #include <functional>
@@ -10,9 +11,6 @@
 #include <vector>
 
 namespace palpate {
-
-/// Pairs of a StepGuard, in the order of the table's pairs that they guard.
-using GuardedPairs = std::vector<std::unique_ptr<PairRecord>>;
 
 /// The step of an OctreeBasedCD, for a StepGuard that may outlive it. Every function throws
 /// InvalidCall once it was destroyed.
@@ -25,9 +23,9 @@ class StepSource {
   virtual GeometryTable& geometries() const = 0;
   virtual const PairTable& pairs() const = 0;
   virtual const Threads& threads() const = 0;
-  /// Within change(): writes the contacts of these pairs to their records. Pairs for which nothing
-  /// changed keep them.
-  virtual void detect(const GuardedPairs&) = 0;
+  /// Within change(): writes the contacts of these searches. Those for which nothing changed keep
+  /// them.
+  virtual void detect(SeparateSearches) = 0;
 };
 
 }  // namespace palpate

@@ -3,7 +3,7 @@
 #include <palpate/Capture.h>
 
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
 #include "Diagnostics/DistinctImpacts.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Order.h"
@@ -64,10 +64,10 @@ int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
 /// the answer lists.
 class Coverage {
  public:
-  Coverage(const PairRecord& record, const FeatureLists& sample)
-      : m_record(record),
+  Coverage(const Question& question, const FeatureLists& sample)
+      : m_question(question),
         m_sample(sample),
-        m_byTriangles(record.plan.method == Method::Intersection) {
+        m_byTriangles(question.plan.method == Method::Intersection) {
     PALPATE_ASSERT(std::is_sorted(sample.verticesOfA.begin(), sample.verticesOfA.end()));
     PALPATE_ASSERT(std::is_sorted(sample.verticesOfB.begin(), sample.verticesOfB.end()));
     PALPATE_ASSERT(std::is_sorted(sample.edgesOfA.begin(), sample.edgesOfA.end()));
@@ -88,7 +88,7 @@ class Coverage {
   }
   /// Vertices and edges are covered by the element that owns them.
   bool coversShape(const ShapeContact& c) const {
-    const MeshTopology& mesh = m_record.mesh().body.mesh.topology;
+    const MeshTopology& mesh = m_question.mesh().mesh.topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
     const std::uint32_t edge = isVertex ? 0 : mesh.edgeOf({c.vertices[0], c.vertices[1]});
@@ -97,18 +97,17 @@ class Coverage {
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
   bool coversTriangles(const ElementPair& pair) const {
-    return holds(m_sample.trianglesOfA,
-                 m_record.a == m_record.b ? std::min(pair.a, pair.b) : pair.a);
+    return holds(m_sample.trianglesOfA, m_question.self() ? std::min(pair.a, pair.b) : pair.a);
   }
 
  private:
-  const MeshTopology& ofA() const { return m_record.a->body.mesh.topology; }
-  const MeshTopology& ofB() const { return m_record.b->body.mesh.topology; }
+  const MeshTopology& ofA() const { return m_question.a.mesh.topology; }
+  const MeshTopology& ofB() const { return m_question.b.mesh.topology; }
   static bool holds(const std::vector<std::uint32_t>& list, std::uint32_t id) {
     return std::binary_search(list.begin(), list.end(), id);
   }
 
-  const PairRecord& m_record;
+  const Question& m_question;
   const FeatureLists& m_sample;
   bool m_byTriangles;
 };
@@ -196,9 +195,9 @@ void compare(CountedVector<Contact> expected, std::span<const Contact> allFound,
 
 }  // namespace
 
-FeatureLists drawFeatures(const PairRecord& record, const AuditSettings& settings,
+FeatureLists drawFeatures(const Question& question, const AuditSettings& settings,
                           std::uint64_t frame) {
-  FeatureLists features = everyFeature(record);
+  FeatureLists features = everyFeature(question);
   const std::initializer_list<std::vector<std::uint32_t>*> lists{
       &features.verticesOfA, &features.verticesOfB, &features.edgesOfA, &features.trianglesOfA};
   std::uint64_t size = 0;
@@ -206,8 +205,8 @@ FeatureLists drawFeatures(const PairRecord& record, const AuditSettings& setting
   const auto count = static_cast<std::uint64_t>(settings.features);
   if (count >= size) return features;
 
-  const auto a = static_cast<std::uint32_t>(record.pair.a),
-             b = static_cast<std::uint32_t>(record.pair.b);
+  const auto a = static_cast<std::uint32_t>(question.pair.a),
+             b = static_cast<std::uint32_t>(question.pair.b);
   std::seed_seq seed{low(settings.seed), high(settings.seed), low(frame), high(frame), a, b};
   std::mt19937_64 random(seed);
   const std::vector<std::uint64_t> drawn = drawNumbers(count, size, random);
@@ -224,17 +223,16 @@ FeatureLists drawFeatures(const PairRecord& record, const AuditSettings& setting
   return features;
 }
 
-void audit(const PairRecord& record, const CollisionData& data, const AuditSettings& settings,
-           std::uint64_t frame, std::vector<AuditFailure>& out) {
-  if (record.sides && record.sides->changesContacts()) return;
+void audit(const Question& question, bool sidesAreKnown, const CollisionData& data,
+           const AuditSettings& settings, std::uint64_t frame, std::vector<AuditFailure>& out) {
   ContactBuffers contacts, pierced;
-  const MeshPair meshes = record.meshes();
-  const CollisionPair& pair = record.pair;
-  const FeatureLists sample = drawFeatures(record, settings, frame);
-  const Coverage coverage(record, sample);
+  const MeshPair meshes = question.meshes();
+  const CollisionPair& pair = question.pair;
+  const FeatureLists sample = drawFeatures(question, settings, frame);
+  const Coverage coverage(question, sample);
   // Any contact with a shape may stand for one of the sample.
-  const bool needsAll = record.plan.kind == PairKind::MeshAndShape && meshes.reportsDistinct();
-  findContactsByBruteForce(record, needsAll ? everyFeature(record) : sample, contacts);
+  const bool needsAll = question.plan.kind == PairKind::MeshAndShape && meshes.reportsDistinct();
+  findContactsByBruteForce(question, needsAll ? everyFeature(question) : sample, contacts);
   if (meshes.settings.method == Method::Intersection)
     addListed(meshes, coverage, data, contacts, pierced);
   ContactBuffers* const buffers[] = {&contacts, &pierced};
@@ -256,9 +254,8 @@ void audit(const PairRecord& record, const CollisionData& data, const AuditSetti
     return c && known.mayDrop(*c);
   };
   const auto reporterFor = [&](List list) {
-    return [=, &record, &pair, &out](Fault fault, const Any& e, const Any& f) {
-      if (isAuto &&
-          (fault != Fault::FalseNegative || (record.sidesAreKnown && mayBeDropped(e, list))))
+    return [=, &pair, &out](Fault fault, const Any& e, const Any& f) {
+      if (isAuto && (fault != Fault::FalseNegative || (sidesAreKnown && mayBeDropped(e, list))))
         return;
       out.push_back({pair.a, pair.b, frame, fault, list, e, f, {}, {}});
     };
@@ -274,7 +271,7 @@ void audit(const PairRecord& record, const CollisionData& data, const AuditSetti
   dropRepeatedImpacts(meshes, data, expected);
   if (needsAll) {
     DistinctContacts distinct;
-    keepDistinct(record, distinct, expected.shape);
+    keepDistinct(question, distinct, expected.shape);
     std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
   }
   const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
@@ -340,14 +337,17 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
   ++record.frame;
   if (settings.audit.features == 0) return;
   for (const auto& pair : pairs.records()) {
+    const PairKind kind = pair->question->plan.kind;
     // Brute force over features does not reproduce proxies, whose contacts have an error, nor
     // what bodies tell about contacts.
     // The answer of an unfinished pair is of an earlier state.
-    if (!pair->collides() || pair->isUnfinished || pair->byBodies ||
-        pair->plan.kind == PairKind::Proxy || pair->plan.kind == PairKind::AttachedProxy)
+    if (!pair->collides() || pair->memory.urgency.isUnfinished || pair->found.byBodies ||
+        kind == PairKind::Proxy || kind == PairKind::AttachedProxy ||
+        pair->memory.sides.changesContacts())
       continue;
     const std::size_t first = failures.size();
-    audit(*pair, pair->data, settings.audit, record.frame, failures);
+    audit(*pair->question, pair->found.sidesAreKnown, pair->last.data, settings.audit, record.frame,
+          failures);
     const auto own = std::span(failures).subspan(first);
     if (own.empty() || settings.audit.folder.empty()) continue;
     if (record.files < settings.audit.maxFiles) {

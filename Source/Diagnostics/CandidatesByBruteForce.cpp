@@ -1,5 +1,5 @@
 // Part of CollisionDetection/DiagnosticsInterface.h: candidates.
-#include "CollisionDetection/DiagnosticsInterface.h"
+#include "Search/BruteForce.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "Core/Assert.h"
 

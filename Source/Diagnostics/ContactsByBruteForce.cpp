@@ -1,6 +1,6 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 
-#include "CollisionDetection/ShapeWork.h"
+#include "Search/ShapeWork.h"
 #include "DistanceField/FieldContacts.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Filters.h"
@@ -348,10 +348,9 @@ FeatureLists everyElement(const MeshTopology& mesh) {
 
 }  // namespace
 
-FeatureLists everyFeature(const PairRecord& record) {
-  return record.a->body.shape || record.b->body.shape || record.usesField()
-             ? everyElement(record.mesh().body.mesh.topology)
-             : everyFeature(record.meshes());
+FeatureLists everyFeature(const Question& question) {
+  return question.hasShape() || question.usesField() ? everyElement(question.mesh().mesh.topology)
+                                                     : everyFeature(question.meshes());
 }
 
 FeatureLists everyFeature(const MeshPair& pair) {
@@ -379,14 +378,13 @@ void findContactsByBruteForce(const MeshPair& pair, const FeatureLists& features
   if (method == Method::Auto) findFastImpacts(pair, features, out);
 }
 
-void findContactsByBruteForce(const PairRecord& record, const FeatureLists& features,
+void findContactsByBruteForce(const Question& question, const FeatureLists& features,
                               ContactBuffers& out) {
-  PALPATE_ASSERT(record.plan.kind != PairKind::Proxy);
-  const MeshPair meshes = record.meshes();
-  if (record.a->body.shape || record.b->body.shape)
-    return findWithShape(record, features.trianglesOfA, out.shapes);
-  if (record.usesField())
-    return FieldContacts::findByBruteForce(record.mesh().body.mesh, record.placedField(),
+  PALPATE_ASSERT(question.plan.kind != PairKind::Proxy);
+  const MeshPair meshes = question.meshes();
+  if (question.hasShape()) return findWithShape(question, features.trianglesOfA, out.shapes);
+  if (question.usesField())
+    return FieldContacts::findByBruteForce(question.mesh().mesh, question.placedField(),
                                            meshes.settings.contacts, meshes.thicknessAtEnd(),
                                            features.trianglesOfA, out.shapes);
   findContactsByBruteForce(meshes, features, out);

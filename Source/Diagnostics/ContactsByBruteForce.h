@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/PairTable.h"
+#include "Search/Question.h"
 #include "NarrowPhase/NarrowPhase.h"
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct FeatureLists {
 
 /// All features that the pair's method tests, without vertices that are in no element.
 FeatureLists everyFeature(const MeshPair&);
-FeatureLists everyFeature(const PairRecord&);
+FeatureLists everyFeature(const Question&);
 
 /// The reference: tests vertices against every element and edges against every edge, without
 /// candidate pairs and without owners. With everyFeature() the contacts equal those of
@@ -28,6 +28,6 @@ inline void findContactsByBruteForce(const MeshPair& pair, ContactBuffers& out) 
   findContactsByBruteForce(pair, everyFeature(pair), out);
 }
 /// The same for a pair with a shape or a field, or for two meshes.
-void findContactsByBruteForce(const PairRecord&, const FeatureLists&, ContactBuffers& out);
+void findContactsByBruteForce(const Question&, const FeatureLists&, ContactBuffers& out);
 
 }  // namespace palpate

@@ -1,6 +1,6 @@
-// Part of CollisionDetection/DiagnosticsInterface.h: contacts of a pair.
+// Part of Search/BruteForce.h: contacts of a pair.
 #include "Diagnostics/ContactsByBruteForce.h"
-#include "CollisionDetection/DiagnosticsInterface.h"
+#include "Search/BruteForce.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
 #include "Core/Assert.h"
@@ -9,10 +9,10 @@
 
 namespace palpate {
 
-void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
+void detectPairByBruteForce(const Question& question, ContactBuffers& contacts,
                             ContactBuffers& intersections) {
-  MeshPair meshes = record.meshes();
-  findContactsByBruteForce(record, everyFeature(record), contacts);
+  MeshPair meshes = question.meshes();
+  findContactsByBruteForce(question, everyFeature(question), contacts);
   const auto countA = static_cast<std::uint32_t>(meshes.a.topology.elements.size()),
              countB = static_cast<std::uint32_t>(meshes.b.topology.elements.size());
   const auto forEachPair = [&](auto&& f) {
@@ -25,22 +25,22 @@ void detectPairByBruteForce(const PairRecord& record, ContactBuffers& contacts,
       contacts.facts.atStart =
           std::max(contacts.facts.atStart, meetingOf(meshes, true, pair, intersections));
     });
-  if (!record.plan.runsIntersection ||
-      !(contacts.facts.startsPiercing() || record.plan.startsIntersecting))
+  if (!question.plan.runsIntersection ||
+      !(contacts.facts.startsPiercing() || question.plan.startsIntersecting))
     return;
   if (meshes.step.motion > 0.0)
     forEachPair([&](const ElementPair& pair) { addCrossingsAtStart(meshes, pair, intersections); });
-  PALPATE_ASSERT(record.plan.kind == PairKind::Meshes);
+  PALPATE_ASSERT(question.plan.kind == PairKind::Meshes);
   meshes.settings.method = Method::Intersection;
   findContactsByBruteForce(meshes, intersections);
 }
 
-void detectVerticesByBruteForce(const PairRecord& record, std::span<const std::uint32_t> vertices,
+void detectVerticesByBruteForce(const Question& question, std::span<const std::uint32_t> vertices,
                                 ContactBuffers& contacts) {
   PALPATE_ASSERT(std::is_sorted(vertices.begin(), vertices.end()));
   FeatureLists features;
   features.verticesOfA.assign(vertices.begin(), vertices.end());
-  findContactsByBruteForce(record, features, contacts);
+  findContactsByBruteForce(question, features, contacts);
 }
 
 }  // namespace palpate

@@ -1,7 +1,7 @@
 #include "Diagnostics/DistinctImpacts.h"
 
-#include "CollisionDetection/ExcludedImpacts.h"
-#include "CollisionDetection/FirstImpacts.h"
+#include "Search/ExcludedImpacts.h"
+#include "Search/FirstImpacts.h"
 #include "NarrowPhase/Continuous.h"
 
 #include <algorithm>

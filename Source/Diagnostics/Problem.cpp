@@ -64,12 +64,12 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
     problem.geometries.push_back(meshOf(*geometry));
   }
   for (const auto& record : pairs.records()) {
-    problem.pairs.push_back(
-        {indices.at(record->a), indices.at(record->b), record->pair.settings,
-         record->plan.kind == PairKind::AttachedProxy ? Method::Proxy : record->plan.method,
-         static_cast<bool>(record->predicate)});
-    if (record->sides)
-      problem.pairs.back().sides = record->sides->list(record->meshes(), geometries.stepNumber());
+    const PairPlan& plan = record->question->plan;
+    problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
+                             plan.kind == PairKind::AttachedProxy ? Method::Proxy : plan.method,
+                             static_cast<bool>(record->filters.predicate)});
+    if (const auto& sides = record->memory.sides.sides)
+      problem.pairs.back().sides = sides->list(record->meshes(), geometries.stepNumber());
     if (record->pair.settings.restDistance > 0.0)
       copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,
                               record->a->body.mesh.rest);

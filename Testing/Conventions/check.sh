@@ -36,8 +36,9 @@ allowedIn() {
     Simplify) echo "Simplify/ Queries/ Bodies/ Octree/ Mesh/ Math/ Exact/ Core/" ;;
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     Tracking) echo "Tracking/ NarrowPhase/ Mesh/ Math/ Exact/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    Search) echo "Search/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
     Vtk | Fcl | Python | C | iMSTK) echo "$1/" ;;
   esac

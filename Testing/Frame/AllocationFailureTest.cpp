@@ -579,7 +579,7 @@ TEST(AllocationFailureOfDetections, LeavesEveryAnswer) {
         before = failures;
         EXPECT_EQ(run(n, budget, inNextStep), truth) << n;
       }
-      EXPECT_GT(failures, 2u);
+      EXPECT_GE(failures, 2u);
     }
 }
 

@@ -625,7 +625,8 @@ TEST(Deadline, KeptCandidates) {
       const std::int64_t before = clock.looks();
       const bool isStopped = !found.detectCollision(microseconds(i / 8));
       stopped += isStopped;
-      stoppedWhileKept += isStopped && implementationOf(found).pairs.records()[0]->keeps;
+      stoppedWhileKept +=
+          isStopped && implementationOf(found).pairs.records()[0]->memory.kept.answers();
       most = std::max(most, clock.looks() - before);
     }
     found.detectCollision();
@@ -669,7 +670,7 @@ TEST(Deadline, OverlappingBodies) {
       found.detectCollision(microseconds::max());
       all = clock.looks() - last;
       EXPECT_EQ(answersOf(found), complete);
-      deep += implementationOf(found).pairs.records()[0]->byBodies;
+      deep += implementationOf(found).pairs.records()[0]->found.byBodies;
       ++stops;
       budget += 1 + all / 200 * kShareOfCases;
       if (HasFailure()) return;

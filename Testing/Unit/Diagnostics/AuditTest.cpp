@@ -2,6 +2,7 @@
 
 #include <palpate/OctreeBasedCD.h>
 
+#include "CollisionDetection/PairTable.h"
 #include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
@@ -45,8 +46,10 @@ struct AuditedPair {
     record.pair = pair;
     record.a = &a;
     record.b = pair.a == pair.b ? &a : &b;
-    record.plan.kind = kind;
-    record.plan.method = pair.settings.method;
+    PairPlan plan;
+    plan.kind = kind;
+    plan.method = pair.settings.method;
+    record.ask(plan);
   }
   std::vector<AuditFailure> failures(const CollisionData::Contents& contents,
                                      const AuditSettings& settings = kEverything,
@@ -54,7 +57,7 @@ struct AuditedPair {
     std::vector<AuditFailure> out;
     CollisionData data;
     CollisionData::Contents::of(data) = contents;
-    audit(record, data, settings, frame, out);
+    audit(*record.question, record.found.sidesAreKnown, data, settings, frame, out);
     return out;
   }
 };
@@ -287,7 +290,7 @@ TEST(Audit, ComparesWithAutoWhatKnownSidesDoNotConcern) {
   PairRecord& record = scene.audited.record;
   record.pair.settings.method = Method::Auto;
   const auto missing = [&](bool sidesAreKnown) {
-    record.sidesAreKnown = sidesAreKnown;
+    record.found.sidesAreKnown = sidesAreKnown;
     return scene.failures({});
   };
   const auto intersecting = intersectingVertices(scene);
@@ -323,7 +326,7 @@ std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
 
 TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
   forEachScene([&](Scene& scene) {
-    const FeatureLists every = everyFeature(scene.audited.record);
+    const FeatureLists every = everyFeature(*scene.audited.record.question);
     std::size_t all = 0;
     for (const std::size_t size : sizesOf(every)) all += size;
     const auto listsOf = [](const FeatureLists& lists) {
@@ -335,7 +338,7 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
     for (const int features : {1, 2, 7, most / 2, most - 1, most, most + 1}) {
       for (std::uint64_t frame = 1; frame <= 50; ++frame) {
         const AuditSettings settings{.features = features, .seed = 9};
-        const FeatureLists drawn = drawFeatures(scene.audited.record, settings, frame);
+        const FeatureLists drawn = drawFeatures(*scene.audited.record.question, settings, frame);
         std::size_t total = 0;
         for (std::size_t list = 0; list < 4; ++list) {
           const std::vector<std::uint32_t> ids = listsOf(drawn)[list];
@@ -347,7 +350,8 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
           if (features == most / 2) times[list].insert(ids.begin(), ids.end());
         }
         EXPECT_EQ(total, std::min<std::size_t>(all, static_cast<std::size_t>(features)));
-        EXPECT_EQ(listsOf(drawn), listsOf(drawFeatures(scene.audited.record, settings, frame)));
+        EXPECT_EQ(listsOf(drawn),
+                  listsOf(drawFeatures(*scene.audited.record.question, settings, frame)));
       }
     }
     // A sample is half of all, in each of 50 frames: 25 times each on average. 8 is more than 4
@@ -357,7 +361,8 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
 
     const auto draw = [&](std::uint64_t seed, std::uint64_t frame, std::uint32_t b) {
       scene.audited.record.pair.b = GeometryId{b};
-      return listsOf(drawFeatures(scene.audited.record, {.features = 8, .seed = seed}, frame));
+      return listsOf(
+          drawFeatures(*scene.audited.record.question, {.features = 8, .seed = seed}, frame));
     };
     EXPECT_NE(draw(1, 1, 1), draw(2, 1, 1));
     EXPECT_NE(draw(1, 1, 1), draw(std::uint64_t{1} << 32, 1, 1));

@@ -106,11 +106,8 @@ TEST_F(TraceFile, HasTheLastFramesWithNestedEvents) {
       ASSERT_EQ(names.size(), 4u);
       EXPECT_EQ(names.begin()->first, 3u);
       EXPECT_EQ(names.rbegin()->first, 6u);
-      std::set<std::string> expected{"detectCollision", "update", "octree", "audit"};
-      if (engine == Engine::Octree)
-        expected.insert({"start", "round", "job", "join"});
-      else
-        expected.insert("brute force");
+      const std::set<std::string> expected{"detectCollision", "update", "octree", "audit",
+                                           "start",           "round",  "job",    "join"};
       for (const auto& [frame, found] : names) EXPECT_EQ(found, expected) << frame;
       EXPECT_LE(byThread.size(), static_cast<std::size_t>(threads));
       for (auto& [thread, own] : byThread) {

@@ -1,6 +1,6 @@
-#include "CollisionDetection/FirstImpacts.h"
+#include "Search/FirstImpacts.h"
 
-#include "CollisionDetection/ExcludedImpacts.h"
+#include "Search/ExcludedImpacts.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Proximity.h"
 #include "Math/ClosestPoint.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/PairTable.h"
+#include "Search/Question.h"
 #include "Queries/BodyPenetration.h"
 #include "NarrowPhase/NarrowPhase.h"
 
@@ -28,7 +28,7 @@ class BodyContacts {
   /// local  the contacts of Intersection at the end, with the triangles that intersect
   /// step   the other contacts
   /// Cost   of bodies that are deep in each other: that of penetrationOf(), on one thread
-  bool find(const PairRecord&, Engine, bool startsIntersecting, Buffers local, Buffers step);
+  bool find(const Question&, Engine, bool startsIntersecting, Buffers local, Buffers step);
   ContactBuffers& contacts() { return m_contacts; }
   /// Of the last find(): the number of decisions by exact arithmetic.
   std::size_t exactDecisions() const { return m_scratch.pair.stack.exactDecisions; }

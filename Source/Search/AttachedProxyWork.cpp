@@ -1,7 +1,7 @@
-#include "CollisionDetection/AttachedProxyWork.h"
+#include "Search/AttachedProxyWork.h"
 
-#include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/PairResults.h"
+#include "Search/BruteForce.h"
+#include "Search/PairResults.h"
 #include "Queries/ElementsNearShape.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
@@ -51,29 +51,24 @@ void describeAsShape(const TriangleMesh& points, CollisionData::Contents& conten
 
 }  // namespace
 
-std::size_t AttachedProxyWork::place(bool divides) {
-  const PairPlan& plan = m_record->plan;
+std::size_t AttachedProxyWork::start(const FrameStart& frame) {
+  const Question& question = *m_search.question;
+  const PairPlan& plan = question.plan;
   std::optional<ProxyStep> step;
   if (plan.motion > 0.0)
-    step = {m_record->b->motion.range(), m_record->pair.settings.thickness, plan.motionTolerance};
-  return m_proxyJobs.start(*m_record, m_record->b->proxy.get(), plan.proxyThickness, divides, step);
+    step = {question.bInStep.range, question.settings().thickness, plan.motionTolerance};
+  return m_proxyJobs.start(question, plan.proxyThickness, frame, step);
 }
-
-std::size_t AttachedProxyWork::start(const FrameStart&) { return place(isTimed()); }
 
 void AttachedProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
   const AddedTime time(scratch.narrowMilliseconds);
   m_proxyJobs.find(job, scratch);
   writeHits(scratch);
-  findOthers(scratch);
-}
-
-void AttachedProxyWork::runByBruteForce(JobScratch& scratch) {
-  place(false);
-  m_proxyJobs.findByBruteForce(scratch);
-  writeHits(scratch);
-  detectVerticesByBruteForce(*m_record, scratch.hits.others, scratch.contacts);
+  if (m_proxyJobs.isByBruteForce())
+    detectVerticesByBruteForce(*m_search.question, scratch.hits.others, scratch.contacts);
+  else
+    findOthers(scratch);
 }
 
 void AttachedProxyWork::writeHits(JobScratch& scratch) const {
@@ -84,19 +79,19 @@ void AttachedProxyWork::writeHits(JobScratch& scratch) const {
 }
 
 void AttachedProxyWork::findOthers(JobScratch& scratch) const {
-  const TriangleMesh& points = m_record->a->body.mesh;
-  const MeshPair meshes = m_record->meshes();
-  const bool swept = m_record->plan.swept();
+  const Question& question = *m_search.question;
+  const TriangleMesh& points = question.a.mesh;
+  const MeshPair meshes = question.meshes();
+  const bool swept = question.plan.swept();
   const auto isDisabled = [&](const ElementPair& p) {
-    return !m_record->b->body.mesh.topology.isEnabled(p.b);
+    return !question.b.mesh.topology.isEnabled(p.b);
   };
   for (const std::uint32_t point : scratch.hits.others) {
     checkTime();
     Eigen::AlignedBox3d box(points.now[point]);
     if (swept) box.extend(points.before[point]);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(meshes.maxFeatureDistance());
-    findElementsNear(m_record->b->body, {box.min() - margin, box.max() + margin}, swept,
-                     scratch.elements);
+    findElementsNear(question.b, {box.min() - margin, box.max() + margin}, swept, scratch.elements);
     scratch.kept.clear();
     for (const std::uint32_t element : scratch.elements) scratch.kept.push_back({point, element});
     std::erase_if(scratch.kept, isDisabled);
@@ -105,20 +100,20 @@ void AttachedProxyWork::findOthers(JobScratch& scratch) const {
 }
 
 void AttachedProxyWork::join(Jobs jobs, const FrameJoin& join) const {
-  PairRecord& record = *m_record;
+  const Question& question = *m_search.question;
   PairResults& results = join.results;
-  const bool continuous = record.plan.method == Method::Continuous;
+  const bool continuous = question.plan.method == Method::Continuous;
   results.start(jobs);
   for (const ContactBuffers* found : results.found()) results.facts().add(found->facts);
-  results.sortFacts(record);
-  results.order(record);
-  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+  results.sortFacts(question);
+  results.order(m_search);
+  CollisionData::Contents& contents = m_search.answer->contents();
   describeExact(contents);
   m_proxyJobs.describe(jobs, contents);
-  results.assess(record, false, join.statistics);
-  if (continuous) results.keepFirstImpacts(record, std::numeric_limits<double>::infinity());
+  results.assess(m_search, false, join.statistics);
+  if (continuous) results.keepFirstImpacts(m_search, std::numeric_limits<double>::infinity());
   countContacts(continuous ? contents.vertexTriangle.size() : 0, contents);
-  describeAsShape(record.a->body.mesh, contents);
+  describeAsShape(question.a.mesh, contents);
   contents.step.endRows.clear();
 }
 

@@ -1,4 +1,4 @@
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
 
 #include "Core/Assert.h"
 
@@ -36,52 +36,52 @@ void PairResults::start(Jobs jobs) {
   }
 }
 
-void PairResults::sortFacts(const PairRecord& record) {
-  const TriangleMesh &a = record.a->body.mesh, &b = record.b->body.mesh;
+void PairResults::sortFacts(const Question& question) {
+  const TriangleMesh &a = question.a.mesh, &b = question.b.mesh;
   sortUnique(m_facts.verticesA, a.now.size(), m_flags);
   sortUnique(m_facts.verticesB, b.now.size(), m_flags);
   sortUnique(m_facts.degenerateA, a.topology.elements.size(), m_flags);
   sortUnique(m_facts.degenerateB, b.topology.elements.size(), m_flags);
 }
 
-std::size_t PairResults::order(PairRecord& record, std::size_t preferred) {
+std::size_t PairResults::order(const Search& search, std::size_t preferred) {
   PALPATE_ASSERT(preferred <= m_found.size());
-  return orderContacts(m_found, preferred, m_orderScratch,
-                       CollisionData::Contents::of(record.next));
+  return orderContacts(m_found, preferred, m_orderScratch, search.answer->contents());
 }
 
-void PairResults::assess(PairRecord& record, bool nearby, FrameStatistics& statistics) {
-  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+void PairResults::assess(const Search& search, bool nearby, FrameStatistics& statistics) {
+  const Question& question = *search.question;
+  CollisionData::Contents& contents = search.answer->contents();
   PALPATE_ASSERT(std::is_sorted(m_facts.verticesA.begin(), m_facts.verticesA.end()));
-  contents.earliestTimeOfImpact = record.earliest.load();
+  contents.earliestTimeOfImpact = search.answer->earliest.load();
   if (contents.earliestTimeOfImpact <= 1.0) m_facts.clearance = 0.0;
-  if (!record.guarded)
-    record.trust.finish(record.pair.settings, record.a->inStep(), record.b->inStep(), record.plan,
-                        m_facts, nearby, record.meshes(), contents, impacts);
+  if (search.trust)
+    search.trust->finish(question.settings(), question.aInStep, question.bInStep, question.plan,
+                         m_facts, nearby, question.meshes(), contents, impacts);
   statistics.exactDecisions += impacts.exactDecisions;
   statistics.validityPairs += impacts.validityPairs;
 }
 
-void PairResults::keepFirstImpacts(PairRecord& record, double end) {
-  const MeshPair pair = record.meshes();
+void PairResults::keepFirstImpacts(const Search& search, double end) {
+  const MeshPair pair = search.question->meshes();
   if (!pair.reportsDistinct()) return;
-  m_firstImpacts.keep(pair, end, m_orderScratch, CollisionData::Contents::of(record.next));
+  m_firstImpacts.keep(pair, end, m_orderScratch, search.answer->contents());
 }
 
-void keepDistinct(const PairRecord& record, DistinctContacts& distinct,
+void keepDistinct(const Question& question, DistinctContacts& distinct,
                   CountedVector<ShapeContact>& contacts) {
-  PALPATE_ASSERT(record.plan.kind == PairKind::MeshAndShape);
-  const Body& shape = record.shape().body;
-  contacts.resize(distinct.keep(record.mesh().body.mesh, shape.shape->now,
+  PALPATE_ASSERT(question.plan.kind == PairKind::MeshAndShape);
+  const Body& shape = question.shape();
+  contacts.resize(distinct.keep(question.mesh().mesh, shape.shape->now,
                                 shape.mesh.before.transform(), shape.mesh.now.transform(),
-                                record.meshes().settings, contacts));
+                                question.meshes().settings, contacts));
 }
 
-void takeEarliest(PairRecord& record, ContactBuffers& contacts) {
-  PALPATE_ASSERT(record.pair.settings.continuous.earliestTimeOnly);
+void takeEarliest(const Search& search, ContactBuffers& contacts) {
+  PALPATE_ASSERT(search.question->settings().continuous.earliestTimeOnly);
+  std::atomic<double>& earliest = search.answer->earliest;
   const auto take = [&](auto& list, int = 0) {
-    for (const auto& contact : list)
-      record.earliest = std::min(record.earliest.load(), contact.timeOfImpact);
+    for (const auto& contact : list) earliest = std::min(earliest.load(), contact.timeOfImpact);
     list.clear();
   };
   forEachImpactList(contacts, take);

@@ -1,4 +1,4 @@
-#include "CollisionDetection/KeptPairs.h"
+#include "Search/KeptPairs.h"
 
 #include "Bodies/OctreeFrame.h"
 #include "Octree/BoxMap.h"

@@ -3,10 +3,10 @@
 #include <palpate/CollisionData.h>
 #include <palpate/FrameStatistics.h>
 
-#include "CollisionDetection/BodyContacts.h"
-#include "CollisionDetection/FirstImpacts.h"
-#include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/PairTable.h"
+#include "Search/BodyContacts.h"
+#include "Search/FirstImpacts.h"
+#include "Search/JobScratch.h"
+#include "Search/Question.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Order.h"
 #include "NarrowPhase/Piercing.h"
@@ -22,7 +22,7 @@
 namespace palpate {
 
 /// Contacts::Distinct for the contacts of a mesh and a shape.
-void keepDistinct(const PairRecord&, DistinctContacts&, CountedVector<ShapeContact>&);
+void keepDistinct(const Question&, DistinctContacts&, CountedVector<ShapeContact>&);
 
 /// From what the jobs of a pair found to the pair's results, in steps that the kinds of work share.
 /// Its scratch remembers its peak.
@@ -38,18 +38,17 @@ class PairResults {
   std::vector<ContactBuffers*>& intersections() { return m_intersections; }
 
   /// Sorts the ids of the facts, each once.
-  void sortFacts(const PairRecord&);
+  void sortFacts(const Question&);
   /// Writes found(), sorted by element ids. Returns the number of contacts from the first
   /// `preferred` buffers, which have precedence over others of the same elements.
-  std::size_t order(PairRecord&, std::size_t preferred = 0);
+  std::size_t order(const Search&, std::size_t preferred = 0);
   /// Writes Validity. nearby: as Trust::finish() has it. Writes no error bound.
-  void assess(PairRecord&, bool nearby, FrameStatistics&);
+  void assess(const Search&, bool nearby, FrameStatistics&);
   /// Contacts::Distinct for impacts before `end`.
-  void keepFirstImpacts(PairRecord&, double end);
+  void keepFirstImpacts(const Search&, double end);
   /// Contacts::Distinct for a shape.
-  void keepDistinct(PairRecord& record) {
-    palpate::keepDistinct(record, m_distinctContacts,
-                          CollisionData::Contents::of(record.next).shape);
+  void keepDistinct(const Search& search) {
+    palpate::keepDistinct(*search.question, m_distinctContacts, search.answer->contents().shape);
   }
 
   /// Of work on meshes.
@@ -70,8 +69,8 @@ class PairResults {
   Buffer<std::uint8_t> m_flags;
 };
 
-/// ContinuousSettings::earliestTimeOnly: replaces a pair's contacts by the earliest of their times.
-void takeEarliest(PairRecord&, ContactBuffers&);
+/// ContinuousSettings::earliestTimeOnly: replaces contacts by the earliest of their times.
+void takeEarliest(const Search&, ContactBuffers&);
 
 /// The error bound and the lists of Validity of an answer without an error.
 void describeExact(CollisionData::Contents&);

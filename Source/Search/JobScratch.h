@@ -54,6 +54,7 @@ using Jobs = std::span<const std::unique_ptr<JobScratch>>;
 /// What start() of a pair's work needs of the frame.
 struct FrameStart {
   const Threads& threads;
+  Engine engine;
   Buffer<NodePair>& nodePairs;  ///< of the traversals of all pairs
   TraversalStack& stack;
   /// Whether a pair has many jobs if it is large enough. Results do not depend on it.

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "CollisionDetection/JobScratch.h"
-#include "CollisionDetection/PairTable.h"
+#include "Search/JobScratch.h"
+#include "Search/Question.h"
 
 #include <cstddef>
 
@@ -12,16 +12,16 @@ namespace palpate {
 /// vertices.
 class FieldWork {
  public:
-  explicit FieldWork(PairRecord& record) : m_record(&record) {}
+  explicit FieldWork(const Search& search) : m_search(search) {}
 
   std::size_t start(const FrameStart&);
-  bool hasRound(int round, Jobs) const { return round < 3; }
+  bool hasRound(int round, Jobs) const { return round < (m_byBruteForce ? 1 : 3); }
   void run(int round, std::size_t job, JobScratch&) const;
-  void runByBruteForce(JobScratch&) const;
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  PairRecord* m_record;
+  Search m_search;
+  bool m_byBruteForce = false;
   std::size_t m_jobs = 0;
 };
 

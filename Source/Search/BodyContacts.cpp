@@ -1,4 +1,4 @@
-#include "CollisionDetection/BodyContacts.h"
+#include "Search/BodyContacts.h"
 
 #include "Queries/Containment.h"
 #include "Bodies/OctreeFrame.h"
@@ -18,14 +18,14 @@ using Eigen::Vector3d;
 namespace {
 
 /// Whether contacts of bodies may stand for those of a pair.
-bool mayBeBodies(const PairRecord& record) {
-  const PairSettings& settings = record.pair.settings;
-  if (settings.method != Method::Auto || settings.continuous.earliestTimeOnly ||
-      record.a == record.b || record.plan.kind != PairKind::Meshes || record.anyDisabled() ||
-      record.meshes().hasFilters())
+bool mayBeBodies(const Question& question) {
+  const PairSettings& settings = question.settings();
+  if (settings.method != Method::Auto || settings.continuous.earliestTimeOnly || question.self() ||
+      question.plan.kind != PairKind::Meshes || question.anyDisabled() ||
+      question.meshes().hasFilters())
     return false;
-  return record.a->body.mesh.topology.count() > 0 && record.b->body.mesh.topology.count() > 0 &&
-         hasClosedSurface(record.a->body) && hasClosedSurface(record.b->body);
+  return question.a.mesh.topology.count() > 0 && question.b.mesh.topology.count() > 0 &&
+         hasClosedSurface(question.a) && hasClosedSurface(question.b);
 }
 
 /// In the world; none if the body may be larger than its box.
@@ -166,14 +166,14 @@ bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buf
 
 }  // namespace
 
-bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsIntersecting,
+bool BodyContacts::find(const Question& question, Engine engine, bool startsIntersecting,
                         Buffers local, Buffers step) {
   PointQueryStack& stack = m_scratch.pair.stack;
   m_hasTurned = false;
   stack.exactDecisions = 0;
   m_contacts.clear();
-  if (!mayBeBodies(record)) return false;
-  const Body &a = record.a->body, &b = record.b->body;
+  if (!mayBeBodies(question)) return false;
+  const Body &a = question.a, &b = question.b;
   const bool meet = anyIntersecting(local);
   if (meet && agree(local)) return false;
   const bool overlapped =
@@ -183,7 +183,7 @@ bool BodyContacts::find(const PairRecord& record, Engine engine, bool startsInte
   if (!overlapped) return false;
   const BodyPair pair(a, b, engine, m_scratch.pair, kQuick.moved);
   const Penetration found = penetrationOf(pair, m_scratch, kQuick);
-  if (found.intersecting) addContacts(pair, found, record.pair.settings.thickness, local);
+  if (found.intersecting) addContacts(pair, found, question.settings().thickness, local);
   if (!found.intersecting && !meet) m_hasTurned = turnLeaving(a.mesh, b.mesh, step);
   return found.intersecting;
 }

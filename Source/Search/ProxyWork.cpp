@@ -1,6 +1,6 @@
-#include "CollisionDetection/ProxyWork.h"
+#include "Search/ProxyWork.h"
 
-#include "CollisionDetection/PairResults.h"
+#include "Search/PairResults.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopping.h"
@@ -8,12 +8,9 @@
 
 namespace palpate {
 
-std::size_t ProxyWork::place(bool divides) {
-  return m_proxyJobs.start(*m_record, m_record->proxy.get(), m_record->pair.settings.thickness,
-                           divides);
+std::size_t ProxyWork::start(const FrameStart& frame) {
+  return m_proxyJobs.start(*m_search.question, m_search.question->settings().thickness, frame);
 }
-
-std::size_t ProxyWork::start(const FrameStart&) { return place(isTimed()); }
 
 void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
@@ -21,17 +18,9 @@ void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
   m_proxyJobs.find(job, scratch);
 }
 
-void ProxyWork::runByBruteForce(JobScratch& scratch) {
-  place(false);
-  const MemoryScope memory(MemoryStage::NarrowPhase);
-  const AddedTime time(scratch.narrowMilliseconds);
-  m_proxyJobs.findByBruteForce(scratch);
-}
-
 void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
-  PairRecord& record = *m_record;
-  PALPATE_ASSERT(record.plan.kind == PairKind::Proxy);
-  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+  PALPATE_ASSERT(m_search.question->plan.kind == PairKind::Proxy);
+  CollisionData::Contents& contents = m_search.answer->contents();
   contents.vertexTriangle.clear();
   contents.triangleVertex.clear();
   contents.edgeEdge.clear();
@@ -48,7 +37,7 @@ void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   });
   m_proxyJobs.describe(jobs, contents);
   join.results.start(jobs);
-  join.results.assess(record, false, join.statistics);
+  join.results.assess(m_search, false, join.statistics);
   countContacts(0, contents);
 }
 

@@ -1,7 +1,6 @@
-#include "CollisionDetection/MeshWork.h"
+#include "Search/MeshWork.h"
 
-#include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/Planning.h"
+#include "Search/BruteForce.h"
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/ElementBoxes.h"
 #include "NarrowPhase/Intersection.h"
@@ -20,39 +19,29 @@ namespace palpate {
 
 namespace {
 
-/// Node pairs and jobs for each collision pair, where there is a deadline or more than one thread.
-constexpr std::size_t kNodePairsWanted = 256, kJobsPerPair = 32;
-/// Below this many elements, splitting a pair among threads costs more than it saves. With a
-/// deadline it is split into so many node pairs, as the search from each asks no deadline.
-constexpr std::size_t kSharedSize = 8192, kFewNodePairs = 8;
-
 /// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
 /// method reports nothing but touching features: Continuous, without a thickness.
-bool reportsOnlyTouching(const PairRecord& record) {
-  return record.a == record.b && record.plan.method == Method::Continuous &&
-         record.a->body.mesh.topology.hasFaces() && record.meshes().maxFeatureDistance() == 0.0;
+bool reportsOnlyTouching(const Question& question) {
+  return question.self() && question.plan.method == Method::Continuous &&
+         question.a.mesh.topology.hasFaces() && question.meshes().maxFeatureDistance() == 0.0;
 }
 
 /// L: by how much more than the thickness Continuous may report features (TimeOfImpactSettings).
 /// Their boxes in the world overlap at the thickness, but those in another frame may not.
-double approachSlack(const PairRecord& record, double thickness) {
-  if (!record.plan.swept()) return 0.0;
-  const double motion = record.plan.motion,
-               largestDifference = record.a->inStep().extent + record.b->inStep().extent + motion;
-  return record.pair.settings.continuous.timeTolerance * motion +
+double approachSlack(const Question& question, double thickness) {
+  if (!question.plan.swept()) return 0.0;
+  const double motion = question.plan.motion,
+               largestDifference = question.aInStep.extent + question.bInStep.extent + motion;
+  return question.settings().continuous.timeTolerance * motion +
          kApproachError * (largestDifference + 2.0 * thickness);
 }
 
-FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
-  FloatPair floats{record.a->body.tree.floats(),
-                   record.b->body.tree.floats(),
-                   nullptr,
-                   nullptr,
-                   trees.shiftLower,
-                   trees.shiftUpper};
-  if (record.plan.swept()) {
-    floats.beforeA = record.a->body.tree.floatsAtStart();
-    floats.beforeB = record.b->body.tree.floatsAtStart();
+FloatPair floatsOf(const Question& question, const TreePair& trees) {
+  FloatPair floats{question.a.tree.floats(), question.b.tree.floats(), nullptr, nullptr,
+                   trees.shiftLower,         trees.shiftUpper};
+  if (question.plan.swept()) {
+    floats.beforeA = question.a.tree.floatsAtStart();
+    floats.beforeB = question.b.tree.floatsAtStart();
   }
   return floats;
 }
@@ -60,39 +49,35 @@ FloatPair floatsOf(const PairRecord& record, const TreePair& trees) {
 }  // namespace
 
 std::size_t MeshWork::start(const FrameStart& frame) {
-  if (m_record->keeps) return startKept(frame);
+  m_byBruteForce = frame.engine == Engine::BruteForce;
+  if (m_byBruteForce) return 1;
+  const KeptSource& kept = m_search.kept;
+  if (kept.answers) return startKept(frame);
   m_searchJobs = startTraversal(frame, true, BoxFrame::Body);
-  return m_searchJobs + (m_record->gathers ? startGathering(frame) : 0);
+  if (!kept.lists || !question().hasElements()) return m_searchJobs;
+  return m_searchJobs + kept.lists->startGathering(question().a, question().b, kept.reach,
+                                                   kept.detections, jobsFor(frame));
 }
 
-static bool hasElements(const PairRecord& record) {
-  return record.a->body.tree.octree().size() > 0 && record.b->body.tree.octree().size() > 0;
+std::size_t MeshWork::jobsFor(const FrameStart& frame) {
+  return frame.divides() ? TraversalJobs::kJobsPerPair : 1;
 }
 
 std::size_t MeshWork::startKept(const FrameStart& frame) {
-  PairRecord& record = *m_record;
-  const Body &a = record.a->body, &b = record.b->body;
-  if (!hasElements(record)) return 0;
+  if (!question().hasElements()) return 0;
+  KeptPairs& lists = *m_search.kept.lists;
   const std::size_t jobs =
-      record.kept.start(a, b, reachOfKept(record), frame.divides() ? kJobsPerPair : 1);
-  m_thickness = record.meshes().maxFeatureDistance();
-  m_floats = record.kept.floats();
+      lists.start(question().a, question().b, m_search.kept.reach, jobsFor(frame));
+  m_thickness = question().meshes().maxFeatureDistance();
+  m_floats = lists.floats();
   return jobs;
 }
 
-std::size_t MeshWork::startGathering(const FrameStart& frame) {
-  PairRecord& record = *m_record;
-  if (!hasElements(record)) return 0;
-  const KeptPairs::Reach reach = reachOfKept(record);
-  return record.kept.startGathering(record.a->body, record.b->body, reach,
-                                    detectionsToGather(record, reach),
-                                    frame.divides() ? kJobsPerPair : 1);
-}
-
 void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
-  const MeshPair meshes = m_record->meshes(&m_floats);
+  KeptPairs& lists = *m_search.kept.lists;
+  const MeshPair meshes = question().meshes(&m_floats);
   scratch.near.clear();
-  m_record->kept.run(job, meshes, scratch, scratch.near);
+  lists.run(job, meshes, scratch, scratch.near);
   const MemoryScope memory(MemoryStage::NarrowPhase);
   const AddedTime time(scratch.narrowMilliseconds);
   const auto enabled = [&](std::span<const ElementPair> pairs, Buffer<ElementPair>& kept) {
@@ -102,14 +87,13 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
                   [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
     return std::span<const ElementPair>(kept);
   };
-  const bool anyDisabled = m_record->anyDisabled();
+  const bool anyDisabled = question().anyDisabled();
   // Those that meet at the step's start have boxes within the motion at its end, and are listed.
   if (meshes.step.checksStart)
-    m_record->kept.forEachList(
-        job, meshes.step.apartBelow, [&](std::span<const ElementPair> pairs) {
-          forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
-                      [&](const auto& part) { checkStart(meshes, part, scratch); });
-        });
+    lists.forEachList(job, meshes.step.apartBelow, [&](std::span<const ElementPair> pairs) {
+      forEachPart(anyDisabled ? enabled(pairs, scratch.kept) : pairs,
+                  [&](const auto& part) { checkStart(meshes, part, scratch); });
+    });
   if (anyDisabled) {
     enabled(scratch.near, scratch.kept);
     scratch.near.swap(scratch.kept);
@@ -124,52 +108,38 @@ std::size_t MeshWork::startCandidates(const FrameStart& frame) {
 
 std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs,
                                      BoxFrame boxFrame) {
-  PairRecord& record = *m_record;
-  GeometryOctree &ofA = record.a->body.tree, &ofB = record.b->body.tree;
-  const std::size_t elements = ofA.octree().size() + ofB.octree().size();
-  if (!hasElements(record)) return 0;
-  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(record)
-                                       ? ofA.findUnfoldedStars(record.a->body.mesh, frame.threads)
+  const Question& asked = question();
+  GeometryOctree &ofA = asked.a.tree, &ofB = asked.b.tree;
+  if (!asked.hasElements()) return 0;
+  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(asked)
+                                       ? ofA.findUnfoldedStars(asked.a.mesh, frame.threads)
                                        : nullptr;
   m_thickness =
-      record.plan.method == Method::Intersection ? 0.0 : record.meshes().maxFeatureDistance();
+      asked.plan.method == Method::Intersection ? 0.0 : asked.meshes().maxFeatureDistance();
   const auto treesIn = [&](BoxFrame in, double distance) {
-    if (in == BoxFrame::Body) distance += approachSlack(record, m_thickness);
-    TreePair trees = treesOf(record.a->body, record.b->body, distance, record.plan.swept(), in);
+    if (in == BoxFrame::Body) distance += approachSlack(asked, m_thickness);
+    TreePair trees = treesOf(asked.a, asked.b, distance, asked.plan.swept(), in);
     if (trees.self() && !adjacentPairs) trees.adjacency = ofA.ordered().data();
     if (unfolded) trees.adjacency = unfolded;
     return trees;
   };
-  m_floats = floatsOf(record, treesIn(BoxFrame::World, m_thickness));
+  m_floats = floatsOf(asked, treesIn(BoxFrame::World, m_thickness));
   // A search at the searchDistance is for boxes in the world.
-  const bool searches = adjacentPairs && record.plan.searchDistance > 0.0,
-             inWorld = searches || !record.a->body.isPlaced() || !record.b->body.isPlaced();
-  m_trees = treesIn(inWorld ? BoxFrame::World : boxFrame,
-                    searches ? std::max(m_thickness, record.plan.searchDistance) : m_thickness);
-  const bool shared = frame.divides() && elements >= kSharedSize;
-  startPairs(m_trees, shared ? kNodePairsWanted : isTimed() ? kFewNodePairs : 1, frame.stack);
-  m_nodePairs = &frame.nodePairs;
-  m_first = frame.nodePairs.size(), m_count = frame.stack.pairs.size();
-  frame.nodePairs.insert(frame.nodePairs.end(), frame.stack.pairs.begin(), frame.stack.pairs.end());
-  m_grain = std::max<std::size_t>(1, (m_count + kJobsPerPair - 1) / kJobsPerPair);
-  return (m_count + m_grain - 1) / m_grain;
-}
-
-void MeshWork::traverseJob(std::size_t job, JobScratch& scratch) const {
-  PALPATE_ASSERT(m_nodePairs && job * m_grain < m_count);
-  const std::size_t begin = job * m_grain, size = std::min(m_count - begin, m_grain);
-  traverse(m_trees, std::span(*m_nodePairs).subspan(m_first + begin, size), scratch.stack,
-           scratch.sink);
-  scratch.sink.flush();
+  const bool searches = adjacentPairs && asked.plan.searchDistance > 0.0,
+             inWorld = searches || !asked.a.isPlaced() || !asked.b.isPlaced();
+  const TreePair trees =
+      treesIn(inWorld ? BoxFrame::World : boxFrame,
+              searches ? std::max(m_thickness, asked.plan.searchDistance) : m_thickness);
+  return m_traversal.start(trees, ofA.octree().size() + ofB.octree().size(), frame);
 }
 
 /// Whether the boxes of the traversal may be larger than those of the pair's method.
 bool MeshWork::hasWiderBoxes() const {
-  return m_record->hasWiderBoxes() || m_record->plan.searchDistance > 0.0;
+  return question().hasWiderBoxes() || question().plan.searchDistance > 0.0;
 }
 
 bool MeshWork::isFiltered() const {
-  return hasWiderBoxes() || m_record->anyDisabled() || m_trees.isMapped();
+  return hasWiderBoxes() || question().anyDisabled() || m_traversal.trees().isMapped();
 }
 
 /// Keeps the candidates of a batch of the traversal.
@@ -179,24 +149,24 @@ std::span<const ElementPair> MeshWork::candidatesAmong(std::span<const ElementPa
     scratch.nearby = true;
     return pairs;
   }
-  const PairPlan& plan = m_record->plan;
+  const PairPlan& plan = question().plan;
   const bool searches = plan.searchDistance > 0.0;
   Buffer<ElementPair>& kept = scratch.kept;
   kept.assign(pairs.begin(), pairs.end());
   // First, pairs whose boxes overlap at the thickness of the traversal. That of mapped trees finds
   // other pairs as well. So does a search if other pairs of the geometries need boxes over the
   // step.
-  if (m_trees.isMapped() || (searches && m_record->hasWiderBoxes()))
+  if (m_traversal.trees().isMapped() || (searches && question().hasWiderBoxes()))
     keepInWorld(searches ? std::max(plan.step.motionWithRounding, m_thickness) : m_thickness,
                 scratch);
   scratch.nearby |= !kept.empty();
-  const MeshTopology &a = m_record->a->body.mesh.topology, &b = m_record->b->body.mesh.topology;
-  if (m_record->anyDisabled())
+  const MeshTopology &a = question().a.mesh.topology, &b = question().b.mesh.topology;
+  if (question().anyDisabled())
     std::erase_if(kept,
                   [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
   // Then those whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
   // method: at the step's end, or over the whole step.
-  if (m_trees.isMapped()) {
+  if (m_traversal.trees().isMapped()) {
     if (plan.searchDistance > m_thickness) keepInWorld(m_thickness, scratch);
   } else if (hasWiderBoxes()) {
     keepOverlapping(a, b, m_floats, kept);
@@ -205,16 +175,16 @@ std::span<const ElementPair> MeshWork::candidatesAmong(std::span<const ElementPa
 }
 
 void MeshWork::keepInWorld(double distance, JobScratch& scratch) const {
-  keepOverlapping(m_record->meshes(), m_record->plan.swept(), distance, scratch.kept);
+  keepOverlapping(question().meshes(), question().plan.swept(), distance, scratch.kept);
 }
 
 bool MeshWork::repeats(const JobScratch& job) const {
-  return job.intersectionsMissed && m_record->plan.runsIntersection;
+  return job.intersectionsMissed && question().plan.runsIntersection;
 }
 
 bool MeshWork::hasRound(int round, Jobs jobs) const {
   if (round != 1) return round == 0;
-  bool startsIntersecting = m_record->plan.startsIntersecting, missed = false;
+  bool startsIntersecting = question().plan.startsIntersecting, missed = false;
   for (const auto& job : jobs) {
     startsIntersecting |= job->contacts.facts.startsPiercing();
     missed |= repeats(*job);
@@ -223,10 +193,13 @@ bool MeshWork::hasRound(int round, Jobs jobs) const {
 }
 
 void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
-  if (round == 0 && m_record->keeps) {
+  if (m_byBruteForce) {
+    runByBruteForce(scratch);
+  } else if (round == 0 && m_search.kept.answers) {
     runKept(job, scratch);
   } else if (job >= m_searchJobs) {
-    if (round == 0) m_record->kept.gather(job - m_searchJobs, m_record->meshes(&m_floats), scratch);
+    if (round == 0)
+      m_search.kept.lists->gather(job - m_searchJobs, question().meshes(&m_floats), scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
       forEachPart(pairs, [&](const auto& part) { detect(part, scratch); });
@@ -241,14 +214,14 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
 }
 
 void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) const {
-  const MeshPair meshes = m_record->meshes(m_trees.isMapped() ? nullptr : &m_floats);
+  const MeshPair meshes = question().meshes(m_traversal.trees().isMapped() ? nullptr : &m_floats);
   {
     const MemoryScope memory(MemoryStage::NarrowPhase);
     const AddedTime time(scratch.narrowMilliseconds);
     const StepFacts& facts = scratch.contacts.facts;
     if (meshes.step.checksStart) checkStart(meshes, pairs, scratch);
-    if (m_record->plan.runsIntersection &&
-        (facts.startsPiercing() || m_record->plan.startsIntersecting))
+    if (question().plan.runsIntersection &&
+        (facts.startsPiercing() || question().plan.startsIntersecting))
       detectIntersections(pairs, scratch);
     else
       scratch.intersectionsMissed = true;
@@ -282,15 +255,15 @@ void MeshWork::checkStart(const MeshPair& meshes, std::span<const ElementPair> p
 /// Auto: finds intersections at the step's end.
 void MeshWork::detectIntersections(std::span<const ElementPair> pairs, JobScratch& scratch) const {
   const MemoryScope memory(MemoryStage::NarrowPhase);
-  PALPATE_ASSERT(m_record->plan.runsIntersection);
-  const MeshPair meshes = m_record->meshes();
+  PALPATE_ASSERT(question().plan.runsIntersection);
+  const MeshPair meshes = question().meshes();
   findIntersections(meshes, pairs, scratch.intersections);
   if (meshes.step.motion > 0.0) findCrossingsAtStart(meshes, pairs, scratch.intersections);
 }
 
 void MeshWork::findEarliest(const MeshPair& meshes, std::span<const ElementPair> pairs,
                             JobScratch& scratch) const {
-  std::atomic<double>& earliest = m_record->earliest;
+  std::atomic<double>& earliest = m_search.answer->earliest;
   const double found = findEarliestImpact(meshes, pairs, earliest.load(), scratch.contacts);
   PALPATE_ASSERT(found >= 0.0);
   double known = earliest.load();
@@ -299,42 +272,42 @@ void MeshWork::findEarliest(const MeshPair& meshes, std::span<const ElementPair>
 }
 
 void MeshWork::runByBruteForce(JobScratch& scratch) const {
-  detectPairByBruteForce(*m_record, scratch.contacts, scratch.intersections);
-  if (m_record->pair.settings.continuous.earliestTimeOnly)
-    takeEarliest(*m_record, scratch.contacts);
+  const AddedTime time(scratch.narrowMilliseconds);
+  detectPairByBruteForce(question(), scratch.contacts, scratch.intersections);
+  if (question().settings().continuous.earliestTimeOnly) takeEarliest(m_search, scratch.contacts);
   scratch.nearby = true;
 }
 
 void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
-  PALPATE_ASSERT(jobs.empty() || m_record->plan.kind == PairKind::Meshes);
-  PairRecord& record = *m_record;
+  PALPATE_ASSERT(jobs.empty() || question().plan.kind == PairKind::Meshes);
+  const Question& asked = question();
   PairResults& results = join.results;
   auto& [pierced, leaving, piercingContacts, knownSides, bodies] = results.meshes;
   pierced.clear();
   results.start(jobs);
   auto &found = results.found(), &intersections = results.intersections();
   StepFacts& facts = results.facts();
-  const bool byIntersection = record.plan.method == Method::Intersection;
+  const bool byIntersection = asked.plan.method == Method::Intersection;
   auto& atEnd = byIntersection ? found : intersections;
-  piercingContacts.find(record.meshes(), atEnd, pierced);
+  piercingContacts.find(asked.meshes(), atEnd, pierced);
   atEnd.push_back(&pierced);
   for (const auto* buffers : {&found, &intersections})
     for (const ContactBuffers* each : *buffers) facts.add(each->facts);
-  results.sortFacts(record);
+  results.sortFacts(asked);
   checkTime();
-  if (record.plan.step.reportsImpacts && facts.clearance == 0.0) {
+  if (asked.plan.step.reportsImpacts && facts.clearance == 0.0) {
     for (ContactBuffers* each : found)
-      replaceByImpacts(record.meshes(), facts, *each, results.impacts);
+      replaceByImpacts(asked.meshes(), facts, *each, results.impacts);
     found.push_back(&results.impacts);
   }
-  if (record.plan.startsIntersecting) facts.atStart = Meeting::Piercing;
-  record.plan.startsIntersecting = facts.startsPiercing();
+  if (asked.plan.startsIntersecting) facts.atStart = Meeting::Piercing;
   std::size_t preferred = 0;
-  record.sidesAreKnown = facts.startsPiercing() && record.plan.runsIntersection;
-  if (record.sidesAreKnown) {
+  bool& sidesAreKnown = m_search.answer->sidesAreKnown;
+  sidesAreKnown = facts.startsPiercing() && asked.plan.runsIntersection;
+  if (sidesAreKnown) {
     leaving.clear();
-    piercingContacts.findAtStart(record.meshes(), intersections, leaving);
-    knownSides.apply(record.meshes(), intersections, leaving, found);
+    piercingContacts.findAtStart(asked.meshes(), intersections, leaving);
+    knownSides.apply(asked.meshes(), intersections, leaving, found);
     preferred = intersections.size();
     found.insert(found.begin(), intersections.begin(), intersections.end());
   }
@@ -343,20 +316,20 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
   // the step starts intersecting only Intersection knows the side.
   preferred = preferBodies(join, preferred);
   checkTime();
-  const std::size_t intersectionCount = results.order(record, preferred);
+  const std::size_t intersectionCount = results.order(m_search, preferred);
   join.statistics.exactDecisions += pierced.exactDecisions;
-  CollisionData::Contents& contents = CollisionData::Contents::of(record.next);
+  CollisionData::Contents& contents = m_search.answer->contents();
   describeExact(contents);
   const bool nearby =
       std::any_of(jobs.begin(), jobs.end(), [](const auto& job) { return job->nearby; });
   checkTime();
-  results.assess(record, nearby, join.statistics);
+  results.assess(m_search, nearby, join.statistics);
   checkTime();
   // After assess(), which tests the triangles around every impact.
-  const bool mixes = record.plan.step.reportsImpacts,
-             continuous = record.plan.method == Method::Continuous;
+  const bool mixes = asked.plan.step.reportsImpacts,
+             continuous = asked.plan.method == Method::Continuous;
   if (mixes || continuous)
-    results.keepFirstImpacts(record, mixes ? 1.0 : std::numeric_limits<double>::infinity());
+    results.keepFirstImpacts(m_search, mixes ? 1.0 : std::numeric_limits<double>::infinity());
   std::size_t atImpact = 0;
   if (mixes)
     forEachTimed(contents, [&](const auto& contacts) {
@@ -370,17 +343,18 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
 /// Auto: of closed bodies that intersect when the step begins, takes only contacts on outer sides.
 /// Returns the number of preferred buffers.
 std::size_t MeshWork::preferBodies(const FrameJoin& join, std::size_t preferred) const {
-  PairRecord& record = *m_record;
-  record.byBodies = false;
-  if (record.pair.settings.method != Method::Auto) return preferred;
+  const Question& asked = question();
+  bool& byBodies = m_search.answer->byBodies;
+  byBodies = false;
+  if (asked.settings().method != Method::Auto) return preferred;
   auto &found = join.results.found(), &intersections = join.results.intersections();
   std::unique_ptr<BodyContacts>& bodies = join.results.meshes.bodies;
   if (!bodies) bodies = std::make_unique<BodyContacts>();
-  const bool byIntersection = record.plan.method == Method::Intersection;
+  const bool byIntersection = asked.plan.method == Method::Intersection;
   const BodyContacts::Buffers all(found), local = byIntersection ? all : intersections;
-  const bool areDeep = bodies->find(record, join.engine, join.results.facts().startsPiercing(),
+  const bool areDeep = bodies->find(asked, join.engine, join.results.facts().startsPiercing(),
                                     local, all.subspan(byIntersection ? all.size() : preferred));
-  record.byBodies = areDeep || bodies->hasTurned();
+  byBodies = areDeep || bodies->hasTurned();
   join.statistics.exactDecisions += bodies->exactDecisions();
   if (!areDeep) return preferred;
   found.assign(1, &bodies->contacts());

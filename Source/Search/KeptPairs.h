@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/JobScratch.h"
+#include "Search/JobScratch.h"
 #include "NarrowPhase/FeatureBounds.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/NarrowPhase.h"

@@ -2,7 +2,7 @@
 
 #include <palpate/CollisionData.h>
 
-#include "CollisionDetection/ExcludedImpacts.h"
+#include "Search/ExcludedImpacts.h"
 #include "NarrowPhase/CollisionContents.h"
 #include "NarrowPhase/Order.h"
 #include "Math/NormalCone.h"

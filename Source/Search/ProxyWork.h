@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/ProxyJobs.h"
+#include "Search/ProxyJobs.h"
 
 #include <cstddef>
 
@@ -10,18 +10,15 @@ namespace palpate {
 /// places in the results.
 class ProxyWork {
  public:
-  explicit ProxyWork(PairRecord& record) : m_record(&record) {}
+  explicit ProxyWork(const Search& search) : m_search(search) {}
 
   std::size_t start(const FrameStart&);
   bool hasRound(int round, Jobs) const { return round == 0; }
   void run(int round, std::size_t job, JobScratch&) const;
-  void runByBruteForce(JobScratch&);
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  std::size_t place(bool divides);
-
-  PairRecord* m_record;
+  Search m_search;
   ProxyJobs m_proxyJobs;
 };
 

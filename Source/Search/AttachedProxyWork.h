@@ -1,6 +1,6 @@
 #pragma once
 
-#include "CollisionDetection/ProxyJobs.h"
+#include "Search/ProxyJobs.h"
 
 #include <cstddef>
 
@@ -10,20 +10,18 @@ namespace palpate {
 /// particles that may have an impact in the step.
 class AttachedProxyWork {
  public:
-  explicit AttachedProxyWork(PairRecord& record) : m_record(&record) {}
+  explicit AttachedProxyWork(const Search& search) : m_search(search) {}
 
   std::size_t start(const FrameStart&);
   bool hasRound(int round, Jobs) const { return round == 0; }
   void run(int round, std::size_t job, JobScratch&) const;
-  void runByBruteForce(JobScratch&);
   void join(Jobs, const FrameJoin&) const;
 
  private:
-  std::size_t place(bool divides);
   void writeHits(JobScratch&) const;
   void findOthers(JobScratch&) const;
 
-  PairRecord* m_record;
+  Search m_search;
   ProxyJobs m_proxyJobs;
 };
 
