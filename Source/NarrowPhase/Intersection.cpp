@@ -99,7 +99,7 @@ class IntersectionContacts {
     sort(edgeA, edgeB);
     const EdgeEdgeDistance at = distanceOf(edgeA, edgeB);
     if (!haveCrossed(edgeA, edgeB, at)) return false;
-    addEdges(edgeA, edgeB, at);
+    addEdges(edgeA, edgeB, at, true);
     return true;
   }
 
@@ -165,13 +165,14 @@ class IntersectionContacts {
   }
   void addEdges(std::uint32_t edgeA, std::uint32_t edgeB) {
     sort(edgeA, edgeB);
-    addEdges(edgeA, edgeB, distanceOf(edgeA, edgeB));
+    const EdgeEdgeDistance at = distanceOf(edgeA, edgeB);
+    addEdges(edgeA, edgeB, at, haveCrossed(edgeA, edgeB, at));
   }
-  void addEdges(std::uint32_t edgeA, std::uint32_t edgeB, EdgeEdgeDistance answer) {
+  void addEdges(std::uint32_t edgeA, std::uint32_t edgeB, EdgeEdgeDistance answer, bool crossed) {
     if (rejectsEdges(m_pair, edgeA, edgeB)) return;
     const Segment &p = m_pair.a.topology.edges[edgeA], &q = m_pair.b.topology.edges[edgeB];
     m_out.exactDecisions += answer.exact;
-    if (haveCrossed(edgeA, edgeB, answer)) {
+    if (crossed) {
       answer.normal = -answer.normal;
       answer.distance = -answer.distance;
     }

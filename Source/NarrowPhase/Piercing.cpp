@@ -28,6 +28,14 @@ namespace palpate {
 
 namespace {
 
+/// Cosine of the angle between the normals of a vertex and of a ridge above its edge: at a right
+/// angle, the ridge leads out through the vertex' face and not through the crossed one.
+constexpr double kSameWayOut = 0.7;
+
+/// Of the product of two squared lengths, L^4. Between these bounds the products of two such
+/// normals do not leave the range of double either.
+constexpr double kSmallestSquare = 0x1p-400, kLargestSquare = 0x1p400;
+
 /// A mesh at one end of the step.
 struct PlacedMesh {
   const MeshTopology& topology;
@@ -49,13 +57,26 @@ bool holds(const Segment& edge, std::uint32_t vertex) {
   return edge[0] == vertex || edge[1] == vertex;
 }
 
+/// The winding normal of a triangle times twice its area, with an error of at most 2^-30 of its
+/// length. Nothing of a triangle that is nearly a line, or where squares leave the range of double.
+/// Much cheaper than windingNormal().
+std::optional<Eigen::Vector3d> roughNormal(const Corners& triangle) {
+  const Eigen::Vector3d u = triangle[1] - triangle[0], v = triangle[2] - triangle[0],
+                        normal = u.cross(v);
+  const double square = normal.squaredNorm(), most = u.squaredNorm() * v.squaredNorm();
+  if (!(most > kSmallestSquare && most < kLargestSquare && square > 0x1p-40 * most)) return {};
+  return normal;
+}
+
 /// From an end of an edge to where the edge crosses a triangle. NaN where rounding hides that.
 Eigen::Vector3d crossingFrom(std::uint32_t end, const PlacedMesh& own, std::uint32_t edge,
                              const PlacedMesh& surface, std::uint32_t triangle) {
   const Segment& ends = own.topology.edges[edge];
   const Eigen::Vector3d along = own.at[ends[ends[0] == end]] - own.at[end];
-  const auto [a, b, c] = surface.corners(triangle);
-  const Eigen::Vector3d normal = windingNormal(a, b, c);
+  const Corners corners = surface.corners(triangle);
+  const auto& [a, b, c] = corners;
+  const std::optional<Eigen::Vector3d> rough = roughNormal(corners);
+  const Eigen::Vector3d normal = rough ? *rough : windingNormal(a, b, c);
   const double weight = normal.dot(a - own.at[end]) / normal.dot(along);
   if (!(weight >= 0.0 && weight <= 1.0))
     return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
@@ -74,9 +95,30 @@ std::optional<Eigen::Vector3d> betweenInteriors(const Eigen::Vector3d& p, const 
   const Eigen::Vector3d normal = u.cross(v);
   const double square = normal.squaredNorm();
   if (!(square > kTouchAngle * kTouchAngle * u.squaredNorm() * v.squaredNorm())) return {};
-  const double ofU = from.cross(v).dot(normal), ofV = from.cross(u).dot(normal);
-  if (!(ofU > 0.0 && ofU < square && ofV > 0.0 && ofV < square)) return {};
+  const double ofU = from.cross(v).dot(normal);
+  if (!(ofU > 0.0 && ofU < square)) return {};
+  const double ofV = from.cross(u).dot(normal);
+  if (!(ofV > 0.0 && ofV < square)) return {};
   return scale * (from.dot(normal) / square) * normal;
+}
+
+/// Whether two edges are certainly not nearest to each other within kSameWayOut of a direction.
+bool leadElsewhere(const Eigen::Vector3d& u, const Eigen::Vector3d& v,
+                   const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d normal = u.cross(v);
+  const double along = normal.dot(direction);
+  return along * along < (1.0 - 0x1p-10) * kSameWayOut * kSameWayOut * normal.squaredNorm() &&
+         normal.squaredNorm() > 0x1p-30 * u.squaredNorm() * v.squaredNorm();
+}
+
+/// Whether the normals of two triangles are the same or opposite ones, up to kTouchAngle.
+bool areParallel(const Corners& s, const Corners& t) {
+  const std::optional<Eigen::Vector3d> m = roughNormal(s), n = roughNormal(t);
+  const double most = m && n ? m->squaredNorm() * n->squaredNorm() : 0.0;
+  if (std::isnormal(most) && m->cross(*n).squaredNorm() > 4.0 * kTouchAngle * kTouchAngle * most)
+    return false;
+  return windingNormal(s[0], s[1], s[2]).cross(windingNormal(t[0], t[1], t[2])).norm() <
+         kTouchAngle;
 }
 
 /// Whether two triangles hold an edge, and each is behind the other by more than rounding.
@@ -84,8 +126,7 @@ bool isConvex(const PlacedMesh& mesh, std::uint32_t edge) {
   const auto both = mesh.topology.edgeTriangles[edge];
   if (both.size() != 2) return false;
   const Corners s = mesh.corners(both[0]), t = mesh.corners(both[1]);
-  if (windingNormal(s[0], s[1], s[2]).cross(windingNormal(t[0], t[1], t[2])).norm() < kTouchAngle)
-    return false;
+  if (areParallel(s, t)) return false;
   const auto& corners = mesh.topology.elements[both[1]];
   return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t v) {
     return !holds(mesh.topology.edges[edge], v) && sideOf(s, mesh.at[v]) < 0;
@@ -178,9 +219,6 @@ constexpr double kExitReach = 1.5;
 /// Of a vertex' depth: an edge that crosses the surface at least this deep has a contact of its
 /// own. Below 1, so that rounding does not choose where the edge is as deep as its end.
 constexpr double kDeepCrossing = 0.5;
-/// Cosine of the angle between the normals of a vertex and of a ridge above its edge: at a right
-/// angle, the ridge leads out through the vertex' face and not through the crossed one.
-constexpr double kSameWayOut = 0.7;
 
 /// Searches the feature of a surface that is nearest to a vertex behind it.
 class NearestInFront {
@@ -194,7 +232,7 @@ class NearestInFront {
 
   /// Begins at a triangle behind which the vertex is, or goes on to it if it is nearer.
   bool enter(std::uint32_t triangle) {
-    if (m_isKnown && triangle == m_triangle) return false;
+    if (m_isKnown && (triangle == m_triangle || isNoNearer(m_mesh.corners(triangle)))) return false;
     const VertexTriangleDistance found = measure(triangle);
     if (m_isKnown && !(found.distance < m_nearest.distance)) return false;
     m_isKnown = true;
@@ -224,7 +262,8 @@ class NearestInFront {
   void shorten(std::span<const PiercingContacts::Behind> crossings,
                PiercingContacts::Scratch& scratch) {
     findCrossings(crossings, scratch.crossings);
-    double shortest = exitDistance(scratch.crossings);
+    const VertexTriangleContact nearest = contact();
+    double shortest = exitDistance(nearest, scratch.crossings);
     const double reach = kExitReach * shortest;
     shortest *= 1.0 - kExitDistanceSlack;
     findNearer(shortest, reach, crossings, scratch);
@@ -238,20 +277,24 @@ class NearestInFront {
       std::pop_heap(nearer.begin(), end, std::greater<>());
       m_triangle = std::prev(end)->id;
       m_nearest = measure(m_triangle);
-      const double other = exitDistance(scratch.crossings);
+      const double other = exitDistance(contact(), scratch.crossings);
       if (!(other < shortest) || goesOn()) continue;
       shortest = (1.0 - kExitDistanceSlack) * other;
       best = {m_triangle, m_nearest};
       isBetter = true;
     }
     std::tie(m_triangle, m_nearest) = best;
-    if (isBetter) walk();
+    if (isBetter)
+      walk();
+    else
+      m_contact = nearest;
   }
 
   std::uint32_t triangle() const { return m_triangle; }
   Corners corners() const { return m_mesh.corners(m_triangle); }
   bool exact() const { return m_nearest.exact; }
   VertexTriangleContact contact() const {
+    if (m_contact) return *m_contact;
     VertexTriangleDistance answer = m_nearest;
     if (answer.distance > 0.0) turnToFront(corners(), answer);
     return contactOf(m_vertex, m_triangle, m_mesh.topology.elements[m_triangle], answer);
@@ -280,8 +323,8 @@ class NearestInFront {
   }
   /// L: how far the vertex, and the places where its edges cross the surface, must move along the
   /// contact's normal to be in front of the plane through the closest point.
-  double exitDistance(std::span<const Eigen::Vector3d> crossings) const {
-    const VertexTriangleContact at = contact();
+  double exitDistance(const VertexTriangleContact& at,
+                      std::span<const Eigen::Vector3d> crossings) const {
     double furthest = 0.0;
     for (const Eigen::Vector3d& crossing : crossings)  // NaN changes nothing
       furthest = std::max(furthest, -at.normal.dot(crossing));
@@ -337,12 +380,24 @@ class NearestInFront {
   /// Whether the triangle's plane is further away, or the vertex certainly in front of it. A
   /// triangle that is nearly a line has no plane.
   bool isOutOfReach(const Corners& triangle, double distanceSquared) const {
-    const auto& [a, b, c] = triangle;
-    const Eigen::Vector3d u = b - a, v = c - a, normal = u.cross(v), from = m_position - a;
-    const double square = normal.squaredNorm(), height = normal.dot(from);
-    if (!(square > 0x1p-40 * u.squaredNorm() * v.squaredNorm())) return false;
+    const std::optional<Eigen::Vector3d> normal = roughNormal(triangle);
+    if (!normal) return false;
+    const Eigen::Vector3d from = m_position - triangle[0];
+    const double square = normal->squaredNorm(), height = normal->dot(from);
     if (height > 0.0) return height * height > 0x1p-40 * square * from.squaredNorm();
-    return (1.0 - 0x1p-20) * height * height >= distanceSquared * square;
+    return isBeyond(height, distanceSquared * square);
+  }
+  /// Whether a triangle is certainly at least as far away as the nearest one so far.
+  bool isNoNearer(const Corners& triangle) const {
+    const double distanceSquared = m_nearest.distance * m_nearest.distance;
+    if (!std::isnormal(distanceSquared)) return false;
+    if (squaredDistanceToBox(triangle) >= distanceSquared) return true;
+    const std::optional<Eigen::Vector3d> normal = roughNormal(triangle);
+    if (!normal) return false;
+    return isBeyond(normal->dot(m_position - triangle[0]), distanceSquared * normal->squaredNorm());
+  }
+  static bool isBeyond(double height, double limitSquared) {
+    return std::isnormal(limitSquared) && (1.0 - 0x1p-20) * height * height >= limitSquared;
   }
   bool goesOn() const {
     const auto around = holders(feature());
@@ -365,6 +420,7 @@ class NearestInFront {
   Eigen::Vector3d m_position;
   VertexTriangleDistance m_nearest{};
   bool m_isKnown = false;
+  std::optional<VertexTriangleContact> m_contact;  ///< where it was measured already
 };
 
 }  // namespace
@@ -421,11 +477,13 @@ void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffer
 
 template <class IsAllowed>
 bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t edge,
-                                std::initializer_list<std::uint32_t> triangles, ContactBuffers& out,
+                                std::initializer_list<std::uint32_t> triangles,
+                                const Eigen::Vector3d* wayOut, ContactBuffers& out,
                                 IsAllowed&& isAllowed) {
   const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
   const MeshTopology& topology = surface.topology;
   const Segment& ends = own.topology.edges[edge];
+  const Eigen::Vector3d p = own.at[ends[0]], q = own.at[ends[1]], along = q - p;
   Buffer<Near>& ridges = m_scratch.nearer;
   ridges.clear();
   for (const std::uint32_t triangle : triangles)
@@ -438,8 +496,9 @@ bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t ed
         if (ridge == kNoEdge) continue;
         const Segment& both = topology.edges[ridge];
         if (pair.self() && (holds(ends, both[0]) || holds(ends, both[1]))) continue;
-        const auto up = betweenInteriors(own.at[ends[0]], own.at[ends[1]], surface.at[both[0]],
-                                         surface.at[both[1]]);
+        const Eigen::Vector3d r = surface.at[both[0]], s = surface.at[both[1]];
+        if (wayOut && leadElsewhere(along, s - r, *wayOut)) continue;
+        const auto up = betweenInteriors(p, q, r, s);
         if (!up) continue;
         const double length = stableLength(*up);
         if (isAllowed(*up, length)) ridges.push_back({length, ridge});
@@ -478,7 +537,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
       const Eigen::Vector3d& place = m_scratch.crossings[crossing - begin];
       const double depth = -contact.normal.dot(place) - contact.distance;
       if (depth > 0.0 && depth >= kDeepCrossing * -contact.distance)
-        addRidge(pair, ofB, crossing->edge, {crossing->triangle}, out,
+        addRidge(pair, ofB, crossing->edge, {crossing->triangle}, &contact.normal, out,
                  [&](const Eigen::Vector3d& up, double length) {
                    return length <= kExitReach * depth &&
                           up.dot(contact.normal) >= kSameWayOut * length;
@@ -550,7 +609,7 @@ bool PiercingContacts::addBelow(const MeshPair& pair, const PiercedPair& pierced
     const std::uint32_t end = own.topology.edges[here.edge][0];
     const double apart = stableLength(crossingFrom(end, own, here.edge, surface, here.triangle) -
                                       crossingFrom(end, own, here.edge, surface, there.triangle));
-    any |= addRidge(pair, ofB, here.edge, {here.triangle, there.triangle}, out,
+    any |= addRidge(pair, ofB, here.edge, {here.triangle, there.triangle}, nullptr, out,
                     [&](const Eigen::Vector3d&, double length) { return length <= apart; });
   };
   const auto addOf = [&](bool ofB, std::uint32_t triangle, unsigned edges, std::uint32_t crossed) {

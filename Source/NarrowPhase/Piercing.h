@@ -104,11 +104,12 @@ class PiercingContacts {
   bool addBelow(const MeshPair&, const PiercedPair&, ContactBuffers& out);
   /// Adds the contact of an edge and the nearest ridge that it is below, of the ridges at corners
   /// of the triangles. isAllowed(from the edge to the ridge, its length) chooses among these.
-  /// Returns whether there is one. ofB: the edge is of MeshPair::b, and the ridge is not.
+  /// Returns whether there is one. ofB: the edge is of MeshPair::b, and the ridge is not. wayOut:
+  /// if there is one, isAllowed() is false outside of kSameWayOut of this direction.
   template <class IsAllowed>
   bool addRidge(const MeshPair&, bool ofB, std::uint32_t edge,
-                std::initializer_list<std::uint32_t> triangles, ContactBuffers& out,
-                IsAllowed&& isAllowed);
+                std::initializer_list<std::uint32_t> triangles, const Eigen::Vector3d* wayOut,
+                ContactBuffers& out, IsAllowed&& isAllowed);
 
   Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;
