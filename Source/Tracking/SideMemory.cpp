@@ -531,6 +531,28 @@ bool SideMemory::hasPassedEnd(const Crossing& passage) const {
          passes(m_ofSecond, r) || passes(m_ofSecond, s);
 }
 
+/// Whether a vertex passed into a body and out of it elsewhere, and vertices of the body passed the
+/// vertex' surface there. What these remember leads both back; the sides of the vertex would lead
+/// it into the body.
+bool SideMemory::isOfPassedBody(const MeshPair& pair, const Course& course) const {
+  const Crossing& passage = course.side.passage;
+  if (isEdges(passage) || pair.self()) return false;
+  const ContactKind ofBody = passage.kind == ContactKind::VertexTriangle
+                                 ? ContactKind::TriangleVertex
+                                 : ContactKind::VertexTriangle;
+  const auto havePassed = [&](const Course& through) {
+    const Triangle& corners = m_visited[through.first].corners;
+    return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t v) {
+      return anyCourse({ofBody, {v, v}}, [](std::uint32_t) { return true; });
+    });
+  };
+  return anyCourse(passage, [&](std::uint32_t i) {
+    const Course& other = m_courses[i];
+    return other.hasPassed && other.side.passage.forward != passage.forward &&
+           (havePassed(course) || havePassed(other));
+  });
+}
+
 void SideMemory::follow(const MeshPair& pair, std::span<const Crossing> passages) {
   m_here.clear();
   m_courses.clear();
@@ -557,7 +579,7 @@ void SideMemory::follow(const MeshPair& pair, std::span<const Crossing> passages
   for (std::uint32_t i = 0; i < m_courses.size(); ++i)
     if (isEdges(m_courses[i].side.passage) ? hasFaces(pair) : !m_courses[i].hasPassed)
       searchHooked(pair, i);
-    else if (m_courses[i].hasPassed)
+    else if (m_courses[i].hasPassed && !isOfPassedBody(pair, m_courses[i]))
       m_next.push_back(m_courses[i].side);
   std::sort(m_searches.begin(), m_searches.end());
   for (std::size_t i = 0; i < m_searches.size(); ++i)

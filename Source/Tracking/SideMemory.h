@@ -103,6 +103,7 @@ class SideMemory : public CountedObject {
   bool hasPassedEnd(const Crossing&) const;
   void add(const MeshPair&, const Side&, double time);
   void take(const MeshPair&, const Crossing&);
+  bool isOfPassedBody(const MeshPair&, const Course&) const;
   void searchHooked(const MeshPair&, std::uint32_t course);
   void addHooked(const MeshPair&, const HookSearch&);
   void addHooked(const MeshPair&, const VertexSide&, const Segment& edge, const Pierced&,

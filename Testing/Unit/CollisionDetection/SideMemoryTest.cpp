@@ -720,6 +720,29 @@ TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
   for (const auto& contact : data.triangleVertex()) EXPECT_LE(contact.normal[2], 1e-12);
 }
 
+/// A body jumps through a membrane and back. The vertices of the membrane pass into it and out of
+/// it in one step; they are where they were if the body is, which its own vertices remember.
+TEST(SideMemory, OfABodyThatJumpedIsThatOfItsOwnVertices) {
+  OctreeBasedCD collisions;
+  Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3), membrane = sheet(16, 0.0, 0.0);
+  for (Vector3d& p : membrane.positions) p[2] = 0.0;
+  const GeometryId body = addMesh(collisions, cube), tissue = addMesh(collisions, membrane);
+  collisions.addCollisionPair(body, tissue, remembering(0.03, Contacts::All));
+  collisions.detectCollision();
+  collisions.advance();
+  const auto sidesAfter = [&](double shift) {
+    for (Vector3d& p : cube.positions) p[2] += shift;
+    collisions.setPositions(body, cube.positions);
+    collisions.advance();
+    collisions.detectCollision();
+    return collisions.collisionData(body, tissue).rememberedSides();
+  };
+  const auto sides = sidesAfter(-0.35);
+  EXPECT_EQ(sides.size(), cube.positions.size());
+  for (const Crossing& side : sides) EXPECT_EQ(side.kind, ContactKind::VertexTriangle);
+  EXPECT_TRUE(sidesAfter(0.35).empty());
+}
+
 /// An end of a thread passes a membrane, the thread then passes the membrane's fold, and the end
 /// comes back. The thread is led back over the fold, in a membrane of any fineness.
 TEST(SideMemory, AnEdgeStaysHookedWhereItsEndReturned) {
