@@ -26,7 +26,7 @@ constexpr std::size_t kMostRays = 8;          ///< of vertices that bound one tr
 constexpr std::size_t kMostFaceNormals = 32;  ///< directions from faces
 constexpr int kMostTests = 64;                ///< of whether one direction separates
 /// Operations of all sweeps, for each triangle and besides; more if nothing separates the bodies.
-constexpr std::size_t kOperationsPerTriangle = 96, kOperations = 20000;
+constexpr std::size_t kOperationsPerTriangle = 24, kOperations = 40000;
 constexpr int kMostDescents = 10;
 /// A direction whose translation is longer than the best one by more than this starts no descent.
 constexpr double kWorthDescent = 1.15;

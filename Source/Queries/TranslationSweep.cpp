@@ -25,6 +25,9 @@ namespace {
 constexpr double kNever = std::numeric_limits<double>::infinity();
 /// A vertex moves at most so many insets.
 constexpr double kMostInsets = 16.0;
+/// Mean extent of triangles along an axis, as a share of the body's. If it is larger, the places of
+/// triangles along the axis do not tell which ones are near. Any value near a half will do.
+constexpr double kWideTriangles = 0.5;
 constexpr double kRaySlack = kExitSlack;  ///< in units: more than the rounding of a ray
 
 /// The translations along a direction at which two triangles cross, and where they touch last.
@@ -139,13 +142,28 @@ void TranslationSweep::load(bool ofA, Side& side) {
   };
   TimeCheck check(256);
   side.order.clear();
+  Vector3d extents = Vector3d::Zero();
+  std::size_t count = 0;
+  topology.forEachElement([&](std::uint32_t element) {
+    check();
+    const auto [p, q, r] = cornersOf(topology.elements[element], own.positions);
+    extents += p.cwiseMax(q).cwiseMax(r) - p.cwiseMin(q).cwiseMin(r);
+    ++count;
+  });
+  // Of plates, for instance, only the order across them tells which triangles are near each other.
+  const auto isDivided = [&](int k) {
+    return extents[k] < kWideTriangles * static_cast<double>(count) * own.box.sizes()[k];
+  };
+  const std::array<bool, 3> divides{isDivided(0), isDivided(1), isDivided(2)};
   topology.forEachElement([&](std::uint32_t element) {
     check();
     const auto [p, q, r] = cornersOf(topology.elements[element], own.positions);
     if (!hasArea(p, q, r)) return;  // its edges are those of other triangles
     const Vector3d cell = scale * ((p / 3.0 + q / 3.0 + r / 3.0) - lower);
     const auto at = [&](int k) {
-      return spread(static_cast<std::uint32_t>(std::clamp(cell[k], 0.0, kCells)));
+      return divides[static_cast<std::size_t>(k)]
+                 ? spread(static_cast<std::uint32_t>(std::clamp(cell[k], 0.0, kCells)))
+                 : 0u;
     };
     side.order.push_back({at(0) | at(1) << 1 | at(2) << 2, element});
   });

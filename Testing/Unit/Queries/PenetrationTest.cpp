@@ -1,3 +1,7 @@
+#include "Queries/BodyPenetration.h"
+#include "Core/Stopping.h"
+#include "Core/Threads.h"
+
 #include "Common/ExpectRefused.h"
 #include "Common/FieldMeshes.h"
 #include "Common/Sanitized.h"
@@ -12,9 +16,12 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 // Directions and depths of bodies: what a translation must do is tested on the moved positions, all
@@ -270,6 +277,40 @@ TEST(Penetration, LayersAreLeftByTheShortWay) {
   ASSERT_TRUE(p.intersecting);
   EXPECT_LE(p.depth, 1.5 * 150);
   EXPECT_FALSE(Bodies(moved(ball, p.depth * p.direction), plates).penetration().intersecting);
+}
+
+/// How often a search asks for the time, which it does in proportion to its work.
+std::size_t workOf(const Mesh& first, const Mesh& second) {
+  const Threads thread(1);
+  Body a(GeometryId{0}), b(GeometryId{1});
+  for (const auto& [mesh, body] : {std::pair(&first, &a), std::pair(&second, &b)}) {
+    makeBody(mesh->positions, mesh->triangles, thread, *body);
+    body->mesh.topology = MeshTopology(mesh->positions.size(), mesh->triangles);
+  }
+  std::size_t asked = 0;
+  const Deadline::Clock clock = [&] {
+    ++asked;
+    return Deadline::Time::min();
+  };
+  const std::atomic<bool> isCancelled = false;
+  const Deadline deadline(Deadline::Time::max(), isCancelled, clock);
+  const StopScope scope(&deadline);
+  PenetrationScratch scratch;
+  EXPECT_TRUE(penetrationOf(a, b, Engine::Octree, scratch).intersecting);
+  return asked;
+}
+
+/// The search along directions that cannot become better ends after a share of the triangles.
+TEST(Penetration, LayersCostInProportionToTheirTriangles) {
+  const Mesh ball = sphere(8, 10, {0, 0, 0}, 0.9);
+  for (const int count : {100, 300}) {
+    Mesh plates;
+    for (int i = 0; i < count; ++i)
+      append(plates,
+             boxMesh({-2.0 * count, -2.0 * count, i - 0.3}, {2.0 * count, 2.0 * count, i + 0.3}));
+    EXPECT_LE(workOf(moved(ball, {0, 0, count / 2 + 0.2}), plates),
+              40000 + 25 * plates.triangles.size());
+  }
 }
 
 /// Two stacks of plates that reach into each other: one plate's thickness separates them, not one
