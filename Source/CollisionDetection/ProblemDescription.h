@@ -3,6 +3,8 @@
 #include <palpate/Capture.h>
 
 #include "Shapes/Shape.h"
+#include "Fields/Description.h"
+#include "Fields/Problem.h"
 #include "Core/Archive.h"
 
 #include <algorithm>
@@ -20,32 +22,20 @@ namespace palpate::description {
 
 inline constexpr int kVersion = 14;  ///< of captures
 
-// Enumerators are written by name. The names are in the order of the declarations.
-inline constexpr std::array<std::string_view, 6> kMethods{
-    "Auto", "Intersection", "Proximity", "Continuous", "DistanceField", "Proxy"};
-inline constexpr std::array<std::string_view, 5> kGeometryTypes{"Triangles", "Lines", "Points",
-                                                                "Shape", "Field"};
-inline constexpr std::array<std::string_view, 2> kSides{"Both", "Outer"};
+// Enumerators are written by name.
 inline constexpr std::array<std::string_view, 6> kShapes{"Sphere", "Capsule",  "Plane",
                                                          "Box",    "Cylinder", "ConvexHull"};
-inline constexpr std::array<std::string_view, 3> kPassages{"VertexTriangle", "TriangleVertex",
-                                                           "EdgeEdge"};
-inline constexpr std::array<std::string_view, 2> kContacts{"Distinct", "All"};
 // Before version 9, a third value of `contacts` stood for earliestTimeOnly.
 enum class ContactsBefore9 { Distinct, All, Earliest };
-inline constexpr std::array<std::string_view, 3> kContactsBefore9{"Distinct", "All", "Earliest"};
-inline constexpr std::array<std::string_view, 2> kEngines{"Octree", "BruteForce"};
-inline constexpr std::array<std::string_view, 2> kUpdates{"Auto", "Rebuild"};
-inline constexpr std::array<std::string_view, 3> kBounds{"Box", "Dop14", "Dop18"};
 
 template <class File, class SettingsType>
 void settingsLine(File& file, SettingsType& settings, int version) {
-  file.word(settings.engine, kEngines);
+  file.word(settings.engine, kEnumerators<Engine>);
   file.integer(settings.threads);
   file.integer(settings.octree.maxDepth);
   file.integer(settings.octree.maxElementsPerLeaf);
-  file.word(settings.octree.update, kUpdates);
-  if (version >= 10) file.word(settings.octree.bounds, kBounds);
+  file.word(settings.octree.update, kEnumerators<OctreeUpdate>);
+  if (version >= 10) file.word(settings.octree.bounds, kEnumerators<OctreeBounds>);
 }
 
 // Least numbers of characters of items: a digit and a space for each number.
@@ -64,10 +54,10 @@ void listOf(File& file, auto& list) {
 
 template <class File, class SettingsType>
 void contactsOf(File& file, SettingsType& settings, int version) {
-  if (version >= 9) return file.word(settings.contacts, kContacts);
+  if (version >= 9) return file.word(settings.contacts, kEnumerators<Contacts>);
   if constexpr (File::kReads) {
     ContactsBefore9 contacts{};
-    file.word(contacts, kContactsBefore9);
+    file.word(contacts, kEnumerators<ContactsBefore9>);
     settings.continuous.earliestTimeOnly = contacts == ContactsBefore9::Earliest;
     settings.contacts = contacts == ContactsBefore9::All ? Contacts::All : PairSettings().contacts;
   }
@@ -75,10 +65,11 @@ void contactsOf(File& file, SettingsType& settings, int version) {
 
 template <class File, class PairType>
 void pairLine(File& file, PairType& pair, int version) {
+  if constexpr (kIsArchive<File>) return valueOf(file, pair);
   file.integer(pair.a);
   file.integer(pair.b);
-  file.word(pair.settings.method, kMethods);
-  file.word(pair.method, kMethods);
+  file.word(pair.settings.method, kEnumerators<Method>);
+  file.word(pair.method, kEnumerators<Method>);
   file.real(pair.settings.thickness);
   contactsOf(file, pair.settings, version);
   if (version >= 2) file.real(pair.settings.automatic.motionTolerance);
@@ -97,7 +88,7 @@ void pairLine(File& file, PairType& pair, int version) {
   fieldOf(file, pair.settings.rememberSides);
   sizeOf(file, pair.sides, kSideText);
   for (auto& side : pair.sides) {
-    file.word(side.kind, kPassages);
+    file.word(side.kind, kEnumerators<ContactFeatures::Kind>);
     fieldOf(file, side.ids);
     fieldOf(file, side.forward);
   }
@@ -107,7 +98,7 @@ template <class File, class FilterType>
 void filterOf(File& file, FilterType& filter) {
   file.integer(filter.groups);
   file.integer(filter.mask);
-  file.word(filter.sidedness, kSides);
+  file.word(filter.sidedness, kEnumerators<Sidedness>);
 }
 
 /// A shape's dimensions, and its placements at both ends of the step.
@@ -144,7 +135,7 @@ void meshLines(File& file, MeshType& mesh, int version) {
   sizeOf(file, mesh.now, kVertexText);
   sizeOf(file, mesh.triangles, kTriangleText);
   if (version >= 3) {
-    file.word(mesh.type, kGeometryTypes);
+    file.word(mesh.type, kEnumerators<GeometryType>);
     listOf(file, mesh.radii);
     if (mesh.type == GeometryType::Shape) {
       std::size_t index = mesh.analytical ? mesh.analytical->index() : 0;

@@ -6,6 +6,10 @@
 #include "Validity/TrustDescription.h"
 #include "Tracking/TrackingDescription.h"
 #include "Bodies/SavedRevisions.h"
+#include "Fields/Contacts.h"
+#include "Fields/Description.h"
+#include "Fields/Settings.h"
+#include "Fields/Statistics.h"
 #include "Core/Archive.h"
 
 #include <algorithm>
@@ -61,7 +65,7 @@ using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;
 
 // Least bytes of items.
-constexpr std::size_t kGeometryBytes = 64, kSavedPairBytes = 64, kContactBytes = 64;
+constexpr std::size_t kGeometryBytes = 64, kSavedPairBytes = 64;
 
 template <class File>
 void poseOf(File& file, Pose& pose) {
@@ -82,102 +86,14 @@ void describeGeometry(File& file, SavedGeometry& geometry) {
   meshLines(file, problem, kVersion);
   itemsOf(file, problem.name, 1, [&](char& letter) { file.integer(letter); });
   optionalOf(file, geometry.field, [&](auto& bounds) { fieldOf(file, bounds); });
-  optionalOf(file, geometry.proxy, [&](SurfaceProxySettings& settings) {
-    for (double* value : {&settings.reach, &settings.errorBound, &settings.widestNormalCone})
-      file.real(*value);
-  });
+  valueOf(file, geometry.proxy);
   for (auto& pose : geometry.poses) optionalOf(file, pose, [&](Pose& p) { poseOf(file, p); });
   for (bool* flag : {&geometry.isDetectedOther, &geometry.isDetectedBefore, &geometry.isNew,
                      &geometry.bodyGiven, &geometry.transformGiven})
     fieldOf(file, *flag);
   describeSets(file, geometry.sets);
-  itemsOf(file, geometry.detected, sizeof(Eigen::Vector3d),
-          [&](Eigen::Vector3d& p) { fieldOf(file, p); });
-  itemsOf(file, geometry.freeMotion, sizeof(double), [&](double& value) { file.real(value); });
-}
-
-template <class File>
-void describeContact(File& file, VertexTriangleContact& c) {
-  file.integer(c.vertex);
-  file.integer(c.triangle);
-  fieldOf(file, c.vertices);
-  fieldOf(file, c.weights);
-  fieldOf(file, c.normal);
-  file.real(c.distance);
-  file.real(c.timeOfImpact);
-  enumeratorOf(file, c.feature, TriangleFeature::Face);
-}
-
-template <class File>
-void describeContact(File& file, EdgeEdgeContact& c) {
-  fieldOf(file, c.edgeA);
-  fieldOf(file, c.edgeB);
-  file.real(c.weightA);
-  file.real(c.weightB);
-  fieldOf(file, c.normal);
-  file.real(c.distance);
-  file.real(c.timeOfImpact);
-  enumeratorOf(file, c.featureA, EdgeFeature::Interior);
-  enumeratorOf(file, c.featureB, EdgeFeature::Interior);
-}
-
-template <class File>
-void describeContact(File& file, ShapeContact& c) {
-  enumeratorOf(file, c.element, ShapeElement::Face);
-  file.integer(c.id);
-  fieldOf(file, c.vertices);
-  for (auto* vector : {&c.weights, &c.point, &c.pointOnShape, &c.normal}) fieldOf(file, *vector);
-  file.real(c.distance);
-  file.real(c.timeOfImpact);
-}
-
-template <class File>
-void describeContact(File& file, ShapeShapeContact& c) {
-  for (auto* vector : {&c.pointA, &c.pointB, &c.normal}) fieldOf(file, *vector);
-  file.real(c.distance);
-  file.real(c.timeOfImpact);
-}
-
-template <class File>
-void describeContact(File& file, ElementPair& c) {
-  file.integer(c.a);
-  file.integer(c.b);
-}
-
-template <class File>
-void describeContact(File& file, TrackedContact& c) {
-  contactKeyOf(file, c.key);
-  optionalOf(file, c.predecessor, [&](ContactKey& key) { contactKeyOf(file, key); });
-  file.integer(c.age);
-  file.integer(c.userData);
-  enumeratorOf(file, c.end, ContactEnd::Apart);
-}
-
-template <class File>
-void describeContact(File& file, Crossing& c) {
-  enumeratorOf(file, c.kind, ContactKind::EdgeEdge);
-  fieldOf(file, c.ids);
-  file.real(c.time);
-  fieldOf(file, c.forward);
-}
-
-template <class File>
-void describeValidity(File& file, Validity& validity) {
-  for (bool* flag : {&validity.trusted, &validity.startedApart, &validity.sideMayBeWrong,
-                     &validity.unwelded, &validity.advanceMayBeMissing})
-    fieldOf(file, *flag);
-  file.word(validity.method, kMethods);
-  enumeratorOf(file, validity.reason, MethodReason::OutOfTime);
-  file.integer(validity.atEnd);
-  file.integer(validity.atImpact);
-  for (double* value : {&validity.displacement, &validity.displacementLimit, &validity.arcDeviation,
-                        &validity.effectiveThickness, &validity.proxyDepth})
-    file.real(*value);
-  file.integer(validity.age);
-  for (auto* list : {&validity.untrustedVerticesA, &validity.untrustedVerticesB,
-                     &validity.degenerateTrianglesA, &validity.degenerateTrianglesB,
-                     &validity.outsideBand, &validity.nearThreshold, &validity.unreliableSign})
-    itemsOf(file, *list, sizeof(std::uint32_t), [&](std::uint32_t& id) { file.integer(id); });
+  valueOf(file, geometry.detected);
+  valueOf(file, geometry.freeMotion);
 }
 
 /// Throws unless all ids are below the numbers of vertices and of elements of the two geometries.
@@ -243,6 +159,9 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
   all(ContactKind::ShapeShape, c.shapeShape, c.tracked.shapeShape);
   const std::size_t between = c.vertexTriangle.size() + c.triangleVertex.size() + c.edgeEdge.size();
   std::size_t next = 0;
+  for (const auto* passages : {&c.crossings, &c.rememberedSides})
+    for (const Crossing& passage : *passages)
+      file.need(passage.kind <= ContactKind::EdgeEdge, "there is no such enumerator");
   for (const auto& row : c.step.endRows) {
     file.need(row.contact >= next && row.contact < between, "a row belongs to no contact");
     next = row.contact + std::size_t{1};
@@ -262,31 +181,18 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
 
 template <class File>
 void describeContents(File& file, Contents& c) {
-  const auto lists = [&](std::size_t least, auto&... each) {
-    (itemsOf(file, each, least, [&](auto& item) { describeContact(file, item); }), ...);
-  };
-  lists(kContactBytes, c.vertexTriangle, c.triangleVertex, c.edgeEdge, c.shape, c.shapeShape);
-  lists(sizeof(ElementPair), c.intersectingTriangles);
-  file.real(c.earliestTimeOfImpact);
-  file.real(c.errorBound);
-  describeValidity(file, c.validity);
+  const auto values = [&](auto&... each) { (valueOf(file, each), ...); };
+  values(c.vertexTriangle, c.triangleVertex, c.edgeEdge, c.shape, c.shapeShape);
+  values(c.intersectingTriangles, c.earliestTimeOfImpact, c.errorBound, c.validity);
   auto& t = c.tracked;
-  lists(34, t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended);
-  lists(29, c.crossings, c.rememberedSides);
-  fieldOf(file, t.elementsOfSecond);
-  fieldOf(file, c.step.elementsOfSecond);
+  values(t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended);
+  values(c.crossings, c.rememberedSides, t.elementsOfSecond, c.step.elementsOfSecond);
   itemsOf(file, c.step.endRows, 84, [&](Contents::Step::EndRow& row) {
-    file.integer(row.contact);
-    fieldOf(file, row.stencil.vertices);
-    for (double& weight : row.stencil.weights) file.real(weight);
-    fieldOf(file, row.normal);
-    file.real(row.gap);
+    values(row.contact, row.stencil, row.normal, row.gap);
   });
-  for (auto& list : c.tags)
-    itemsOf(file, list, sizeof(ContactTags), [&](ContactTags& tags) { fieldOf(file, tags); });
+  for (auto& list : c.tags) valueOf(file, list);
   auto& s = c.smooth;
-  for (auto* list : {&s.vertexTriangle, &s.triangleVertex, &s.edgeEdge, &s.shape})
-    itemsOf(file, *list, sizeof(Eigen::Vector3d), [&](Eigen::Vector3d& n) { fieldOf(file, n); });
+  values(s.vertexTriangle, s.triangleVertex, s.edgeEdge, s.shape);
   if constexpr (File::kReads) checkLists(file, c);
 }
 
@@ -339,12 +245,7 @@ void describeKnown(File& file, std::vector<FreeMotionSearch::Known>& known, Reco
 template <class File>
 void describeUnfinished(File& file, FrameStatistics& statistics) {
   fieldOf(file, statistics.freeMotionUnfinished);
-  itemsOf(file, statistics.unfinishedPairs, 21, [&](UnfinishedPair& pair) {
-    for (GeometryId* id : {&pair.a, &pair.b}) file.integer(*id);
-    file.real(pair.distanceBound);
-    file.integer(pair.age);
-    fieldOf(file, pair.exceedsBudget);
-  });
+  valueOf(file, statistics.unfinishedPairs);
 }
 
 SavedRevisions revisionsOf(const Geometry& geometry) {

@@ -5,6 +5,8 @@
 #include "CollisionDetection/StepSource.h"
 #include "Tracking/LoopPassages.h"
 #include "Bodies/InputChecks.h"
+#include "Fields/Description.h"
+#include "Fields/Topology.h"
 #include "Core/Archive.h"
 
 #include <algorithm>
@@ -165,17 +167,6 @@ void describeWatch(File& file, ThreadWatch& watch) {
   for (bool* flag : {&watch.isLost, &watch.wasLost}) description::fieldOf(file, *flag);
 }
 
-template <class File>
-void describeEvent(File& file, ThreadEvent& event) {
-  file.integer(event.index);
-  file.integer(event.step);
-  description::enumeratorOf(file, event.cause, Cause::Disabled);
-  file.integer(event.change);
-  description::fieldOf(file, event.thread);
-  description::fieldOf(file, event.loop);
-  file.real(event.time);
-}
-
 }  // namespace
 
 struct ThreadTopology::Implementation {
@@ -196,7 +187,7 @@ struct ThreadTopology::Implementation {
   void describe(File& file) {
     description::itemsOf(file, watches, 32,
                          [&](ThreadWatch& watch) { describeWatch(file, watch); });
-    description::itemsOf(file, events, 41, [&](ThreadEvent& event) { describeEvent(file, event); });
+    description::valueOf(file, events);
     file.integer(eventsBefore);
     description::optionalOf(file, step, [&](std::uint64_t& number) { file.integer(number); });
     if constexpr (File::kReads)

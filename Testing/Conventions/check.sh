@@ -24,6 +24,7 @@ moduleOf() {
 allowedIn() {
   case $1 in
     Core) echo "Core/" ;;
+    Fields) echo "Fields/ Core/Archive.h Core/Assert.h" ;;
     Exact) echo "Exact/ Core/" ;;
     Math) echo "Math/ Exact/ Core/" ;;
     Mesh) echo "Mesh/ Math/ Exact/ Core/" ;;
@@ -37,8 +38,8 @@ allowedIn() {
     Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
     Tracking) echo "Tracking/ NarrowPhase/ Mesh/ Math/ Exact/ Core/" ;;
     Search) echo "Search/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
     Vtk | Fcl | Python | C | iMSTK) echo "$1/" ;;
   esac

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <palpate/Settings.h>
+
+#include "Fields/Fields.h"
+
+namespace palpate {
+
+template <>
+struct Fields<ContinuousSettings> {
+  using T = ContinuousSettings;
+  static constexpr auto kList =
+      listOf(field("timeTolerance", &T::timeTolerance, Unit::StepFraction),
+             field("earliestTimeOnly", &T::earliestTimeOnly));
+};
+
+template <>
+struct Fields<AutoSettings> {
+  static constexpr auto kList =
+      listOf(field("motionTolerance", &AutoSettings::motionTolerance, Unit::Length));
+};
+
+template <>
+struct Fields<LeafSettings> {
+  static constexpr auto kList =
+      listOf(field("widestNormalCone", &LeafSettings::widestNormalCone, Unit::Angle));
+};
+
+template <>
+struct Fields<PairSettings> {
+  using T = PairSettings;
+  static constexpr auto kList = listOf(
+      field("method", &T::method), field("thickness", &T::thickness, Unit::Length),
+      field("contacts", &T::contacts), field("restDistance", &T::restDistance, Unit::Length),
+      field("allowedError", &T::allowedError, Unit::Length),
+      field("freeMotionReach", &T::freeMotionReach, Unit::Length),
+      field("trackContacts", &T::trackContacts), field("reportCrossings", &T::reportCrossings),
+      field("smoothNormals", &T::smoothNormals), field("rememberSides", &T::rememberSides),
+      field("continuous", &T::continuous), field("automatic", &T::automatic),
+      field("proxy", &T::proxy), field("priority", &T::priority));
+};
+
+template <>
+struct Fields<SurfaceProxySettings> {
+  using T = SurfaceProxySettings;
+  static constexpr auto kList = listOf(
+      field("reach", &T::reach, Unit::Length), field("errorBound", &T::errorBound, Unit::Length),
+      field("widestNormalCone", &T::widestNormalCone, Unit::Angle));
+};
+
+}  // namespace palpate
