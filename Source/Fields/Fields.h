@@ -61,6 +61,20 @@ constexpr auto listOf(Field<Struct, Members>... fields) {
   return [=](auto&& function) -> decltype(auto) { return function(fields...); };
 }
 
+/// A name in the style of C and Python: "time_of_impact" for "timeOfImpact".
+struct SnakeCase {
+  char text[40] = {};
+};
+constexpr SnakeCase snakeCase(const char* name) {
+  SnakeCase result;
+  for (char* out = result.text; *name; ++name) {
+    const bool isUpper = 'A' <= *name && *name <= 'Z';
+    if (isUpper) *out++ = '_';
+    *out++ = static_cast<char>(isUpper ? *name - 'A' + 'a' : *name);
+  }
+  return result;
+}
+
 /// The list of the members of a public struct: `kList`, in the order of their declaration. The
 /// headers of this folder have those of the public headers.
 template <class Struct>

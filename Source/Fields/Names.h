@@ -19,6 +19,26 @@ constexpr std::string_view compilersNameOf() {
   return text.substr(text.find_last_of(':') + 1);
 }
 
+/// g++ leaves out the namespace of the function where it names a type, so that the function has one
+/// of its own.
+namespace compiler {
+template <class Type>
+constexpr std::string_view textOf() {
+  return __PRETTY_FUNCTION__;
+}
+}  // namespace compiler
+
+/// The name of a type of this library by which the compiler knows it, as "ContactFeatures::Kind".
+template <class Type>
+constexpr std::string_view nameOfType() {
+  constexpr std::string_view kBefore = "Type = palpate::";
+  std::string_view text = compiler::textOf<Type>();
+  const std::size_t begin = text.find(kBefore);
+  if (begin == text.npos) return {};
+  text.remove_prefix(begin + kBefore.size());
+  return text.substr(0, text.find_first_of(";]"));
+}
+
 /// The name of an enumerator, with a null character behind it. Hidden, as the library would export
 /// variables whose arguments are visible.
 template <auto value>

@@ -7,6 +7,32 @@
 namespace palpate {
 
 template <>
+struct Fields<OctreeSettings> {
+  using T = OctreeSettings;
+  static constexpr auto kList =
+      listOf(field("maxDepth", &T::maxDepth), field("maxElementsPerLeaf", &T::maxElementsPerLeaf),
+             field("update", &T::update), field("bounds", &T::bounds),
+             field("keepsPairs", &T::keepsPairs));
+};
+
+template <>
+struct Fields<AuditSettings> {
+  using T = AuditSettings;
+  static constexpr auto kList =
+      listOf(field("features", &T::features), field("seed", &T::seed), field("folder", &T::folder),
+             field("maxFiles", &T::maxFiles));
+};
+
+template <>
+struct Fields<Settings> {
+  using T = Settings;
+  static constexpr auto kList = listOf(
+      field("octree", &T::octree), field("engine", &T::engine), field("threads", &T::threads),
+      field("audit", &T::audit), field("traceFrames", &T::traceFrames),
+      field("executor", &T::executor), field("memoryLimit", &T::memoryLimit, Unit::Bytes));
+};
+
+template <>
 struct Fields<ContinuousSettings> {
   using T = ContinuousSettings;
   static constexpr auto kList =
@@ -38,6 +64,13 @@ struct Fields<PairSettings> {
       field("smoothNormals", &T::smoothNormals), field("rememberSides", &T::rememberSides),
       field("continuous", &T::continuous), field("automatic", &T::automatic),
       field("proxy", &T::proxy), field("priority", &T::priority));
+};
+
+template <>
+struct Fields<CollisionFilter> {
+  using T = CollisionFilter;
+  static constexpr auto kList = listOf(field("groups", &T::groups), field("mask", &T::mask),
+                                       field("sidedness", &T::sidedness));
 };
 
 template <>

@@ -41,7 +41,8 @@ allowedIn() {
     CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
-    Vtk | Fcl | Python | C | iMSTK) echo "$1/" ;;
+    Python) echo "Python/ Fields/" ;;
+    Vtk | Fcl | C | iMSTK) echo "$1/" ;;
   esac
 }
 

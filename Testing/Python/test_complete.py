@@ -179,12 +179,12 @@ def names_of(kind):
 
 
 def fields_in_bindings():
-    """For each C++ struct the members that Python sees as fields, from the lists kFields."""
+    """For each C++ struct the members that Python sees as fields, from the lists of members."""
     result = {}
-    for path in (SOURCE / "Adapters" / "Python").glob("*.h"):
-        lists = re.findall(r"kFields<([\w:]+)> =(.*?);\n(?=\S|$)", path.read_text(), re.S)
+    for path in (SOURCE / "Fields").glob("*.h"):
+        lists = re.findall(r"struct Fields<([\w:]+)> {(.*?)\n};", path.read_text(), re.S)
         for name, body in lists:
-            members = set(re.findall(r'field\(\s*"(\w+)"', body))
+            members = {snake(member) for member in re.findall(r'field\("(\w+)"', body)}
             result[name.replace("::", ".")] = members
     return result
 

@@ -1,256 +1,69 @@
 #pragma once
 
-#include "Python/Fields.h"
+#include "Python/Members.h"
+#include "Fields/Contacts.h"
+#include "Fields/Names.h"
+#include "Fields/Queries.h"
+#include "Fields/Settings.h"
+#include "Fields/Shapes.h"
+#include "Fields/Statistics.h"
 
-#include <palpate/AnalyticalGeometry.h>
 #include <palpate/Capture.h>
-#include <palpate/ConstraintRows.h>
-#include <palpate/FrameStatistics.h>
-#include <palpate/LooseOctree.h>
-#include <palpate/Meshes.h>
 #include <palpate/PenetrationTracker.h>
-#include <palpate/Settings.h>
-#include <palpate/Validity.h>
 
 #include <functional>
 
 namespace palpate::python {
 
-/// The name of a struct's or an enumeration's class in the package palpate; null: it has none.
+/// Settings, statistics and shapes, of which Python has classes with the same values.
+template <class T, class... Structs>
+inline constexpr bool kIsOneOf = (std::is_same_v<T, Structs> || ...);
 template <class T>
-inline constexpr const char* kClass = nullptr;
+inline constexpr bool kIsStructWithClass =
+    kIsOneOf<T, OctreeSettings, AuditSettings, Settings, PairSettings, SurfaceProxySettings,
+             CollisionFilter, InsideSettings, MemoryUse, FrameStatistics::Stages, UnfinishedPair,
+             FrameStatistics, PairStatistics, OctreeStatistics, Validity, Sphere, Capsule, Plane,
+             Box, Cylinder, ConvexHull>;
+
+/// Whether the package palpate has a class for the struct or the enumeration.
 template <class T>
-concept HasClass = kClass<T>
-!= nullptr;
+constexpr bool hasClass() {
+  if constexpr (std::is_enum_v<T>)
+    return !nameOfType<T>().empty() && !kEnumerators<T>.empty();
+  else
+    return kIsStructWithClass<T>;
+}
+template <class T>
+concept HasClass = hasClass<T>();
 
+/// The name of the class: that of C++ without colons.
+template <HasClass T>
+inline constexpr auto kClass = [] {
+  std::array<char, nameOfType<T>().size() + 1> name{};
+  std::copy_if(nameOfType<T>().begin(), nameOfType<T>().end(), name.begin(),
+               [](char letter) { return letter != ':'; });
+  return name;
+}();
 template <>
-inline constexpr const char* kClass<GeometryType> = "GeometryType";
-template <>
-inline constexpr const char* kClass<OctreeUpdate> = "OctreeUpdate";
-template <>
-inline constexpr const char* kClass<OctreeBounds> = "OctreeBounds";
-template <>
-inline constexpr const char* kClass<Engine> = "Engine";
-template <>
-inline constexpr const char* kClass<Method> = "Method";
-template <>
-inline constexpr const char* kClass<Contacts> = "Contacts";
-template <>
-inline constexpr const char* kClass<Sidedness> = "Sidedness";
-template <>
-inline constexpr const char* kClass<ContactFeatures::Kind> = "ContactFeaturesKind";
-template <>
-inline constexpr const char* kClass<ContactKind> = "ContactKind";
-template <>
-inline constexpr const char* kClass<ErrorCode> = "ErrorCode";
-template <>
-inline constexpr const char* kClass<AuditFailure::Fault> = "AuditFailureFault";
-template <>
-inline constexpr const char* kClass<AuditFailure::List> = "AuditFailureList";
-template <>
-inline constexpr const char* kClass<MethodReason> = "MethodReason";
-template <>
-inline constexpr const char* kClass<InsideRule> = "InsideRule";
-template <>
-inline constexpr const char* kClass<LooseOctree::Update> = "LooseOctreeUpdate";
+inline constexpr std::array kClass<FrameStatistics::Stages> = std::to_array("FrameStages");
 
-// Settings and statistics: dataclasses with the same values.
-
-template <>
-inline constexpr const char* kClass<OctreeSettings> = "OctreeSettings";
-template <>
-inline constexpr auto kFields<OctreeSettings> =
-    std::tuple(field("max_depth", &OctreeSettings::maxDepth),
-               field("max_elements_per_leaf", &OctreeSettings::maxElementsPerLeaf),
-               field("update", &OctreeSettings::update), field("bounds", &OctreeSettings::bounds),
-               field("keeps_pairs", &OctreeSettings::keepsPairs));
-template <>
-inline constexpr const char* kClass<AuditSettings> = "AuditSettings";
-template <>
-inline constexpr auto kFields<AuditSettings> = std::tuple(
-    field("features", &AuditSettings::features), field("seed", &AuditSettings::seed),
-    field("folder", &AuditSettings::folder), field("max_files", &AuditSettings::maxFiles));
-template <>
-inline constexpr const char* kClass<Settings> = "Settings";
-template <>
-inline constexpr auto kFields<Settings> = std::tuple(field("octree", &Settings::octree),
-                                                     field("engine", &Settings::engine),
-                                                     field("threads", &Settings::threads),
-                                                     field("audit", &Settings::audit),
-                                                     field("trace_frames", &Settings::traceFrames),
-                                                     field("executor", &Settings::executor),
-                                                     field("memory_limit", &Settings::memoryLimit));
-template <>
-inline constexpr const char* kClass<PairSettings> = "PairSettings";
-template <>
-inline constexpr auto kFields<PairSettings> = std::tuple(
-    field("method", &PairSettings::method), field("thickness", &PairSettings::thickness),
-    field("contacts", &PairSettings::contacts),
-    field(
-        "motion_tolerance", [](auto& s) -> auto& { return s.automatic.motionTolerance; }),
-    field("rest_distance", &PairSettings::restDistance),
-    field(
-        "time_tolerance", [](auto& s) -> auto& { return s.continuous.timeTolerance; }),
-    field(
-        "earliest_time_only", [](auto& s) -> auto& { return s.continuous.earliestTimeOnly; }),
-    field("allowed_error", &PairSettings::allowedError),
-    field("free_motion_reach", &PairSettings::freeMotionReach),
-    field("track_contacts", &PairSettings::trackContacts),
-    field("report_crossings", &PairSettings::reportCrossings),
-    field("smooth_normals", &PairSettings::smoothNormals),
-    field("remember_sides", &PairSettings::rememberSides),
-    field(
-        "widest_normal_cone", [](auto& s) -> auto& { return s.proxy.widestNormalCone; }),
-    field("priority", &PairSettings::priority));
-template <>
-inline constexpr const char* kClass<SurfaceProxySettings> = "SurfaceProxySettings";
-template <>
-inline constexpr auto kFields<SurfaceProxySettings> =
-    std::tuple(field("reach", &SurfaceProxySettings::reach),
-               field("error_bound", &SurfaceProxySettings::errorBound),
-               field(
-                   "widest_normal_cone", [](auto& s) -> auto& { return s.widestNormalCone; }));
-template <>
-inline constexpr const char* kClass<CollisionFilter> = "CollisionFilter";
-template <>
-inline constexpr auto kFields<CollisionFilter> =
-    std::tuple(field("groups", &CollisionFilter::groups), field("mask", &CollisionFilter::mask),
-               field("sidedness", &CollisionFilter::sidedness));
-template <>
-inline constexpr const char* kClass<InsideSettings> = "InsideSettings";
-template <>
-inline constexpr auto kFields<InsideSettings> =
-    std::tuple(field("rule", &InsideSettings::rule), field("margin", &InsideSettings::margin));
-template <>
-inline constexpr const char* kClass<MemoryUse> = "MemoryUse";
-template <>
-inline constexpr auto kFields<MemoryUse> =
-    std::tuple(field("geometries", &MemoryUse::geometries), field("octrees", &MemoryUse::octrees),
-               field("pairs", &MemoryUse::pairs), field("narrow_phase", &MemoryUse::narrowPhase),
-               field("results", &MemoryUse::results), field("queries", &MemoryUse::queries),
-               field("snapshots", &MemoryUse::snapshots), field("total", &MemoryUse::total));
-template <>
-inline constexpr const char* kClass<FrameStatistics::Stages> = "FrameStages";
-template <>
-inline constexpr auto kFields<FrameStatistics::Stages> =
-    std::tuple(field("boxes", &FrameStatistics::Stages::boxes),
-               field("octree", &FrameStatistics::Stages::octree),
-               field("pairs", &FrameStatistics::Stages::pairs),
-               field("narrow_phase", &FrameStatistics::Stages::narrowPhase),
-               field("order", &FrameStatistics::Stages::order));
-template <>
-inline constexpr const char* kClass<UnfinishedPair> = "UnfinishedPair";
-template <>
-inline constexpr auto kFields<UnfinishedPair> = std::tuple(
-    field("a", &UnfinishedPair::a), field("b", &UnfinishedPair::b),
-    field("distance_bound", &UnfinishedPair::distanceBound), field("age", &UnfinishedPair::age),
-    field("exceeds_budget", &UnfinishedPair::exceedsBudget));
-template <>
-inline constexpr const char* kClass<FrameStatistics> = "FrameStatistics";
-template <>
-inline constexpr auto kFields<FrameStatistics> = std::tuple(
-    field("milliseconds", &FrameStatistics::milliseconds),
-    field("geometries", &FrameStatistics::geometries),
-    field("triangles", &FrameStatistics::triangles), field("segments", &FrameStatistics::segments),
-    field("points", &FrameStatistics::points),
-    field("untested_vertices", &FrameStatistics::untestedVertices),
-    field("rebuilt_octrees", &FrameStatistics::rebuiltOctrees),
-    field("refitted_octrees", &FrameStatistics::refittedOctrees),
-    field("unchanged_octrees", &FrameStatistics::unchangedOctrees),
-    field("candidate_pairs", &FrameStatistics::candidatePairs),
-    field("feature_pairs", &FrameStatistics::featurePairs),
-    field("contacts", &FrameStatistics::contacts),
-    field("intersecting_triangles", &FrameStatistics::intersectingTriangles),
-    field("exact_decisions", &FrameStatistics::exactDecisions),
-    field("validity_pairs", &FrameStatistics::validityPairs),
-    field("memory", &FrameStatistics::memory), field("peak_memory", &FrameStatistics::peakMemory),
-    field("unfinished_pairs", &FrameStatistics::unfinishedPairs),
-    field("free_motion_unfinished", &FrameStatistics::freeMotionUnfinished));
-template <>
-inline constexpr const char* kClass<PairStatistics> = "PairStatistics";
-template <>
-inline constexpr auto kFields<PairStatistics> =
-    std::tuple(field("milliseconds", &PairStatistics::milliseconds),
-               field("candidate_pairs", &PairStatistics::candidatePairs),
-               field("feature_pairs", &PairStatistics::featurePairs),
-               field("exact_decisions", &PairStatistics::exactDecisions),
-               field("contacts", &PairStatistics::contacts));
-template <>
-inline constexpr const char* kClass<OctreeStatistics> = "OctreeStatistics";
-template <>
-inline constexpr auto kFields<OctreeStatistics> =
-    std::tuple(field("nodes_in_use", &OctreeStatistics::nodesInUse),
-               field("nodes_allocated", &OctreeStatistics::nodesAllocated),
-               field("blocks_in_use", &OctreeStatistics::blocksInUse),
-               field("blocks_free", &OctreeStatistics::blocksFree),
-               field("blocks_allocated", &OctreeStatistics::blocksAllocated),
-               field("deepest_level", &OctreeStatistics::deepestLevel),
-               field("elements", &OctreeStatistics::elements),
-               field("max_elements_in_node", &OctreeStatistics::maxElementsInNode),
-               field("nodes_by_depth", &OctreeStatistics::nodesByDepth),
-               field("elements_by_depth", &OctreeStatistics::elementsByDepth),
-               field("bytes", &OctreeStatistics::bytes));
-template <>
-inline constexpr const char* kClass<Validity> = "Validity";
-template <>
-inline constexpr auto kFields<Validity> = std::tuple(
-    field("trusted", &Validity::trusted), field("started_apart", &Validity::startedApart),
-    field("side_may_be_wrong", &Validity::sideMayBeWrong), field("unwelded", &Validity::unwelded),
-    field("method", &Validity::method), field("reason", &Validity::reason),
-    field("at_end", &Validity::atEnd), field("at_impact", &Validity::atImpact),
-    field("displacement", &Validity::displacement),
-    field("displacement_limit", &Validity::displacementLimit),
-    field("arc_deviation", &Validity::arcDeviation),
-    field("effective_thickness", &Validity::effectiveThickness),
-    field("proxy_depth", &Validity::proxyDepth), field("age", &Validity::age),
-    field("advance_may_be_missing", &Validity::advanceMayBeMissing),
-    field("untrusted_vertices_a", &Validity::untrustedVerticesA),
-    field("untrusted_vertices_b", &Validity::untrustedVerticesB),
-    field("degenerate_triangles_a", &Validity::degenerateTrianglesA),
-    field("degenerate_triangles_b", &Validity::degenerateTrianglesB),
-    field("outside_band", &Validity::outsideBand),
-    field("near_threshold", &Validity::nearThreshold),
-    field("unreliable_sign", &Validity::unreliableSign));
-
-// Shapes.
-
-template <>
-inline constexpr const char* kClass<Sphere> = "Sphere";
-template <>
-inline constexpr auto kFields<Sphere> = std::tuple(field("centre", &Sphere::centre),
-                                                   field("radius", &Sphere::radius));
-template <>
-inline constexpr const char* kClass<Capsule> = "Capsule";
-template <>
-inline constexpr auto kFields<Capsule> = std::tuple(field("p0", &Capsule::p0),
-                                                    field("p1", &Capsule::p1),
-                                                    field("radius", &Capsule::radius));
-template <>
-inline constexpr const char* kClass<Plane> = "Plane";
-template <>
-inline constexpr auto kFields<Plane> = std::tuple(field("point", &Plane::point),
-                                                  field("normal", &Plane::normal),
-                                                  field("two_sided", &Plane::twoSided));
-template <>
-inline constexpr const char* kClass<Box> = "Box";
-template <>
-inline constexpr auto kFields<Box> = std::tuple(field("centre", &Box::centre),
-                                                field("half_extents", &Box::halfExtents));
-template <>
-inline constexpr const char* kClass<Cylinder> = "Cylinder";
-template <>
-inline constexpr auto kFields<Cylinder> = std::tuple(field("p0", &Cylinder::p0),
-                                                     field("p1", &Cylinder::p1),
-                                                     field("radius", &Cylinder::radius));
-template <>
-inline constexpr const char* kClass<ConvexHull> = "ConvexHull";
-template <>
-inline constexpr auto kFields<ConvexHull> = std::tuple(field("points", &ConvexHull::points));
+/// Calls function(name, member) for each attribute of the class of a struct. Those of a struct that
+/// has no class, such as ContinuousSettings, stand in its place.
+template <class Struct, class Function>
+void forEachAttribute(Struct& object, const Function& function) {
+  forEachMember(object, [&](const auto& field, auto& member) {
+    using Member = std::remove_cvref_t<decltype(member)>;
+    if constexpr (HasFields<Member> && !HasClass<Member>)
+      forEachAttribute(member, function);
+    else
+      function(snakeCase(field.name).text, member);
+  });
+}
 
 /// The class of a struct or an enumeration.
 template <HasClass T>
 py::handle classOf() {
-  return lookedUp<T>("palpate", kClass<T>);
+  return lookedUp<T>("palpate", kClass<T>.data());
 }
 
 /// Tags of lookedUp().
@@ -334,7 +147,7 @@ struct type_caster<T, std::enable_if_t<std::is_class_v<T> && palpate::python::Ha
   PYBIND11_TYPE_CASTER(T, const_name("object"));
   bool load(handle source, bool) {
     if (!isinstance(source, palpate::python::classOf<T>())) return false;
-    palpate::python::forEachField(value, [&](const char* field, auto& member) {
+    palpate::python::forEachAttribute(value, [&](const char* field, auto& member) {
       using Member = std::remove_cvref_t<decltype(member)>;
       member = palpate::python::fromPython<Member>(source.attr(field), field);
     });
@@ -342,7 +155,7 @@ struct type_caster<T, std::enable_if_t<std::is_class_v<T> && palpate::python::Ha
   }
   static handle cast(const T& source, return_value_policy, handle) {
     dict values;
-    palpate::python::forEachField(source, [&](const char* field, const auto& member) {
+    palpate::python::forEachAttribute(source, [&](const char* field, const auto& member) {
       values[field] = palpate::python::toPython(member);
     });
     return palpate::python::classOf<T>()(**values).release();

@@ -1,5 +1,9 @@
-#include "Fields/Description.h"
+#include "Fields/FeaturePairs.h"
+#include "Fields/Names.h"
 #include "Fields/Problem.h"
+#include "Fields/Queries.h"
+#include "Fields/Rows.h"
+#include "Fields/Shapes.h"
 #include "Fields/Statistics.h"
 #include "Fields/Topology.h"
 
@@ -12,23 +16,33 @@
 namespace palpate {
 namespace {
 
-template <class Struct>
-class FieldsTest : public testing::Test {};
+template <class... Structs>
+void expectOrderOfDeclaration() {
+  const auto expectOrder = [](const auto& object) {
+    const void* last = nullptr;
+    forEachMember(*object, [&](const auto& field, const auto& member) {
+      EXPECT_LT(last, static_cast<const void*>(&member)) << field.name;
+      last = &member;
+    });
+  };
+  (expectOrder(std::make_unique<Structs>()), ...);
+}
 
-using Structs =
-    testing::Types<ElementPair, VertexTriangleContact, EdgeEdgeContact, ShapeContact,
-                   ShapeShapeContact, ContactKey, TrackedContact, Crossing, Stencil, Validity,
-                   ContinuousSettings, AutoSettings, LeafSettings, PairSettings,
-                   SurfaceProxySettings, UnfinishedPair, ThreadEvent, CollisionProblem::Pair>;
-TYPED_TEST_SUITE(FieldsTest, Structs);
-
-TYPED_TEST(FieldsTest, AreInTheOrderOfTheStruct) {
-  const auto object = std::make_unique<TypeParam>();
-  const void* last = nullptr;
-  forEachMember(*object, [&](const auto& field, const auto& member) {
-    EXPECT_LT(last, static_cast<const void*>(&member)) << field.name;
-    last = &member;
-  });
+// Lists with another order of types do not compile. Members of equal types could still be swapped.
+TEST(Fields, AreInTheOrderOfDeclaration) {
+  expectOrderOfDeclaration<ElementPair, VertexTriangleContact, EdgeEdgeContact, ShapeContact,
+                           ShapeShapeContact, ContactKey, TrackedContact, Crossing, Stencil,
+                           Validity, VertexTriangleDistance, EdgeEdgeDistance,
+                           CollisionProblem::Pair, ThreadEvent, HeldVertex>();
+  expectOrderOfDeclaration<SurfacePoint, SignedDistance, RayHit, Pick, GeometryDistance,
+                           Penetration, PathInterval, PathClearance, InsideSettings, InsideVertex,
+                           TrackedVertex, TetrahedronPoint, EmbeddedVertex, ConstraintRow,
+                           ContactMotion>();
+  expectOrderOfDeclaration<OctreeSettings, AuditSettings, Settings, ContinuousSettings,
+                           AutoSettings, LeafSettings, PairSettings, SurfaceProxySettings,
+                           CollisionFilter, MemoryUse, UnfinishedPair, FrameStatistics::Stages,
+                           FrameStatistics, PairStatistics, OctreeStatistics, Sphere, Capsule,
+                           Plane, Box, Cylinder, ConvexHull>();
 }
 
 struct Sample {
@@ -42,6 +56,12 @@ static_assert(!kHasMoreThan<Sample, int, bool, std::optional<ContactKey>, Eigen:
 static_assert(kHasMoreThan<Sample, int, bool, std::optional<ContactKey>>);
 static_assert(kHasMoreThan<Sample, int, bool>);
 static_assert(!kBeginsWith<Sample, bool, int>);
+
+TEST(Fields, HaveNamesInTheStyleOfCAndPython) {
+  EXPECT_STREQ(snakeCase("timeOfImpact").text, "time_of_impact");
+  EXPECT_STREQ(snakeCase("p0").text, "p0");
+  EXPECT_EQ(nameOfType<ContactFeatures::Kind>(), "ContactFeatures::Kind");
+}
 
 TEST(Enumerators, HaveTheirNames) {
   static_assert(kEnumerators<Method>.size() == 6 && kEnumerators<GeometryId>.empty());
