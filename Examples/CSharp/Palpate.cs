@@ -47,7 +47,7 @@ public sealed class NativeAttribute : Attribute {
 public struct Settings {
   internal UIntPtr Size;
   public UIntPtr MemoryLimit;
-  public int Threads, Engine, OctreeUpdate, OctreeBounds, MaxDepth, MaxElementsPerLeaf;
+  public int MaxDepth, MaxElementsPerLeaf, OctreeUpdate, OctreeBounds, Engine, Threads;
   byte keepsPairs;
   public bool KeepsPairs { get { return keepsPairs != 0; } set { keepsPairs = value ? (byte)1 : (byte)0; } }
   public static Settings Default {
@@ -61,16 +61,16 @@ public struct PairSettings {
   public Method Method;
   public ContactSet Contacts;
   public int Priority;
-  byte earliestTimeOnly, trackContacts, reportCrossings, smoothNormals, rememberSides;
-  public bool EarliestTimeOnly {
-    get { return earliestTimeOnly != 0; } set { earliestTimeOnly = value ? (byte)1 : (byte)0; }
-  }
+  byte trackContacts, reportCrossings, smoothNormals, rememberSides, earliestTimeOnly;
   public bool TrackContacts { get { return trackContacts != 0; } set { trackContacts = value ? (byte)1 : (byte)0; } }
   public bool ReportCrossings {
     get { return reportCrossings != 0; } set { reportCrossings = value ? (byte)1 : (byte)0; }
   }
   public bool SmoothNormals { get { return smoothNormals != 0; } set { smoothNormals = value ? (byte)1 : (byte)0; } }
   public bool RememberSides { get { return rememberSides != 0; } set { rememberSides = value ? (byte)1 : (byte)0; } }
+  public bool EarliestTimeOnly {
+    get { return earliestTimeOnly != 0; } set { earliestTimeOnly = value ? (byte)1 : (byte)0; }
+  }
   public static PairSettings Default {
     get {
       PairSettings s;
@@ -110,7 +110,9 @@ public struct Shape {
   public bool TwoSided { get { return twoSided != 0; } set { twoSided = value ? (byte)1 : (byte)0; } }
 }
 [Native("palpate_pair")]
-public struct Pair { public uint A, B; }
+public struct Pair {
+  public uint A, B;
+}
 [Native("palpate_vertex_triangle")]
 public struct VertexTriangle {
   public uint Vertex, TriangleId;
@@ -155,26 +157,27 @@ struct Indices { public IntPtr Data; public UIntPtr Count; }
 [Native("palpate_validity")]
 public struct Validity {
   internal UIntPtr Size;
-  byte trusted, startedApart, sideMayBeWrong, unwelded;
-  public Method Method;
-  public int Reason;
   public UIntPtr AtEnd, AtImpact;
   public double Displacement, DisplacementLimit, ArcDeviation, EffectiveThickness, ProxyDepth;
-  Indices untrustedA, untrustedB, degenerateA, degenerateB, outsideBand, nearThreshold, unreliableSign;
+  Indices untrustedVerticesA, untrustedVerticesB, degenerateTrianglesA, degenerateTrianglesB;
+  Indices outsideBand, nearThreshold, unreliableSign;
+  public Method Method;
+  public int Reason;
   public uint Age;
+  byte trusted, startedApart, sideMayBeWrong, unwelded;
   byte advanceMayBeMissing;
-  public bool AdvanceMayBeMissing { get { return advanceMayBeMissing != 0; } }
+  public ReadOnlySpan<uint> UntrustedVerticesA { get { return Of(untrustedVerticesA); } }
+  public ReadOnlySpan<uint> UntrustedVerticesB { get { return Of(untrustedVerticesB); } }
+  public ReadOnlySpan<uint> DegenerateTrianglesA { get { return Of(degenerateTrianglesA); } }
+  public ReadOnlySpan<uint> DegenerateTrianglesB { get { return Of(degenerateTrianglesB); } }
+  public ReadOnlySpan<uint> OutsideBand { get { return Of(outsideBand); } }
+  public ReadOnlySpan<uint> NearThreshold { get { return Of(nearThreshold); } }
+  public ReadOnlySpan<uint> UnreliableSign { get { return Of(unreliableSign); } }
   public bool Trusted { get { return trusted != 0; } }
   public bool StartedApart { get { return startedApart != 0; } }
   public bool SideMayBeWrong { get { return sideMayBeWrong != 0; } }
   public bool Unwelded { get { return unwelded != 0; } }
-  public ReadOnlySpan<uint> UntrustedVerticesA { get { return Of(untrustedA); } }
-  public ReadOnlySpan<uint> UntrustedVerticesB { get { return Of(untrustedB); } }
-  public ReadOnlySpan<uint> DegenerateTrianglesA { get { return Of(degenerateA); } }
-  public ReadOnlySpan<uint> DegenerateTrianglesB { get { return Of(degenerateB); } }
-  public ReadOnlySpan<uint> OutsideBand { get { return Of(outsideBand); } }
-  public ReadOnlySpan<uint> NearThreshold { get { return Of(nearThreshold); } }
-  public ReadOnlySpan<uint> UnreliableSign { get { return Of(unreliableSign); } }
+  public bool AdvanceMayBeMissing { get { return advanceMayBeMissing != 0; } }
   static ReadOnlySpan<uint> Of(Indices list) { return Native.View<uint>(list.Data, list.Count); }
 }
 [Native("palpate_row")]
@@ -201,7 +204,10 @@ public struct SurfacePoint {
   public Vector Normal;
 }
 [Native("palpate_signed_distance")]
-public struct SignedDistance { public SurfacePoint Nearest; public double Distance; }
+public struct SignedDistance {
+  public SurfacePoint Nearest;
+  public double Distance;
+}
 [Native("palpate_ray")]
 public struct Ray {
   public Vector Origin, Direction;
@@ -221,7 +227,10 @@ public struct Hit {
   public bool Crosses { get { return crosses != 0; } }
 }
 [Native("palpate_distance")]
-public struct GeometryDistance { public SurfacePoint A, B; public double Distance; }
+public struct GeometryDistance {
+  public SurfacePoint A, B;
+  public double Distance;
+}
 [Native("palpate_penetration")]
 public struct Penetration {
   byte intersecting;
@@ -233,7 +242,11 @@ public struct Penetration {
   public bool Minimal { get { return minimal != 0; } }
 }
 [Native("palpate_inside_settings")]
-struct InsideSettings { public UIntPtr Size; public double Margin; public int Rule; }
+struct InsideSettings {
+  public UIntPtr Size;
+  public double Margin;
+  public int Rule;
+}
 
 /// The contacts of a pair: spans of the library's memory, until the next call that changes the Detection.
 public struct Contacts {

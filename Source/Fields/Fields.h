@@ -19,9 +19,10 @@ enum class Unit : std::uint8_t {
   Bytes
 };
 
-/// A member of a public struct.
-template <class Struct, class Member>
+/// A member of a public struct. isInC: the C interface has it.
+template <class Struct, class Member, bool isInC = true>
 struct Field {
+  static constexpr bool kIsInC = isInC;
   const char* name;
   Member Struct::*member;
   Unit unit;
@@ -31,6 +32,10 @@ template <class Struct, class Member>
 constexpr Field<Struct, Member> field(const char* name, Member Struct::*member,
                                       Unit unit = Unit::None) {
   return {name, member, unit};
+}
+template <class Struct, class Member>
+constexpr Field<Struct, Member, false> notInC(const Field<Struct, Member>& field) {
+  return {field.name, field.member, field.unit};
 }
 
 /// A value that initialises only members of this type.
@@ -54,8 +59,8 @@ inline constexpr bool kHasMoreThan = requires {
 
 /// All members of a struct: a function that calls another one with the fields. It costs the
 /// compiler less than a std::tuple.
-template <class Struct, class... Members>
-constexpr auto listOf(Field<Struct, Members>... fields) {
+template <class Struct, class... Members, bool... isInC>
+constexpr auto listOf(Field<Struct, Members, isInC>... fields) {
   static_assert(kBeginsWith<Struct, Members...> && !kHasMoreThan<Struct, Members...>,
                 "the list must have all members in the order of the struct");
   return [=](auto&& function) -> decltype(auto) { return function(fields...); };

@@ -26,6 +26,14 @@ struct Fields<SignedDistance> {
 };
 
 template <>
+struct Fields<Ray> {
+  using T = Ray;
+  static constexpr auto kList = listOf(field("origin", &T::origin, Unit::Length),
+                                       field("direction", &T::direction, Unit::Length),
+                                       field("tMin", &T::tMin), field("tMax", &T::tMax));
+};
+
+template <>
 struct Fields<RayHit> {
   using T = RayHit;
   static constexpr auto kList =

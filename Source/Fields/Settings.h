@@ -28,8 +28,8 @@ struct Fields<Settings> {
   using T = Settings;
   static constexpr auto kList = listOf(
       field("octree", &T::octree), field("engine", &T::engine), field("threads", &T::threads),
-      field("audit", &T::audit), field("traceFrames", &T::traceFrames),
-      field("executor", &T::executor), field("memoryLimit", &T::memoryLimit, Unit::Bytes));
+      notInC(field("audit", &T::audit)), notInC(field("traceFrames", &T::traceFrames)),
+      notInC(field("executor", &T::executor)), field("memoryLimit", &T::memoryLimit, Unit::Bytes));
 };
 
 template <>
@@ -71,6 +71,14 @@ struct Fields<CollisionFilter> {
   using T = CollisionFilter;
   static constexpr auto kList = listOf(field("groups", &T::groups), field("mask", &T::mask),
                                        field("sidedness", &T::sidedness));
+};
+
+template <>
+struct Fields<ContactFeatures> {
+  using T = ContactFeatures;
+  static constexpr auto kList =
+      listOf(field("kind", &T::kind), field("a", &T::a), field("b", &T::b), field("tagA", &T::tagA),
+             field("tagB", &T::tagB));
 };
 
 template <>

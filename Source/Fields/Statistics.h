@@ -48,7 +48,7 @@ struct Fields<FrameStatistics> {
       field("intersectingTriangles", &T::intersectingTriangles),
       field("exactDecisions", &T::exactDecisions), field("validityPairs", &T::validityPairs),
       field("memory", &T::memory), field("peakMemory", &T::peakMemory),
-      field("unfinishedPairs", &T::unfinishedPairs),
+      notInC(field("unfinishedPairs", &T::unfinishedPairs)),
       field("freeMotionUnfinished", &T::freeMotionUnfinished));
 };
 

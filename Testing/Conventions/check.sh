@@ -41,8 +41,8 @@ allowedIn() {
     CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
-    Python) echo "Python/ Fields/" ;;
-    Vtk | Fcl | C | iMSTK) echo "$1/" ;;
+    C | Python) echo "$1/ Fields/" ;;
+    Vtk | Fcl | iMSTK) echo "$1/" ;;
   esac
 }
 

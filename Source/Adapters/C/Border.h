@@ -98,10 +98,10 @@ Struct& sized(Struct* data, const char* name) {
 
 /// The enumerator with this value; they count from 0 to `last`.
 template <class Enumeration>
-Enumeration enumerator(int value, Enumeration last, const char* name) {
+Enumeration enumerator(int value, Enumeration last, const std::string& name) {
   if (value < 0 || value > static_cast<int>(last))
-    throw InvalidArgument(std::string(name) + " is " + std::to_string(value) +
-                          "; it must be in [0, " + std::to_string(static_cast<int>(last)) + "].");
+    throw InvalidArgument(name + " is " + std::to_string(value) + "; it must be in [0, " +
+                          std::to_string(static_cast<int>(last)) + "].");
   return static_cast<Enumeration>(value);
 }
 

@@ -1,6 +1,7 @@
 // Part of <palpate/palpate_c.h>: geometries, pairs and frames.
 #include "C/Handles.h"
-#include "C/Twins.h"
+#include "C/Structs.h"
+#include "Fields/Settings.h"
 
 #include <palpate/Capture.h>
 
@@ -33,70 +34,6 @@ std::span<const Eigen::Vector3d> positionsOrNone(const double* data, std::size_t
   return c::positions(data, data ? count : 0);
 }
 
-Settings settingsOf(const palpate_settings* settings) {
-  if (!settings) return {};
-  const palpate_settings& s = sized(settings, "the settings");
-  return {.octree = {.maxDepth = s.max_depth,
-                     .maxElementsPerLeaf = s.max_elements_per_leaf,
-                     .update = enumerator(s.octree_update, OctreeUpdate::Rebuild, "octree_update"),
-                     .bounds = enumerator(s.octree_bounds, OctreeBounds::Dop18, "octree_bounds"),
-                     .keepsPairs = s.keeps_pairs != 0},
-          .engine = enumerator(s.engine, Engine::BruteForce, "engine"),
-          .threads = s.threads,
-          .memoryLimit = s.memory_limit};
-}
-
-palpate_settings fromSettings(const Settings& s) {
-  return {.size = sizeof(palpate_settings),
-          .memory_limit = s.memoryLimit,
-          .threads = s.threads,
-          .engine = static_cast<int>(s.engine),
-          .octree_update = static_cast<int>(s.octree.update),
-          .octree_bounds = static_cast<int>(s.octree.bounds),
-          .max_depth = s.octree.maxDepth,
-          .max_elements_per_leaf = s.octree.maxElementsPerLeaf,
-          .keeps_pairs = s.octree.keepsPairs};
-}
-
-PairSettings pairSettingsOf(const palpate_pair_settings* settings) {
-  if (!settings) return {};
-  const palpate_pair_settings& s = sized(settings, "the settings");
-  return {.method = enumerator(s.method, Method::Proxy, "method"),
-          .thickness = s.thickness,
-          .contacts = enumerator(s.contacts, Contacts::All, "contacts"),
-          .restDistance = s.rest_distance,
-          .allowedError = s.allowed_error,
-          .freeMotionReach = s.free_motion_reach,
-          .trackContacts = s.track_contacts != 0,
-          .reportCrossings = s.report_crossings != 0,
-          .smoothNormals = s.smooth_normals != 0,
-          .rememberSides = s.remember_sides != 0,
-          .continuous = {.timeTolerance = s.time_tolerance,
-                         .earliestTimeOnly = s.earliest_time_only != 0},
-          .automatic = {.motionTolerance = s.motion_tolerance},
-          .proxy = {.widestNormalCone = s.widest_normal_cone},
-          .priority = s.priority};
-}
-
-palpate_pair_settings fromPairSettings(const PairSettings& s) {
-  return {.size = sizeof(palpate_pair_settings),
-          .thickness = s.thickness,
-          .rest_distance = s.restDistance,
-          .allowed_error = s.allowedError,
-          .free_motion_reach = s.freeMotionReach,
-          .time_tolerance = s.continuous.timeTolerance,
-          .motion_tolerance = s.automatic.motionTolerance,
-          .widest_normal_cone = s.proxy.widestNormalCone,
-          .method = static_cast<int>(s.method),
-          .contacts = static_cast<int>(s.contacts),
-          .priority = s.priority,
-          .earliest_time_only = s.continuous.earliestTimeOnly,
-          .track_contacts = s.trackContacts,
-          .report_crossings = s.reportCrossings,
-          .smooth_normals = s.smoothNormals,
-          .remember_sides = s.rememberSides};
-}
-
 /// Sets the id of what add() adds. Nothing is added if there is no place for it.
 template <class Add>
 void giveId(palpate_id* id, const Add& add) {
@@ -114,26 +51,22 @@ GeometryId withRadii(const double* radii, std::size_t count, const Add& add) {
 }  // namespace
 
 palpate_status palpate_init_settings(palpate_settings* settings, size_t size) {
-  return initialise(__func__, settings, size, fromSettings({}));
+  return initialiseAs<Settings>(__func__, settings, size);
 }
 palpate_status palpate_init_pair_settings(palpate_pair_settings* settings, size_t size) {
-  return initialise(__func__, settings, size, fromPairSettings({}));
+  return initialiseAs<PairSettings>(__func__, settings, size);
 }
 palpate_status palpate_init_filter(palpate_filter* filter, size_t size) {
-  const CollisionFilter f;
-  return initialise(__func__, filter, size,
-                    {sizeof *filter, f.groups, f.mask, static_cast<int>(f.sidedness)});
+  return initialiseAs<CollisionFilter>(__func__, filter, size);
 }
 palpate_status palpate_init_proxy_settings(palpate_proxy_settings* settings, size_t size) {
-  const SurfaceProxySettings s;
-  return initialise(__func__, settings, size,
-                    {sizeof *settings, s.reach, s.errorBound, s.widestNormalCone});
+  return initialiseAs<SurfaceProxySettings>(__func__, settings, size);
 }
 
 palpate_status palpate_create(const palpate_settings* settings, palpate_cd** cd) {
   return guarded(__func__, [&] {
     given(cd, "cd");
-    *cd = new palpate_cd{OctreeBasedCD(settingsOf(settings))};
+    *cd = new palpate_cd{OctreeBasedCD(structFrom<Settings>(settings))};
   });
 }
 void palpate_destroy(palpate_cd* cd) { delete cd; }
@@ -198,10 +131,7 @@ palpate_status palpate_attach_proxy(palpate_cd* cd, palpate_id mesh,
                                     const palpate_proxy_settings* settings) {
   return guarded(__func__, [&] {
     std::optional<SurfaceProxySettings> proxy;
-    if (settings) {
-      const palpate_proxy_settings& s = sized(settings, "the settings");
-      proxy = {s.reach, s.error_bound, s.widest_normal_cone};
-    }
+    if (settings) proxy = structFrom<SurfaceProxySettings>(settings);
     of(cd).attachSurfaceProxy(GeometryId{mesh}, proxy);
   });
 }
@@ -283,9 +213,8 @@ palpate_status palpate_set_name(palpate_cd* cd, palpate_id id, const char* name)
 }
 palpate_status palpate_set_filter(palpate_cd* cd, palpate_id id, const palpate_filter* filter) {
   return guarded(__func__, [&] {
-    const palpate_filter& f = sized(filter, "the filter");
     of(cd).setCollisionFilter(
-        GeometryId{id}, {f.groups, f.mask, enumerator(f.sidedness, Sidedness::Outer, "sidedness")});
+        GeometryId{id}, structFrom<CollisionFilter>(&given(filter, "the filter"), "the filter"));
   });
 }
 palpate_status palpate_set_disabled_elements(palpate_cd* cd, palpate_id id,
@@ -354,13 +283,13 @@ palpate_status palpate_get_tags(const palpate_cd* cd, palpate_id id, const uint3
 palpate_status palpate_add_pair(palpate_cd* cd, palpate_id a, palpate_id b,
                                 const palpate_pair_settings* settings) {
   return guarded(__func__, [&] {
-    of(cd).addCollisionPair(GeometryId{a}, GeometryId{b}, pairSettingsOf(settings));
+    of(cd).addCollisionPair(GeometryId{a}, GeometryId{b}, structFrom<PairSettings>(settings));
   });
 }
 palpate_status palpate_set_pair_settings(palpate_cd* cd, palpate_id a, palpate_id b,
                                          const palpate_pair_settings* settings) {
   return guarded(__func__, [&] {
-    of(cd).setPairSettings(GeometryId{a}, GeometryId{b}, pairSettingsOf(settings));
+    of(cd).setPairSettings(GeometryId{a}, GeometryId{b}, structFrom<PairSettings>(settings));
   });
 }
 palpate_status palpate_set_predicate(palpate_cd* cd, palpate_id a, palpate_id b,
@@ -381,7 +310,7 @@ palpate_status palpate_get_pair_settings(const palpate_cd* cd, palpate_id a, pal
                                          palpate_pair_settings* settings) {
   return guarded(__func__, [&] {
     sized(settings, "the settings") =
-        fromPairSettings(of(cd).pairSettings(GeometryId{a}, GeometryId{b}));
+        structOf<palpate_pair_settings>(of(cd).pairSettings(GeometryId{a}, GeometryId{b}));
   });
 }
 palpate_status palpate_get_pairs(const palpate_cd* cd, palpate_pair* pairs, size_t capacity,

@@ -1,6 +1,7 @@
 // Part of <palpate/palpate_c.h>: queries.
 #include "C/Handles.h"
-#include "C/Twins.h"
+#include "C/Structs.h"
+#include "Fields/Queries.h"
 
 using namespace palpate;
 using namespace palpate::c;
@@ -8,12 +9,6 @@ using namespace palpate::c;
 namespace {
 
 static_assert(PALPATE_INSIDE_WINDING_NUMBER == static_cast<int>(InsideRule::WindingNumber));
-
-InsideSettings insideSettingsOf(const palpate_inside_settings* settings) {
-  if (!settings) return {};
-  const palpate_inside_settings& s = sized(settings, "the settings");
-  return {enumerator(s.rule, InsideRule::WindingNumber, "rule"), s.margin};
-}
 
 palpate_hit noHit() {
   palpate_hit hit{};
@@ -27,9 +22,7 @@ const Ray& rayOf(const palpate_ray* ray) { return twins(ray, 1, "ray")[0]; }
 }  // namespace
 
 palpate_status palpate_init_inside_settings(palpate_inside_settings* settings, size_t size) {
-  const InsideSettings s;
-  return initialise(__func__, settings, size,
-                    {sizeof *settings, s.margin, static_cast<int>(s.rule)});
+  return initialiseAs<InsideSettings>(__func__, settings, size);
 }
 
 palpate_status palpate_create_queries(const palpate_cd* cd, palpate_queries** queries) {
@@ -65,7 +58,7 @@ palpate_status palpate_contains(const palpate_queries* queries, palpate_id body,
   return guarded(__func__, [&] {
     const auto all = positions(points, count, "points");
     const auto flags = array(inside, count, "inside");
-    const InsideSettings rule = insideSettingsOf(settings);
+    const InsideSettings rule = structFrom<InsideSettings>(settings);
     for (std::size_t i = 0; i < count; ++i)
       flags[i] = of(queries).contains(GeometryId{body}, all[i], rule);
   });
@@ -76,7 +69,7 @@ palpate_status palpate_signed_distances(const palpate_queries* queries, palpate_
                                         palpate_signed_distance* out) {
   return guarded(__func__, [&] {
     of(queries).signedDistances(GeometryId{body}, positions(points, count, "points"),
-                                twins(out, count, "out"), insideSettingsOf(settings));
+                                twins(out, count, "out"), structFrom<InsideSettings>(settings));
   });
 }
 palpate_status palpate_elements_within(const palpate_queries* queries, palpate_id id,
@@ -186,7 +179,7 @@ palpate_status palpate_inside_vertices(const palpate_queries* queries, palpate_i
     const List<palpate_inside_vertex> list(out, capacity, count, "out");
     std::vector<InsideVertex> all;
     of(queries).findInsideVertices(GeometryId{vertices}, GeometryId{body}, all,
-                                   insideSettingsOf(settings));
+                                   structFrom<InsideSettings>(settings));
     list.fill(all);
   });
 }

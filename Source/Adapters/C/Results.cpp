@@ -1,6 +1,8 @@
 // Part of <palpate/palpate_c.h>: contacts, constraint rows and statistics.
 #include "C/Handles.h"
-#include "C/Twins.h"
+#include "C/Structs.h"
+#include "Fields/Contacts.h"
+#include "Fields/Statistics.h"
 
 using namespace palpate;
 using namespace palpate::c;
@@ -26,7 +28,6 @@ static_assert(PALPATE_REASON_CHEAPEST == static_cast<int>(MethodReason::Cheapest
 static_assert(PALPATE_REASON_NO_ALTERNATIVE == static_cast<int>(MethodReason::NoAlternative));
 static_assert(PALPATE_REASON_ALLOWED_ERROR == static_cast<int>(MethodReason::AllowedError));
 static_assert(PALPATE_REASON_OUT_OF_TIME == static_cast<int>(MethodReason::OutOfTime));
-
 static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactKind::TriangleVertex));
 static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactKind::EdgeEdge));
 static_assert(PALPATE_SHAPE_ELEMENT == static_cast<int>(ContactKind::Shape));
@@ -38,10 +39,6 @@ static_assert(PALPATE_END_APART == static_cast<int>(ContactEnd::Apart));
 
 const CollisionData& dataOf(const palpate_cd* cd, palpate_id a, palpate_id b) {
   return of(cd).collisionData(GeometryId{a}, GeometryId{b});
-}
-
-palpate_indices indices(const std::vector<std::uint32_t>& list) {
-  return {list.data(), list.size()};
 }
 
 SolverVertices verticesOf(const palpate_side* side, const char* name) {
@@ -129,30 +126,7 @@ palpate_status palpate_get_validity(const palpate_cd* cd, palpate_id a, palpate_
                                     palpate_validity* validity) {
   return guarded(__func__, [&] {
     sized(validity, "validity");
-    const Validity& v = dataOf(cd, a, b).validity();
-    *validity = {.size = sizeof *validity,
-                 .trusted = v.trusted,
-                 .started_apart = v.startedApart,
-                 .side_may_be_wrong = v.sideMayBeWrong,
-                 .unwelded = v.unwelded,
-                 .method = static_cast<int>(v.method),
-                 .reason = static_cast<int>(v.reason),
-                 .at_end = v.atEnd,
-                 .at_impact = v.atImpact,
-                 .displacement = v.displacement,
-                 .displacement_limit = v.displacementLimit,
-                 .arc_deviation = v.arcDeviation,
-                 .effective_thickness = v.effectiveThickness,
-                 .proxy_depth = v.proxyDepth,
-                 .untrusted_vertices_a = indices(v.untrustedVerticesA),
-                 .untrusted_vertices_b = indices(v.untrustedVerticesB),
-                 .degenerate_triangles_a = indices(v.degenerateTrianglesA),
-                 .degenerate_triangles_b = indices(v.degenerateTrianglesB),
-                 .outside_band = indices(v.outsideBand),
-                 .near_threshold = indices(v.nearThreshold),
-                 .unreliable_sign = indices(v.unreliableSign),
-                 .age = v.age,
-                 .advance_may_be_missing = v.advanceMayBeMissing};
+    *validity = structOf<palpate_validity>(dataOf(cd, a, b).validity());
   });
 }
 palpate_status palpate_get_earliest_time(const palpate_cd* cd, palpate_id a, palpate_id b,
@@ -250,30 +224,7 @@ palpate_status palpate_set_remembered_sides(palpate_cd* cd, palpate_id a, palpat
 palpate_status palpate_get_statistics(const palpate_cd* cd, palpate_statistics* statistics) {
   return guarded(__func__, [&] {
     sized(statistics, "statistics");
-    const FrameStatistics& s = of(cd).statistics();
-    *statistics = {.size = sizeof *statistics,
-                   .boxes_ms = s.milliseconds.boxes,
-                   .octree_ms = s.milliseconds.octree,
-                   .pairs_ms = s.milliseconds.pairs,
-                   .narrow_phase_ms = s.milliseconds.narrowPhase,
-                   .order_ms = s.milliseconds.order,
-                   .geometries = s.geometries,
-                   .triangles = s.triangles,
-                   .segments = s.segments,
-                   .points = s.points,
-                   .untested_vertices = s.untestedVertices,
-                   .rebuilt_octrees = s.rebuiltOctrees,
-                   .refitted_octrees = s.refittedOctrees,
-                   .unchanged_octrees = s.unchangedOctrees,
-                   .candidate_pairs = s.candidatePairs,
-                   .feature_pairs = s.featurePairs,
-                   .contacts = s.contacts,
-                   .intersecting_triangles = s.intersectingTriangles,
-                   .exact_decisions = s.exactDecisions,
-                   .validity_pairs = s.validityPairs,
-                   .memory = fromTwin<palpate_memory>(s.memory),
-                   .peak_memory = fromTwin<palpate_memory>(s.peakMemory),
-                   .free_motion_unfinished = s.freeMotionUnfinished};
+    *statistics = structOf<palpate_statistics>(of(cd).statistics());
   });
 }
 palpate_status palpate_get_unfinished_pairs(const palpate_cd* cd,
@@ -289,9 +240,8 @@ palpate_status palpate_get_pair_statistics(const palpate_cd* cd, palpate_id a, p
                                            palpate_pair_statistics* statistics) {
   return guarded(__func__, [&] {
     sized(statistics, "statistics");
-    const PairStatistics s = of(cd).pairStatistics(GeometryId{a}, GeometryId{b});
-    *statistics = {sizeof *statistics, s.milliseconds,   s.candidatePairs,
-                   s.featurePairs,     s.exactDecisions, s.contacts};
+    *statistics =
+        structOf<palpate_pair_statistics>(of(cd).pairStatistics(GeometryId{a}, GeometryId{b}));
   });
 }
 

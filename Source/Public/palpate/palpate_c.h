@@ -97,12 +97,12 @@ enum { PALPATE_INSIDE_CLOSED, PALPATE_INSIDE_WINDING_NUMBER };  ///< InsideRule
 typedef struct palpate_settings {
   size_t size;
   size_t memory_limit;  ///< bytes; 0: no limit
-  int threads;          ///< 0: one per core
-  int engine;
-  int octree_update;
-  int octree_bounds;
   int max_depth;
   int max_elements_per_leaf;
+  int octree_update;
+  int octree_bounds;
+  int engine;
+  int threads;  ///< 0: one per core
   uint8_t keeps_pairs;
 } palpate_settings;
 PALPATE_EXPORT palpate_status palpate_init_settings(palpate_settings* settings, size_t size);
@@ -119,9 +119,9 @@ typedef struct palpate_pair_settings {
   int method;
   int contacts;
   int priority;
-  uint8_t earliest_time_only;
   uint8_t track_contacts, report_crossings;
   uint8_t smooth_normals, remember_sides;
+  uint8_t earliest_time_only;
 } palpate_pair_settings;
 PALPATE_EXPORT palpate_status palpate_init_pair_settings(palpate_pair_settings* settings,
                                                          size_t size);
@@ -450,14 +450,14 @@ enum {
 /// <palpate/Validity.h>
 typedef struct palpate_validity {
   size_t size;
-  uint8_t trusted, started_apart, side_may_be_wrong, unwelded;
-  int method, reason;
   size_t at_end, at_impact;
   double displacement, displacement_limit, arc_deviation, effective_thickness, proxy_depth;  ///< L
   palpate_indices untrusted_vertices_a, untrusted_vertices_b;
   palpate_indices degenerate_triangles_a, degenerate_triangles_b;
   palpate_indices outside_band, near_threshold, unreliable_sign;
+  int method, reason;
   uint32_t age;  ///< in detections
+  uint8_t trusted, started_apart, side_may_be_wrong, unwelded;
   uint8_t advance_may_be_missing;
 } palpate_validity;
 

@@ -34,15 +34,15 @@ TEST(Fields, AreInTheOrderOfDeclaration) {
                            ShapeShapeContact, ContactKey, TrackedContact, Crossing, Stencil,
                            Validity, VertexTriangleDistance, EdgeEdgeDistance,
                            CollisionProblem::Pair, ThreadEvent, HeldVertex>();
-  expectOrderOfDeclaration<SurfacePoint, SignedDistance, RayHit, Pick, GeometryDistance,
+  expectOrderOfDeclaration<SurfacePoint, SignedDistance, Ray, RayHit, Pick, GeometryDistance,
                            Penetration, PathInterval, PathClearance, InsideSettings, InsideVertex,
                            TrackedVertex, TetrahedronPoint, EmbeddedVertex, ConstraintRow,
                            ContactMotion>();
   expectOrderOfDeclaration<OctreeSettings, AuditSettings, Settings, ContinuousSettings,
                            AutoSettings, LeafSettings, PairSettings, SurfaceProxySettings,
-                           CollisionFilter, MemoryUse, UnfinishedPair, FrameStatistics::Stages,
-                           FrameStatistics, PairStatistics, OctreeStatistics, Sphere, Capsule,
-                           Plane, Box, Cylinder, ConvexHull>();
+                           CollisionFilter, ContactFeatures, MemoryUse, UnfinishedPair,
+                           FrameStatistics::Stages, FrameStatistics, PairStatistics,
+                           OctreeStatistics, Sphere, Capsule, Plane, Box, Cylinder, ConvexHull>();
 }
 
 struct Sample {
