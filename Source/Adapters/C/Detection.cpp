@@ -16,20 +16,6 @@ using namespace palpate::c;
 
 namespace {
 
-static_assert(PALPATE_UPDATE_REBUILD == static_cast<int>(OctreeUpdate::Rebuild));
-static_assert(PALPATE_BOUNDS_DOP14 == static_cast<int>(OctreeBounds::Dop14));
-static_assert(PALPATE_BOUNDS_DOP18 == static_cast<int>(OctreeBounds::Dop18));
-static_assert(PALPATE_ENGINE_BRUTE_FORCE == static_cast<int>(Engine::BruteForce));
-static_assert(PALPATE_METHOD_INTERSECTION == static_cast<int>(Method::Intersection));
-static_assert(PALPATE_METHOD_PROXIMITY == static_cast<int>(Method::Proximity));
-static_assert(PALPATE_METHOD_CONTINUOUS == static_cast<int>(Method::Continuous));
-static_assert(PALPATE_METHOD_DISTANCE_FIELD == static_cast<int>(Method::DistanceField));
-static_assert(PALPATE_METHOD_PROXY == static_cast<int>(Method::Proxy));
-static_assert(PALPATE_CONTACTS_ALL == static_cast<int>(Contacts::All));
-static_assert(PALPATE_SIDES_OUTER == static_cast<int>(Sidedness::Outer));
-static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactFeatures::Kind::TriangleVertex));
-static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactFeatures::Kind::EdgeEdge));
-
 std::span<const Eigen::Vector3d> positionsOrNone(const double* data, std::size_t count) {
   return c::positions(data, data ? count : 0);
 }

@@ -8,8 +8,6 @@ using namespace palpate::c;
 
 namespace {
 
-static_assert(PALPATE_INSIDE_WINDING_NUMBER == static_cast<int>(InsideRule::WindingNumber));
-
 palpate_hit noHit() {
   palpate_hit hit{};
   hit.element = PALPATE_NO_ELEMENT;

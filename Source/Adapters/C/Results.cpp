@@ -9,34 +9,6 @@ using namespace palpate::c;
 
 namespace {
 
-static_assert(PALPATE_CORNER_A == static_cast<int>(TriangleFeature::CornerA));
-static_assert(PALPATE_CORNER_B == static_cast<int>(TriangleFeature::CornerB));
-static_assert(PALPATE_CORNER_C == static_cast<int>(TriangleFeature::CornerC));
-static_assert(PALPATE_EDGE_AB == static_cast<int>(TriangleFeature::EdgeAB));
-static_assert(PALPATE_EDGE_BC == static_cast<int>(TriangleFeature::EdgeBC));
-static_assert(PALPATE_EDGE_CA == static_cast<int>(TriangleFeature::EdgeCA));
-static_assert(PALPATE_FACE == static_cast<int>(TriangleFeature::Face));
-static_assert(PALPATE_EDGE_END == static_cast<int>(EdgeFeature::End));
-static_assert(PALPATE_EDGE_INTERIOR == static_cast<int>(EdgeFeature::Interior));
-static_assert(PALPATE_ELEMENT_EDGE == static_cast<int>(ShapeElement::Edge));
-static_assert(PALPATE_ELEMENT_FACE == static_cast<int>(ShapeElement::Face));
-static_assert(PALPATE_REASON_STILL == static_cast<int>(MethodReason::Still));
-static_assert(PALPATE_REASON_SLOW == static_cast<int>(MethodReason::Slow));
-static_assert(PALPATE_REASON_FAST == static_cast<int>(MethodReason::Fast));
-static_assert(PALPATE_REASON_MIXED == static_cast<int>(MethodReason::Mixed));
-static_assert(PALPATE_REASON_CHEAPEST == static_cast<int>(MethodReason::Cheapest));
-static_assert(PALPATE_REASON_NO_ALTERNATIVE == static_cast<int>(MethodReason::NoAlternative));
-static_assert(PALPATE_REASON_ALLOWED_ERROR == static_cast<int>(MethodReason::AllowedError));
-static_assert(PALPATE_REASON_OUT_OF_TIME == static_cast<int>(MethodReason::OutOfTime));
-static_assert(PALPATE_TRIANGLE_VERTEX == static_cast<int>(ContactKind::TriangleVertex));
-static_assert(PALPATE_EDGE_EDGE == static_cast<int>(ContactKind::EdgeEdge));
-static_assert(PALPATE_SHAPE_ELEMENT == static_cast<int>(ContactKind::Shape));
-static_assert(PALPATE_SHAPE_SHAPE == static_cast<int>(ContactKind::ShapeShape));
-static_assert(PALPATE_END_CUT == static_cast<int>(ContactEnd::Cut));
-static_assert(PALPATE_END_DISABLED == static_cast<int>(ContactEnd::Disabled));
-static_assert(PALPATE_END_FILTERED == static_cast<int>(ContactEnd::Filtered));
-static_assert(PALPATE_END_APART == static_cast<int>(ContactEnd::Apart));
-
 const CollisionData& dataOf(const palpate_cd* cd, palpate_id a, palpate_id b) {
   return of(cd).collisionData(GeometryId{a}, GeometryId{b});
 }

@@ -7,12 +7,6 @@ using namespace palpate::c;
 
 namespace {
 
-static_assert(PALPATE_PASSED == static_cast<int>(ThreadEvent::Cause::Passed));
-static_assert(PALPATE_END_PASSED == static_cast<int>(ThreadEvent::Cause::EndPassed));
-static_assert(PALPATE_SET == static_cast<int>(ThreadEvent::Cause::Set));
-static_assert(PALPATE_CUT == static_cast<int>(ThreadEvent::Cause::Cut));
-static_assert(PALPATE_DISABLED == static_cast<int>(ThreadEvent::Cause::Disabled));
-
 VertexPath pathOf(palpate_id id, const uint32_t* vertices, size_t count, const char* name) {
   const auto all = array(vertices, count, name);
   return {GeometryId{id}, {all.begin(), all.end()}};

@@ -3,6 +3,7 @@
 L is the length unit of the positions. The C++ header <palpate/Settings.h> has all details.
 """
 
+import enum
 import os
 from dataclasses import dataclass, field
 
@@ -26,8 +27,17 @@ from palpate._enums import (
 from palpate._palpate import Executor
 
 
+class _Settings:
+    """Names of enumerators become the enumerators."""
+
+    def __post_init__(self) -> None:
+        for name, default in type(self).__dict__.items():
+            if isinstance(default, enum.IntEnum):
+                object.__setattr__(self, name, parse(type(default), getattr(self, name)))
+
+
 @dataclass(frozen=True, kw_only=True)
-class OctreeSettings:
+class OctreeSettings(_Settings):
     """Settings of octrees. Contacts do not depend on them.
 
     max_depth              deepest level, in [1, 60]; the root has level 0
@@ -42,10 +52,6 @@ class OctreeSettings:
     update: OctreeUpdate | OctreeUpdateName = OctreeUpdate.AUTO
     bounds: OctreeBounds | OctreeBoundsName = OctreeBounds.BOX
     keeps_pairs: bool = True
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "update", parse(OctreeUpdate, self.update))
-        object.__setattr__(self, "bounds", parse(OctreeBounds, self.bounds))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +74,7 @@ class AuditSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class Settings(_Settings):
     """Settings of an OctreeBasedCD, for its whole life.
 
     octree           OctreeSettings
@@ -88,15 +94,12 @@ class Settings:
     executor: Executor | None = None
     memory_limit: int = 0
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "engine", parse(Engine, self.engine))
-
     def __getstate__(self) -> dict[str, object]:
         return {**self.__dict__, "executor": None}
 
 
 @dataclass(frozen=True, kw_only=True)
-class PairSettings:
+class PairSettings(_Settings):
     """How one pair is tested.
 
     method              a Method or its name, as "continuous"
@@ -122,22 +125,18 @@ class PairSettings:
     method: Method | MethodName = Method.AUTO
     thickness: float = 0.0
     contacts: Contacts | ContactsName = Contacts.DISTINCT
-    motion_tolerance: float = -1.0
     rest_distance: float = 0.0
-    time_tolerance: float = 1e-6
-    earliest_time_only: bool = False
     allowed_error: float = 0.0
     free_motion_reach: float = 0.0
     track_contacts: bool = False
     report_crossings: bool = False
     smooth_normals: bool = False
     remember_sides: bool = False
+    time_tolerance: float = 1e-6
+    earliest_time_only: bool = False
+    motion_tolerance: float = -1.0
     widest_normal_cone: float = 0.25
     priority: int = 0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "method", parse(Method, self.method))
-        object.__setattr__(self, "contacts", parse(Contacts, self.contacts))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +154,7 @@ class SurfaceProxySettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CollisionFilter:
+class CollisionFilter(_Settings):
     """Which pairs a geometry takes part in, and from which sides.
 
     groups     bits: the groups that the geometry belongs to
@@ -167,12 +166,9 @@ class CollisionFilter:
     mask: int = 0xFFFFFFFF
     sidedness: Sidedness | SidednessName = Sidedness.BOTH
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "sidedness", parse(Sidedness, self.sidedness))
-
 
 @dataclass(frozen=True, kw_only=True)
-class InsideSettings:
+class InsideSettings(_Settings):
     """Which points are inside a body.
 
     rule    an InsideRule or its name
@@ -181,6 +177,3 @@ class InsideSettings:
 
     rule: InsideRule | InsideRuleName = InsideRule.CLOSED
     margin: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rule", parse(InsideRule, self.rule))
