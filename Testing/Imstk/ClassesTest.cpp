@@ -83,13 +83,30 @@ TEST(Classes, APickerPicksEachCellThatASphereTouchesOnce) {
   EXPECT_GT(cells, 1000u);
 }
 
+/// A tetrahedron's surface that slants through the plane y = 0. The contact of its tip has the cell
+/// next to the tip, and not the cells that its sides pierce.
+std::shared_ptr<imstk::SurfaceMesh> spike(int i) {
+  const double s = std::sin(1.7 * i), c = std::cos(1.7 * i);
+  const Vec3d top(0.3 * s, 0.5, 0.2 * c);
+  auto mesh = std::make_shared<imstk::SurfaceMesh>();
+  mesh->initialize(positionArray({top, top + 0.1 * Vec3d(c, 0, s), top + 0.1 * Vec3d(-s, 0, c),
+                                  Vec3d(0.5 * c, -0.6, 0.4 * s)}),
+                   cellArray<3>({{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}));
+  return mesh;
+}
+
 TEST(Classes, APickerPicksEachCellThatASurfaceIntersectsOnce) {
   std::size_t cells = 0;
-  for (int i = 0; i < 30; ++i) {
-    const auto mesh = sheet({0, 0, 0}, 8), blade = sheet({0.03, 0.01, 0.02}, 5, 1.3);
-    for (Vec3d& p : positionsIn(*mesh)) p.y() = 0.2 * std::sin(5 * p.x() + i) * std::cos(3 * p.z());
-    for (Vec3d& p : positionsIn(*blade))
-      p.y() = 0.3 * std::cos(4 * p.x() - i) * std::sin(2 * p.z() + i);
+  for (int i = 0; i < 60; ++i) {
+    const bool isSpike = i >= 30;
+    const auto mesh = sheet({0, 0, 0}, 8),
+               blade = isSpike ? spike(i) : sheet({0.03, 0.01, 0.02}, 5, 1.3);
+    if (!isSpike) {
+      for (Vec3d& p : positionsIn(*mesh))
+        p.y() = 0.2 * std::sin(5 * p.x() + i) * std::cos(3 * p.z());
+      for (Vec3d& p : positionsIn(*blade))
+        p.y() = 0.3 * std::cos(4 * p.x() - i) * std::sin(2 * p.z() + i);
+    }
     const auto cornersOf = [](imstk::SurfaceMesh& of, const Eigen::Vector3i& cell) {
       std::array<Vector, 3> corners;
       for (int k = 0; k < 3; ++k)

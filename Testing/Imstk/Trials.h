@@ -157,6 +157,7 @@ struct Trial {
   int judgedEvery = 1;
   std::vector<std::shared_ptr<imstk::PbdObject>> moving;  ///< come to rest
   std::function<double()> force = nullptr;                ///< on a tool
+  std::shared_ptr<imstk::PbdObject> tool;                 ///< that feels it
 
   explicit Trial(bool palpate) : isPalpate(palpate) {
     test.config().m_gravity = {0, -9.81, 0};
@@ -389,6 +390,7 @@ inline std::unique_ptr<Trial> toolAndTissue(bool palpate, const Press& press = {
   palpate::PalpateSettings settings;
   settings.thickness = press.thickness;
   trial->collide(organ, tool, 0.0, own, settings);
+  trial->tool = tool;
   trial->steps = 400;
   const auto device = std::make_shared<Vec3d>(0, 0, 0);
   trial->move = [=, bySpring = press.bySpring](int step) {

@@ -1,6 +1,7 @@
 #include <palpate/imstk/PalpateCH.h>
 
 #include "iMSTK/SceneStep.h"
+#include "iMSTK/TissueSweeps.h"
 
 #include <imstkPbdContactConstraint.h>
 #include <imstkPbdModel.h>
@@ -160,7 +161,8 @@ class RowConstraint : public imstk::PbdContactConstraint {
 
 }  // namespace
 
-PalpateCH::PalpateCH(std::shared_ptr<PalpateCD> detection) : m_detection(std::move(detection)) {
+PalpateCH::PalpateCH(std::shared_ptr<PalpateCD> detection)
+    : m_detection(std::move(detection)), m_sweeps(std::make_unique<TissueSweeps>()) {
   setRigidBodyCompliance(0);
   setDeformableStiffnessA(1);
   setDeformableStiffnessB(1);
@@ -178,6 +180,8 @@ void PalpateCH::handle(const std::vector<imstk::CollisionElement>&,
   warnOfChanges(*step);
   appendRows();
   model->getSolver()->addConstraints(&m_collisionConstraints);
+  if (!m_collisionConstraints.empty() && step->isPressed(m_detection->pair()))
+    m_sweeps->begin(*model, m_collisionConstraints);
   step->addHandler(this);
 }
 

@@ -758,6 +758,16 @@ bool SceneStep::hasRigidBody(int pair) const {
          m_bodies[static_cast<std::size_t>(found.bodyB)].role == BodyRole::Rigid;
 }
 
+bool SceneStep::isPressed(int pair) const {
+  const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+  const Body *tool = &m_bodies[static_cast<std::size_t>(found.bodyA)],
+             *tissue = &m_bodies[static_cast<std::size_t>(found.bodyB)];
+  if (tool->role != BodyRole::Rigid) std::swap(tool, tissue);
+  if (tool->role != BodyRole::Rigid || tissue->role != BodyRole::Particles) return false;
+  const imstk::PbdBody& pbd = *tool->object->getPbdBody();
+  return !(pbd.externalForce.isZero(0) && pbd.externalTorque.isZero(0));
+}
+
 imstk::PbdModel* SceneStep::modelOf(int pair) const {
   const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
   for (const int body : {found.bodyA, found.bodyB})

@@ -11,6 +11,8 @@
 
 namespace palpate {
 
+class TissueSweeps;
+
 /// Handles the contacts of a PalpateCD by one-sided constraints, which only push: each keeps the
 /// gap of PalpateSettings. iMSTK's own constraints are equalities, which pull bodies together that
 /// are within a thickness and do not touch. Vertices that a PointwiseMap maps move the particles
@@ -22,6 +24,11 @@ namespace palpate {
 /// Restitution: the share of the speed of approach with which bodies part, of contacts that are
 ///          faster than gravity makes a body in two steps.
 /// Compliance: of pairs with a rigid PbdObject, 0 by default. The guard keeps bodies apart.
+/// Tool     While a force from outside the solver, as that of a PbdObjectController, acts on a
+///          rigid PbdObject within the thickness of a deformable one, each iteration of xPBD sweeps
+///          further over the contacts and the internal constraints around them. The tool then feels
+///          nearly the force of many iterations. The sweeps of an iteration end once one changes
+///          the contact forces by at most 1 %, and after ten. No other pair is swept further.
 /// Unused   stiffness, 1 by default: a warning names it if it was set.
 ///          With setUseCorrectVelocity(false) there is no friction and no restitution.
 class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
@@ -45,6 +52,7 @@ class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {
   std::shared_ptr<PalpateCD> m_detection;
   bool m_hasWarned = false;
   std::vector<std::unique_ptr<imstk::PbdConstraint>> m_owned;
+  std::unique_ptr<TissueSweeps> m_sweeps;
 };
 
 }  // namespace palpate
