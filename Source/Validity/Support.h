@@ -7,7 +7,7 @@
 
 namespace palpate {
 
-/// How a pair is answered. CollisionDetection/PairWork.h names the work of each kind.
+/// How a pair is answered. Search/PairWork.h names the work of each kind.
 enum class PairKind : std::uint8_t {
   Meshes,         ///< candidates of two octrees
   MeshAndShape,   ///< the elements near an analytical shape
