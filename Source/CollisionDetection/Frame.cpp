@@ -41,8 +41,8 @@ void Frame::forEach(std::span<PairRecord* const> records, const Threads& threads
     const MemoryScope memory(MemoryStage::Pairs);
     m_jobs.begin();
     for (PairRecord* record : records)
-      m_jobs.add(record->pair, MeshWork(record->search()), threads, Engine::Octree,
-                 [&](PairWork& work, const FrameStart& frame) {
+      m_jobs.add(record->pair, MeshWork({&*record->question, &record->found}), threads,
+                 Engine::Octree, [&](PairWork& work, const FrameStart& frame) {
                    return record->hasCandidates() ? std::get<MeshWork>(work).startCandidates(frame)
                                                   : std::size_t{0};
                  });
