@@ -692,29 +692,44 @@ TEST_F(OnePoint, RefusesOtherMethods) {
     refuse(ball, {.method = method, .thickness = 0.1});
 }
 
-/// A body that passed as a whole: every contact leads it back, also of edges that passed none.
-TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
+/// A cube above a flat membrane, after the first step.
+struct CubeAndMembrane {
   OctreeBasedCD collisions;
-  Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3), membrane = sheet(16, 0.0, 0.0);
-  for (Vector3d& p : membrane.positions) p[2] = 0.0;
-  const GeometryId body = addMesh(collisions, cube), tissue = addMesh(collisions, membrane);
-  collisions.addCollisionPair(body, tissue, remembering(0.03, Contacts::All));
-  collisions.detectCollision();
-  collisions.advance();
-  const auto shift = [&](double z) {
-    for (Vector3d& p : cube.positions) p[2] += z;
-    collisions.setPositions(body, cube.positions);
+  Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3);
+  GeometryId body, tissue;
+
+  CubeAndMembrane() {
+    Mesh membrane = sheet(16, 0.0, 0.0);
+    for (Vector3d& p : membrane.positions) p[2] = 0.0;
+    body = addMesh(collisions, cube);
+    tissue = addMesh(collisions, membrane);
+    collisions.addCollisionPair(body, tissue, remembering(0.03, Contacts::All));
     collisions.detectCollision();
     collisions.advance();
+  }
+  void move(double z) {
+    for (Vector3d& p : cube.positions) p[2] += z;
+    collisions.setPositions(body, cube.positions);
+  }
+  const CollisionData& data() const { return collisions.collisionData(body, tissue); }
+};
+
+/// A body that passed as a whole: every contact leads it back, also of edges that passed none.
+TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
+  CubeAndMembrane scene;
+  const auto shift = [&](double z) {
+    scene.move(z);
+    scene.collisions.detectCollision();
+    scene.collisions.advance();
   };
   shift(-0.15);  // the lower half has passed
   shift(-0.06);  // all of it
   shift(0.005);
-  const CollisionData& data = collisions.collisionData(body, tissue);
+  const CollisionData& data = scene.data();
   std::size_t vertices = 0;
   for (const auto& contact : data.vertexTriangle()) vertices += contact.normal[2] == 1.0;
   EXPECT_EQ(vertices, data.vertexTriangle().size());
-  EXPECT_EQ(vertices, cube.positions.size());
+  EXPECT_EQ(vertices, scene.cube.positions.size());
   EXPECT_FALSE(data.edgeEdge().empty());
   for (const auto& contact : data.edgeEdge()) EXPECT_GE(contact.normal[2], -1e-12);
   for (const auto& contact : data.triangleVertex()) EXPECT_LE(contact.normal[2], 1e-12);
@@ -723,22 +738,15 @@ TEST(SideMemory, OfABodyThatPassedLeadsItBack) {
 /// A body jumps through a membrane and back. The vertices of the membrane pass into it and out of
 /// it in one step; they are where they were if the body is, which its own vertices remember.
 TEST(SideMemory, OfABodyThatJumpedIsThatOfItsOwnVertices) {
-  OctreeBasedCD collisions;
-  Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3), membrane = sheet(16, 0.0, 0.0);
-  for (Vector3d& p : membrane.positions) p[2] = 0.0;
-  const GeometryId body = addMesh(collisions, cube), tissue = addMesh(collisions, membrane);
-  collisions.addCollisionPair(body, tissue, remembering(0.03, Contacts::All));
-  collisions.detectCollision();
-  collisions.advance();
+  CubeAndMembrane scene;
   const auto sidesAfter = [&](double shift) {
-    for (Vector3d& p : cube.positions) p[2] += shift;
-    collisions.setPositions(body, cube.positions);
-    collisions.advance();
-    collisions.detectCollision();
-    return collisions.collisionData(body, tissue).rememberedSides();
+    scene.move(shift);
+    scene.collisions.advance();
+    scene.collisions.detectCollision();
+    return scene.data().rememberedSides();
   };
   const auto sides = sidesAfter(-0.35);
-  EXPECT_EQ(sides.size(), cube.positions.size());
+  EXPECT_EQ(sides.size(), scene.cube.positions.size());
   for (const Crossing& side : sides) EXPECT_EQ(side.kind, ContactKind::VertexTriangle);
   EXPECT_TRUE(sidesAfter(0.35).empty());
 }
