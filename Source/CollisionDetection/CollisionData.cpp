@@ -1,12 +1,11 @@
 #include <palpate/CollisionData.h>
 
 #include "CollisionDetection/StepRows.h"
-#include "NarrowPhase/NarrowPhase.h"
+#include "Contact/ContactLists.h"
 
 #include <algorithm>
 #include <bit>
 #include <functional>
-#include <tuple>
 #include <type_traits>
 
 namespace palpate {
@@ -35,17 +34,33 @@ class Hash {
   std::uint64_t m_value = 0xcbf29ce484222325u;
 };
 
-/// The tags of a contact of the list, which is in the order of the keys. Null: it has none.
-template <class Contact, class KeyOf>
-const ContactTags* tagsIn(std::span<const Contact> list, std::span<const ContactTags> tags,
-                          const Contact& contact, const KeyOf& keyOf) {
+/// The tags of a contact of a list. Null: the list does not have it, or no tags.
+template <class Contact>
+const ContactTags* tagsIn(ContactKind kind, std::span<const Contact> list,
+                          std::span<const ContactTags> tags, const Contact& contact) {
   if (tags.empty()) return nullptr;
-  const auto place =
-      std::lower_bound(list.begin(), list.end(), contact,
-                       [&](const Contact& l, const Contact& r) { return keyOf(l) < keyOf(r); });
+  const auto place = std::lower_bound(
+      list.begin(), list.end(), keyOf(kind, contact),
+      [&](const Contact& l, const ContactKey& key) { return keyOf(kind, l) < key; });
   return place != list.end() && *place == contact
              ? &tags[static_cast<std::size_t>(place - list.begin())]
              : nullptr;
+}
+
+void addTo(Hash& hash, const VertexTriangleContact& c) {
+  hash.add(c.vertex, c.triangle, c.weights, c.normal, c.distance, c.timeOfImpact,
+           static_cast<std::uint64_t>(c.feature));
+}
+void addTo(Hash& hash, const EdgeEdgeContact& c) {
+  hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal,
+           static_cast<std::uint64_t>(c.featureA) << 8 | static_cast<std::uint64_t>(c.featureB));
+}
+void addTo(Hash& hash, const ShapeContact& c) {
+  hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,
+           c.pointOnShape, c.normal, c.distance, c.timeOfImpact);
+}
+void addTo(Hash& hash, const ShapeShapeContact& c) {
+  hash.add(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
 }
 
 }  // namespace
@@ -63,24 +78,14 @@ CollisionData& CollisionData::operator=(CollisionData&&) noexcept = default;
 CollisionData::~CollisionData() = default;
 
 CollisionData::CollisionData(const Parts& parts) {
-  const auto listOf = [](auto span) {
-    return CountedVector<typename decltype(span)::value_type>(span.begin(), span.end());
-  };
-  Contents::of(*this) = {{},
-                         listOf(parts.vertexTriangle),
-                         listOf(parts.triangleVertex),
-                         listOf(parts.edgeEdge),
-                         listOf(parts.intersectingTriangles),
-                         listOf(parts.shape),
-                         listOf(parts.shapeShape),
-                         parts.earliestTimeOfImpact,
-                         parts.errorBound,
-                         parts.validity,
-                         {},
-                         {},
-                         {},
-                         {},
-                         {}};
+  Contents& contents = Contents::of(*this);
+  const auto copy = [](auto& list, const auto& part) { list.assign(part.begin(), part.end()); };
+  forEachContactList(contents,
+                     [&](auto kind, auto& list) { copy(list, contactList<kind()>(parts)); });
+  copy(contents.intersectingTriangles, parts.intersectingTriangles);
+  contents.earliestTimeOfImpact = parts.earliestTimeOfImpact;
+  contents.errorBound = parts.errorBound;
+  contents.validity = parts.validity;
 }
 
 const CollisionData::Contents& CollisionData::read() const {
@@ -113,66 +118,64 @@ std::span<const ElementPair> CollisionData::intersectingTriangles() const {
 std::span<const ShapeContact> CollisionData::shape() const { return read().shape; }
 std::span<const ShapeShapeContact> CollisionData::shapeShape() const { return read().shapeShape; }
 std::span<const TrackedContact> CollisionData::trackedVertexTriangle() const {
-  return read().tracked.vertexTriangle;
+  return read().columnsOf(ContactKind::VertexTriangle).tracked;
 }
 std::span<const TrackedContact> CollisionData::trackedTriangleVertex() const {
-  return read().tracked.triangleVertex;
+  return read().columnsOf(ContactKind::TriangleVertex).tracked;
 }
 std::span<const TrackedContact> CollisionData::trackedEdgeEdge() const {
-  return read().tracked.edgeEdge;
+  return read().columnsOf(ContactKind::EdgeEdge).tracked;
 }
-std::span<const TrackedContact> CollisionData::trackedShape() const { return read().tracked.shape; }
+std::span<const TrackedContact> CollisionData::trackedShape() const {
+  return read().columnsOf(ContactKind::Shape).tracked;
+}
 std::span<const TrackedContact> CollisionData::trackedShapeShape() const {
-  return read().tracked.shapeShape;
+  return read().columnsOf(ContactKind::ShapeShape).tracked;
 }
-std::span<const TrackedContact> CollisionData::ended() const { return read().tracked.ended; }
+std::span<const TrackedContact> CollisionData::ended() const { return read().ended; }
 std::span<const Crossing> CollisionData::crossings() const { return read().crossings; }
 std::span<const ContactTags> CollisionData::tags(ContactKind kind) const {
-  return read().tags[static_cast<std::size_t>(kind)];
+  return read().columnsOf(kind).tags;
 }
 ContactTags CollisionData::tagsOf(const VertexTriangleContact& contact) const {
-  const auto byTriangle = [](const VertexTriangleContact& c) {
-    return std::tuple(c.triangle, c.vertex);
-  };
+  constexpr ContactKind kFirst = ContactKind::VertexTriangle, kSecond = ContactKind::TriangleVertex;
   // Two contacts of both lists may be equal. Which one it is then depends on its place.
   const std::span<const VertexTriangleContact> second = triangleVertex();
   const std::less<> precedes;
   const bool isInSecond =
       !precedes(&contact, second.data()) && precedes(&contact, second.data() + second.size());
   const ContactTags* found =
-      isInSecond ? nullptr
-                 : tagsIn(vertexTriangle(), tags(ContactKind::VertexTriangle), contact,
-                          [](const auto& c) { return std::tuple(c.vertex, c.triangle); });
-  if (!found) found = tagsIn(second, tags(ContactKind::TriangleVertex), contact, byTriangle);
+      isInSecond ? nullptr : tagsIn(kFirst, vertexTriangle(), tags(kFirst), contact);
+  if (!found) found = tagsIn(kSecond, second, tags(kSecond), contact);
   return found ? *found : ContactTags{};
 }
 ContactTags CollisionData::tagsOf(const EdgeEdgeContact& contact) const {
   const ContactTags* const found =
-      tagsIn(edgeEdge(), tags(ContactKind::EdgeEdge), contact,
-             [](const auto& c) { return std::tuple(c.edgeA, c.edgeB); });
+      tagsIn(ContactKind::EdgeEdge, edgeEdge(), tags(ContactKind::EdgeEdge), contact);
   return found ? *found : ContactTags{};
 }
 ContactTags CollisionData::tagsOf(const ShapeContact& contact) const {
   const ContactTags* const found =
-      tagsIn(shape(), tags(ContactKind::Shape), contact,
-             [](const auto& c) { return std::tuple(c.element, c.id, c.vertices); });
+      tagsIn(ContactKind::Shape, shape(), tags(ContactKind::Shape), contact);
   return found ? *found : ContactTags{};
 }
 ContactTags CollisionData::tagsOf(const ShapeShapeContact& contact) const {
   const ContactTags* const found =
-      tagsIn(shapeShape(), tags(ContactKind::ShapeShape), contact, [](const auto&) { return 0; });
+      tagsIn(ContactKind::ShapeShape, shapeShape(), tags(ContactKind::ShapeShape), contact);
   return found ? *found : ContactTags{};
 }
 std::span<const Eigen::Vector3d> CollisionData::smoothVertexTriangle() const {
-  return read().smooth.vertexTriangle;
+  return read().columnsOf(ContactKind::VertexTriangle).smooth;
 }
 std::span<const Eigen::Vector3d> CollisionData::smoothTriangleVertex() const {
-  return read().smooth.triangleVertex;
+  return read().columnsOf(ContactKind::TriangleVertex).smooth;
 }
 std::span<const Eigen::Vector3d> CollisionData::smoothEdgeEdge() const {
-  return read().smooth.edgeEdge;
+  return read().columnsOf(ContactKind::EdgeEdge).smooth;
 }
-std::span<const Eigen::Vector3d> CollisionData::smoothShape() const { return read().smooth.shape; }
+std::span<const Eigen::Vector3d> CollisionData::smoothShape() const {
+  return read().columnsOf(ContactKind::Shape).smooth;
+}
 std::span<const Crossing> CollisionData::rememberedSides() const { return read().rememberedSides; }
 double CollisionData::errorBound() const { return read().errorBound; }
 const Validity& CollisionData::validity() const { return read().validity; }
@@ -180,7 +183,7 @@ const Validity& CollisionData::validity() const { return read().validity; }
 double CollisionData::earliestTimeOfImpact() const {
   const Contents& contents = read();
   double earliest = contents.earliestTimeOfImpact;
-  forEachTimed(contents, [&](const auto& list) {
+  forEachContactList(contents, [&](ContactKind, const auto& list) {
     for (const auto& contact : list) earliest = std::min(earliest, contact.timeOfImpact);
   });
   return earliest;
@@ -189,24 +192,16 @@ double CollisionData::earliestTimeOfImpact() const {
 std::uint64_t CollisionData::hash() const {
   const Contents& contents = read();
   Hash hash;
-  for (const auto* list : {&contents.vertexTriangle, &contents.triangleVertex}) {
-    hash.add(list->size());
-    for (const VertexTriangleContact& c : *list)
-      hash.add(c.vertex, c.triangle, c.weights, c.normal, c.distance, c.timeOfImpact,
-               static_cast<std::uint64_t>(c.feature));
-  }
-  hash.add(contents.edgeEdge.size());
-  for (const EdgeEdgeContact& c : contents.edgeEdge)
-    hash.add(c.edgeA, c.edgeB, c.weightA, c.weightB, c.distance, c.timeOfImpact, c.normal,
-             static_cast<std::uint64_t>(c.featureA) << 8 | static_cast<std::uint64_t>(c.featureB));
+  forEachMeshList(contents, [&](ContactKind, const auto& list) {
+    hash.add(list.size());
+    for (const auto& contact : list) addTo(hash, contact);
+  });
   hash.add(contents.intersectingTriangles.size());
   for (const ElementPair& p : contents.intersectingTriangles)
     hash.add(std::uint64_t{p.a} << 32 | p.b);
-  for (const ShapeContact& c : contents.shape)
-    hash.add(static_cast<std::uint64_t>(c.element) << 32 | c.id, c.vertices, c.weights, c.point,
-             c.pointOnShape, c.normal, c.distance, c.timeOfImpact);
-  for (const ShapeShapeContact& c : contents.shapeShape)
-    hash.add(c.pointA, c.pointB, c.normal, c.distance, c.timeOfImpact);
+  forEachShapeList(contents, [&](ContactKind, const auto& list) {
+    for (const auto& contact : list) addTo(hash, contact);
+  });
   if (const double earliest = contents.earliestTimeOfImpact; earliest <= 1.0) hash.add(earliest);
   return hash.value();
 }

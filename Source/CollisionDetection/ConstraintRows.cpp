@@ -1,9 +1,9 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
-#include "Search/PairResults.h"
 #include "CollisionDetection/PairTable.h"
 #include "CollisionDetection/StepRows.h"
+#include "Contact/ContactLists.h"
 #include "Mesh/PointMotion.h"
 #include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
@@ -44,9 +44,7 @@ namespace {
 using Eigen::Vector3d;
 using Contents = CollisionData::Contents;
 
-/// On which side each of a contact's four vertices is: 0, the pair's first geometry, or 1.
-using Sides = std::array<std::size_t, 4>;
-constexpr Sides kVertexOfFirst{0, 1, 1, 1}, kVertexOfSecond{1, 0, 0, 0}, kEdges{0, 0, 1, 1};
+using Sides = std::array<std::size_t, 4>;  // sidesOf()
 
 /// A contact's row: linearised at its time, or, with `end`, at the step's end.
 struct Linearised {
@@ -59,9 +57,7 @@ struct Linearised {
 /// Makes the rows of contacts with vertices on both sides, in their order.
 class Linearisation {
  public:
-  explicit Linearisation(const Contents* contents) {
-    if (contents) m_endRows = contents->step.endRows;
-  }
+  explicit Linearisation(const Contents& contents) : m_endRows(contents.step.endRows) {}
   /// smooth: null if the pair has no smooth normals.
   Linearised next(const auto& contact, const Sides& sides, const Vector3d* smooth) {
     const std::uint32_t number = m_next++;
@@ -77,46 +73,47 @@ class Linearisation {
   std::uint32_t m_next = 0;
 };
 
-/// Calls f(contact, smooth normal or null) for a list.
+/// Calls f(kind, contact, smooth normal or null) for all contacts that have rows.
 template <class F>
-void forEachWithSmooth(const auto& list, std::span<const Vector3d> smooth, F&& f) {
-  for (std::size_t i = 0; i < list.size(); ++i) f(list[i], smooth.empty() ? nullptr : &smooth[i]);
+void forEachWithSmooth(const Contents& contents, F&& f) {
+  forEachContactList(contents, [&](auto kind, const auto& list) {
+    if constexpr (kind != ContactKind::ShapeShape) {
+      const auto& smooth = contents.columnsOf(kind).smooth;
+      for (std::size_t i = 0; i < list.size(); ++i)
+        f(kind, list[i], smooth.empty() ? nullptr : &smooth[i]);
+    }
+  });
 }
 
 /// Appends the rows of all lists. first: the solver's numbers of vertex 0 of both sides.
 /// of(contact, row): the offset of a Linearised row of a contact with vertices on both sides.
 /// ofShape(contact, normal): of one with a shape. If these throw, no row is added.
 template <class Of, class OfShape>
-void addRows(const CollisionData& contacts, const std::array<std::uint32_t, 2>& first,
+void addRows(const Contents& contents, const std::array<std::uint32_t, 2>& first,
              std::size_t sideOfElements, std::vector<ConstraintRow>& rows, Of&& of,
              OfShape&& ofShape) {
   const std::size_t initialSize = rows.size();
-  Linearisation linearisation(Contents::in(contacts));
-  const auto add = [&](const Sides& sides) {
-    return [&](const auto& contact, const Vector3d* smooth) {
-      const Linearised own = linearisation.next(contact, sides, smooth);
+  Linearisation linearisation(contents);
+  const auto rowOf = [&](auto kind, const auto& contact, const Vector3d* smooth) -> ConstraintRow {
+    if constexpr (kind == ContactKind::Shape) {
+      const Vector3d& normal = smooth ? *smooth : contact.normal;
+      const auto& [i, j, k] = contact.vertices;
+      const std::uint32_t number = first[sideOfElements];
+      return {{number + i, number + j, number + k, number + i},
+              {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
+              normal,
+              ofShape(contact, normal)};
+    } else {
+      const Linearised own = linearisation.next(contact, sidesOf(kind), smooth);
       ConstraintRow row{own.stencil.vertices, own.stencil.weights, own.normal, of(contact, own)};
       for (std::size_t i = 0; i < 4; ++i) row.vertices[i] += first[own.sides[i]];
-      rows.push_back(row);
-    };
+      return row;
+    }
   };
   try {
-    forEachWithSmooth(contacts.vertexTriangle(), contacts.smoothVertexTriangle(),
-                      add(kVertexOfFirst));
-    forEachWithSmooth(contacts.triangleVertex(), contacts.smoothTriangleVertex(),
-                      add(kVertexOfSecond));
-    forEachWithSmooth(contacts.edgeEdge(), contacts.smoothEdgeEdge(), add(kEdges));
-    forEachWithSmooth(
-        contacts.shape(), contacts.smoothShape(), [&](const auto& contact, const Vector3d* smooth) {
-          const Vector3d& normal = smooth ? *smooth : contact.normal;
-          const auto& [i, j, k] = contact.vertices;
-          const double offset = ofShape(contact, normal);
-          const std::uint32_t number = first[sideOfElements];
-          rows.push_back({{number + i, number + j, number + k, number + i},
-                          {contact.weights[0], contact.weights[1], contact.weights[2], 0.0},
-                          normal,
-                          offset});
-        });
+    forEachWithSmooth(contents, [&](auto kind, const auto& contact, const Vector3d* smooth) {
+      rows.push_back(rowOf(kind, contact, smooth));
+    });
   } catch (...) {
     rows.erase(rows.begin() + static_cast<std::ptrdiff_t>(initialSize), rows.end());
     throw;
@@ -214,19 +211,13 @@ void keepOffsets(Contents& contents) {
   const StepOffsets offsets(*record, contents.step.elementsOfSecond);
   CountedVector<double>& kept = contents.step.offsets;
   kept.clear();
-  kept.reserve(sizeOf(contents));
-  Linearisation linearisation(&contents);
-  const auto keep = [&](const auto& list, const auto& smooth, const Sides& sides) {
-    forEachWithSmooth(list, smooth, [&](const auto& contact, const Vector3d* normal) {
-      kept.push_back(offsets(contact, linearisation.next(contact, sides, normal)));
-    });
-  };
-  const Contents::Smooth& smooth = contents.smooth;
-  keep(contents.vertexTriangle, smooth.vertexTriangle, kVertexOfFirst);
-  keep(contents.triangleVertex, smooth.triangleVertex, kVertexOfSecond);
-  keep(contents.edgeEdge, smooth.edgeEdge, kEdges);
-  forEachWithSmooth(contents.shape, smooth.shape, [&](const auto& contact, const Vector3d* normal) {
-    kept.push_back(offsets(contact, normal ? *normal : contact.normal));
+  kept.reserve(contactCount(contents));
+  Linearisation linearisation(contents);
+  forEachWithSmooth(contents, [&](auto kind, const auto& contact, const Vector3d* normal) {
+    if constexpr (kind == ContactKind::Shape)
+      kept.push_back(offsets(contact, normal ? *normal : contact.normal));
+    else
+      kept.push_back(offsets(contact, linearisation.next(contact, sidesOf(kind), normal)));
   });
   contents.step.hasOffsets = true;
 }
@@ -240,7 +231,7 @@ void CollisionData::appendRows(std::vector<ConstraintRow>& rows, std::uint32_t f
   if (step.hasOffsets) {
     const double* next = step.offsets.data();
     const auto offset = [&](const auto&...) { return *next++; };
-    return addRows(*this, first, sideOfElements, rows, offset, offset);
+    return addRows(read(), first, sideOfElements, rows, offset, offset);
   }
   if (!step.record)
     throw Error(ErrorCode::NotAvailable,
@@ -254,7 +245,7 @@ void CollisionData::appendRows(std::vector<ConstraintRow>& rows, std::uint32_t f
                     "advance()",
                 step.record->pair.a);
   const StepOffsets offsets(*step.record, step.elementsOfSecond);
-  addRows(*this, first, sideOfElements, rows, offsets, offsets);
+  addRows(read(), first, sideOfElements, rows, offsets, offsets);
 }
 
 void appendRows(const CollisionData& contacts, const SolverVertices& a, const SolverVertices& b,
@@ -271,7 +262,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
                     std::to_string(side.now.size()) + " now",
                 {}, vertex);
   };
-  const Contents* const contents = Contents::in(contacts);
+  const Contents& contents = Contents::read(contacts);
   const auto at = [&](std::size_t side, std::uint32_t vertex) {
     require(*both[side], vertex);
     return std::pair<const Vector3d&, const Vector3d&>(both[side]->before[vertex],
@@ -286,7 +277,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
       largest = std::max({largest, before.cwiseAbs().maxCoeff(), now.cwiseAbs().maxCoeff()});
       moved += std::abs(atTime.stencil.weights[i]) * (now - before).cwiseAbs().sum();
     }
-    checkOffset(contents->step, contents->errorBound, offsetOf(contact, atTime, at), largest, moved,
+    checkOffset(contents.step, contents.errorBound, offsetOf(contact, atTime, at), largest, moved,
                 atTime.stencil.vertices[0]);
     return offsetOf(contact, row, at);
   };
@@ -302,7 +293,7 @@ void appendRows(const CollisionData& contacts, const SolverVertices& a, const So
     for (const std::uint32_t vertex : contact.vertices) require(*both[sideOfElements], vertex);
     return offsetOf(contact, normal, motion);
   };
-  addRows(contacts, {a.first, b.first}, sideOfElements, rows, of, ofShape);
+  addRows(contents, {a.first, b.first}, sideOfElements, rows, of, ofShape);
 }
 
 void forEachEntry(std::span<const ConstraintRow> rows, void (*entry)(void*, int, int, double),

@@ -2,6 +2,8 @@
 #include <palpate/ConstraintRows.h>
 #include <palpate/Error.h>
 
+#include "Contact/ContactLists.h"
+#include "Contact/Contents.h"
 #include "Mesh/PointMotion.h"
 #include "Mesh/Rotation.h"
 #include "Math/Tolerances.h"
@@ -70,14 +72,13 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
   const std::size_t initialSize = motions.size();
   const RigidMotion motionA = withExactRotations(a.motion), motionB = withExactRotations(b.motion);
 
-  // firstCount: how many of the stencil's vertices are on the side that the normal points to.
-  const auto add = [&](const auto& contact, const ContactSide& first, const ContactSide& second,
-                       std::size_t firstCount) {
+  const auto add = [&](ContactKind kind, const auto& contact) {
     const auto [vertices, weights] = stencil(contact);
-    SideSum one, other;
+    const auto sides = sidesOf(kind);
+    SideSum one, other;  // one: of the side that the normal points to
     for (std::size_t i = 0; i < 4; ++i) {
-      const ContactSide& side = i < firstCount ? first : second;
-      (i < firstCount ? one : other)
+      const ContactSide& side = sides[i] == 0 ? a : b;
+      (sides[i] == sides[0] ? one : other)
           .add(std::abs(weights[i]),
                motionOf(side, nameOf(side), vertices[i], contact.timeOfImpact));
     }
@@ -88,9 +89,10 @@ void appendMotions(const CollisionData& contacts, const ContactSide& a, const Co
   try {
     checkRadiusCount(a, "a");
     checkRadiusCount(b, "b");
-    for (const auto& contact : contacts.vertexTriangle()) add(contact, a, b, 1);
-    for (const auto& contact : contacts.triangleVertex()) add(contact, b, a, 1);
-    for (const auto& contact : contacts.edgeEdge()) add(contact, a, b, 2);
+    forEachMeshList(CollisionData::Contents::read(contacts),
+                    [&](ContactKind kind, const auto& list) {
+                      for (const auto& contact : list) add(kind, contact);
+                    });
     if (!contacts.shape().empty() && !a.vertices.now.empty() && !b.vertices.now.empty())
       throw Error(ErrorCode::WrongPositionCount,
                   "appendMotions(): both sides have positions, but one of them is a shape, or a "

@@ -1,5 +1,7 @@
 #include "CollisionDetection/GuardedTouches.h"
 
+#include "Contact/ContactLists.h"
+#include "Contact/Contents.h"
 #include "Math/ImpactQuery.h"
 #include "Math/Nearing.h"
 #include "Core/Assert.h"
@@ -95,15 +97,12 @@ class TouchFinder {
 
   void find(const SeparateSearch& search) {
     const Geometry &a = *search.a, &b = *search.b;
-    const CollisionData& data = search.found.data;
-    const auto addAll = [&](const auto& list, const Geometry& first, const Geometry& second) {
-      for (const auto& contact : list) add(Placed{contact, first, second});
-    };
-    addAll(data.vertexTriangle(), a, b);
-    addAll(data.triangleVertex(), b, a);
-    addAll(data.edgeEdge(), a, b);
-    addAll(data.shape(), a.body.shape ? b : a, a.body.shape ? a : b);
-    addAll(data.shapeShape(), a, b);
+    forEachContactList(
+        CollisionData::Contents::read(search.found.data), [&](ContactKind kind, const auto& list) {
+          const bool swapped =
+              kind == ContactKind::TriangleVertex || (kind == ContactKind::Shape && a.body.shape);
+          for (const auto& contact : list) add(Placed{contact, swapped ? b : a, swapped ? a : b});
+        });
   }
 
  private:

@@ -50,7 +50,7 @@ class KeptCandidates {
   void commit(const PairMoment&) noexcept;
   void skip(const PairMoment&) noexcept {}
   void forget() noexcept {}
-  void release(CollisionData&, bool all) {
+  void release(bool all) {
     if (all || !areInUse()) m_lists.releaseMemory();
   }
   template <class File>

@@ -2,6 +2,7 @@
 
 #include "CollisionDetection/PairTable.h"
 #include "Search/PairResults.h"
+#include "Contact/ContactLists.h"
 
 #include <algorithm>
 
@@ -15,7 +16,10 @@ void TrackerMemory::follow(const PairMoment& moment, bool isCurrent, ContactMatc
   if (changes && !collides) found.contents() = {};
   if (!question.settings().trackContacts) {
     tracker.reset();
-    if (changes && collides) found.contents().tracked = {};
+    if (!changes || !collides) return;
+    found.contents().drop(&Contents::Columns::tracked);
+    CountedVector<TrackedContact>().swap(found.contents().ended);
+    found.contents().trackedOfSecond = false;
     return;
   }
   if (!tracker) tracker = std::make_unique<ContactTracker>();
@@ -24,7 +28,7 @@ void TrackerMemory::follow(const PairMoment& moment, bool isCurrent, ContactMatc
     if (begins) tracker->keep();
   } else if (collides || tracker->hadContacts(Contents::of(last))) {
     Contents& contents = found.contents();
-    contents.tracked.elementsOfSecond = !contents.shape.empty() && &question.mesh() == &question.b;
+    contents.trackedOfSecond = !contents.shape.empty() && &question.mesh() == &question.b;
     tracker->track(question.meshes(), collides,
                    {question.a.revisions.elements, question.b.revisions.elements},
                    Contents::of(last), contents, scratch);
@@ -43,8 +47,8 @@ void TrackerMemory::skip(const PairMoment& moment) noexcept {
   if (tracker) tracker->skip(moment.step, moment.isOutdated, Contents::of(moment.last));
 }
 
-void TrackerMemory::release(CollisionData& last, bool) {
-  if (tracker) tracker->releaseMemory(Contents::of(last));
+void TrackerMemory::release(bool) {
+  if (tracker) tracker->releaseMemory();
 }
 
 void SidesMemory::startStep(const PairMoment& moment) {
@@ -64,7 +68,7 @@ void SidesMemory::follow(const Question& question, Answer& found) {
   sides->apply(meshes, contents);
   if (sides->changesContacts()) contents.step.endRows.clear();
   std::size_t atImpact = 0;
-  forEachTimed(contents, [&](const auto& contacts) {
+  forEachContactList(contents, [&](ContactKind, const auto& contacts) {
     for (const auto& contact : contacts) atImpact += !anyAtEnd || contact.timeOfImpact < 1.0;
   });
   countContacts(atImpact, contents);
@@ -79,7 +83,7 @@ void SidesMemory::forget() noexcept {
   if (sides) sides->forget();
 }
 
-void SidesMemory::release(CollisionData&, bool) {
+void SidesMemory::release(bool) {
   if (sides) sides->releaseMemory();
 }
 

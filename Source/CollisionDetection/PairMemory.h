@@ -39,7 +39,7 @@ struct MemoryPart {
   void skip(const PairMoment&) noexcept {}    ///< the detection had no time for the pair
   void forget() noexcept {}                   ///< the pair does not collide
   /// Gives back memory that only detections need. all: also what the next one would use again.
-  void release(CollisionData& /*last*/, bool /*all*/) {}
+  void release(bool /*all*/) {}
   template <class File>
   void describe(File&, PairRecord&, const auto& /*revisions*/) {}  ///< for saved states
 };
@@ -68,7 +68,7 @@ struct TrackerMemory : MemoryPart {
   void keep(CollisionData& last) noexcept;
   void commit(const PairMoment&) noexcept;
   void skip(const PairMoment&) noexcept;
-  void release(CollisionData& last, bool all);
+  void release(bool all);
   template <class File>
   void describe(File&, PairRecord&, const auto& revisions);
 };
@@ -85,7 +85,7 @@ struct SidesMemory : MemoryPart {
   void startStep(const PairMoment&);
   void commit(const PairMoment&) noexcept;
   void forget() noexcept;
-  void release(CollisionData&, bool all);
+  void release(bool all);
   template <class File>
   void describe(File&, PairRecord&, const auto& revisions);
 };

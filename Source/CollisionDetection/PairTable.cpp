@@ -4,6 +4,7 @@
 #include "Tracking/SmoothNormals.h"
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
+#include "Contact/ContactLists.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -32,7 +33,7 @@ void PairRecord::finish(const Threads& threads) {
     findSmoothNormals(meshes(), question->plan.kind == PairKind::MeshAndShape, threads,
                       found.contents());
   else
-    found.contents().smooth = {};
+    found.contents().drop(&CollisionData::Contents::Columns::smooth);
 }
 
 /// Of a shape or of a field that is a geometry. Bodies that a field or proxy stands for have none.
@@ -44,35 +45,36 @@ void PairRecord::addTags() {
   if (isCurrent()) return;
   const TriangleMesh &ofA = a->body.mesh, &ofB = b->body.mesh;
   CollisionData::Contents& contents = found.contents();
-  for (auto& list : contents.tags) list.clear();
+  for (CollisionData::Contents::Columns& each : contents.columns) each.tags.clear();
   if (ofA.tags.empty() && ofB.tags.empty()) return;
-  const auto add = [&](ContactKind kind, const auto& list, const auto& tagsOfContact) {
-    auto& tags = contents.tagsOf(kind);
-    tags.reserve(list.size());
-    for (const auto& contact : list) tags.push_back(tagsOfContact(contact));
+  const auto tagsOf = [&](auto kind, const auto& c) -> ContactTags {
+    if constexpr (kind == ContactKind::VertexTriangle)
+      return {ofA.tagOfVertex(c.vertex), ofB.tag(c.triangle)};
+    else if constexpr (kind == ContactKind::TriangleVertex)
+      return {ofA.tag(c.triangle), ofB.tagOfVertex(c.vertex)};
+    else if constexpr (kind == ContactKind::EdgeEdge)
+      return {ofA.tagOfEdge(c.edgeA), ofB.tagOfEdge(c.edgeB)};
+    else if constexpr (kind == ContactKind::Shape)
+      return tagsOfShape(c);
+    else
+      return {tagOfWhole(a->body), tagOfWhole(b->body)};
   };
-  add(ContactKind::VertexTriangle, contents.vertexTriangle, [&](const auto& c) {
-    return ContactTags{ofA.tagOfVertex(c.vertex), ofB.tag(c.triangle)};
+  forEachContactList(contents, [&](auto kind, const auto& list) {
+    auto& tags = contents.columnsOf(kind).tags;
+    tags.reserve(list.size());
+    for (const auto& contact : list) tags.push_back(tagsOf(kind, contact));
   });
-  add(ContactKind::TriangleVertex, contents.triangleVertex, [&](const auto& c) {
-    return ContactTags{ofA.tag(c.triangle), ofB.tagOfVertex(c.vertex)};
-  });
-  add(ContactKind::EdgeEdge, contents.edgeEdge, [&](const auto& c) {
-    return ContactTags{ofA.tagOfEdge(c.edgeA), ofB.tagOfEdge(c.edgeB)};
-  });
-  add(ContactKind::Shape, contents.shape, [&](const ShapeContact& c) {
-    const TriangleMesh& elements = question->mesh().mesh;
-    const bool ofSecond = &elements == &ofB;
-    const std::uint32_t tag = c.element == ShapeElement::Vertex ? elements.tagOfVertex(c.id)
-                              : c.element == ShapeElement::Edge
-                                  ? elements.tagOfEdge({c.vertices[0], c.vertices[1]})
-                                  : elements.tag(c.id);
-    const std::uint32_t tagOfBody = tagOfWhole((ofSecond ? *a : *b).body);
-    return ofSecond ? ContactTags{tagOfBody, tag} : ContactTags{tag, tagOfBody};
-  });
-  add(ContactKind::ShapeShape, contents.shapeShape, [&](const auto&) {
-    return ContactTags{tagOfWhole(a->body), tagOfWhole(b->body)};
-  });
+}
+
+ContactTags PairRecord::tagsOfShape(const ShapeContact& c) const {
+  const TriangleMesh& elements = question->mesh().mesh;
+  const bool ofSecond = &elements == &b->body.mesh;
+  const std::uint32_t tag = c.element == ShapeElement::Vertex ? elements.tagOfVertex(c.id)
+                            : c.element == ShapeElement::Edge
+                                ? elements.tagOfEdge({c.vertices[0], c.vertices[1]})
+                                : elements.tag(c.id);
+  const std::uint32_t tagOfBody = tagOfWhole((ofSecond ? *a : *b).body);
+  return ofSecond ? ContactTags{tagOfBody, tag} : ContactTags{tag, tagOfBody};
 }
 
 void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
@@ -137,7 +139,7 @@ void PairRecord::setSides(std::uint64_t step, std::span<const Crossing> given) {
 
 void PairRecord::commit(std::uint64_t step) noexcept {
   PALPATE_ASSERT(found.data.validity().atImpact + found.data.validity().atEnd ==
-                 sizeOf(found.contents()));
+                 contactCount(found.contents()));
   std::swap(last.data, found.data);
   CollisionData::Contents& contents = CollisionData::Contents::of(last.data);
   contents.step.elementsOfSecond = !contents.shape.empty() && &question->mesh() == &b->body;
@@ -185,9 +187,8 @@ void PairRecord::releaseMemory(bool all) {
   found.data = {};
   found.fieldScratch.reset();
   CollisionData::Contents& contents = CollisionData::Contents::of(last.data);
-  forEachTimed(contents, [](auto& list) { releaseSpare(list); });
-  releaseSpare(contents.intersectingTriangles);
-  memory.forEach([&](auto& part) { part.release(last.data, all); });
+  contents.releaseSpare();
+  memory.forEach([&](auto& part) { part.release(all); });
 }
 
 void PairRecord::takeOver(PairRecord& former) noexcept {

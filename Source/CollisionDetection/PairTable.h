@@ -73,8 +73,9 @@ struct PairRecord : CountedObject {
   void ask(const PairPlan&);
   /// Completes what the search found by the pair's columns: sides, smooth normals.
   void finish(const Threads&);
-  /// Writes Contents::tags of what was found, if it is new.
+  /// Writes the column `tags` of what was found, if it is new.
   void addTags();
+  ContactTags tagsOfShape(const ShapeContact&) const;
   /// Makes what was found the pair's answer.
   void commit(std::uint64_t step) noexcept;
   /// For rows: the contents of the last answer are those of this pair.

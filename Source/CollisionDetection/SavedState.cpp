@@ -1,10 +1,10 @@
 // Part of CollisionDetection/OctreeBasedCDImplementation.h: saved states.
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 
-#include "Search/PairResults.h"
 #include "CollisionDetection/ProblemDescription.h"
 #include "Validity/TrustDescription.h"
 #include "Tracking/TrackingDescription.h"
+#include "Contact/ContactLists.h"
 #include "Bodies/SavedRevisions.h"
 #include "Fields/Contacts.h"
 #include "Fields/Description.h"
@@ -104,23 +104,22 @@ void checkIds(const ArchiveReader& file, const Contents& c, const PairStates& st
   const auto need = [&](std::uint32_t id, std::size_t count) {
     file.need(id < count, "a contact names a vertex or element that does not exist");
   };
-  for (const auto& x : c.vertexTriangle) {
-    need(x.vertex, a.vertexCount), need(x.triangle, b.elementCount);
-    for (const std::uint32_t v : x.vertices) need(v, b.vertexCount);
-  }
-  for (const auto& x : c.triangleVertex) {
-    need(x.vertex, b.vertexCount), need(x.triangle, a.elementCount);
-    for (const std::uint32_t v : x.vertices) need(v, a.vertexCount);
-  }
-  for (const auto& x : c.edgeEdge)
-    for (int i = 0; i < 2; ++i) need(x.edgeA[i], a.vertexCount), need(x.edgeB[i], b.vertexCount);
-  for (const auto& row : c.step.endRows)
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::size_t ofVertex = c.vertexTriangle.size(),
-                        ofEither = ofVertex + c.triangleVertex.size();
-      const bool isOfA = row.contact < ofVertex ? i == 0 : row.contact < ofEither ? i > 0 : i < 2;
-      need(row.stencil.vertices[i], isOfA ? a.vertexCount : b.vertexCount);
+  const auto needVertices = [&](ContactKind kind, const Stencil& stencil) {
+    for (std::size_t i = 0; i < 4; ++i)
+      need(stencil.vertices[i], states[sidesOf(kind)[i]].vertexCount);
+  };
+  std::size_t first = 0;
+  auto row = c.step.endRows.begin();
+  forEachMeshList(c, [&](auto kind, const auto& list) {
+    for (const auto& contact : list) {
+      needVertices(kind, stencil(contact));
+      if constexpr (kind != ContactKind::EdgeEdge)
+        need(contact.triangle, states[sidesOf(kind)[1]].elementCount);
     }
+    first += list.size();
+    for (; row != c.step.endRows.end() && row->contact < first; ++row)
+      needVertices(kind, row->stencil);
+  });
   for (const auto& x : c.intersectingTriangles)
     need(x.a, a.elementCount), need(x.b, b.elementCount);
   for (const auto& x : c.shape) {
@@ -140,24 +139,17 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
     file.need(list.empty() || list.size() == contacts.size(),
               "a list has not one item for each contact");
   };
-  const auto keys = [&](const auto& tracked, ContactKind kind) {
+  std::size_t between = 0;
+  forEachContactList(c, [&](auto kind, const auto& list) {
+    const auto& [tracked, tags, smooth] = c.columnsOf(kind);
+    beside(tracked, list), beside(tags, list), beside(smooth, list);
     file.need(std::all_of(tracked.begin(), tracked.end(),
                           [&](const TrackedContact& t) { return t.key.kind == kind; }) &&
                   std::is_sorted(tracked.begin(), tracked.end(),
                                  [](const auto& l, const auto& r) { return l.key < r.key; }),
               "tracked contacts are not in order");
-  };
-  const auto all = [&](ContactKind kind, const auto& contacts, const auto& tracked) {
-    beside(tracked, contacts);
-    keys(tracked, kind);
-    beside(c.tags[static_cast<std::size_t>(kind)], contacts);
-  };
-  all(ContactKind::VertexTriangle, c.vertexTriangle, c.tracked.vertexTriangle);
-  all(ContactKind::TriangleVertex, c.triangleVertex, c.tracked.triangleVertex);
-  all(ContactKind::EdgeEdge, c.edgeEdge, c.tracked.edgeEdge);
-  all(ContactKind::Shape, c.shape, c.tracked.shape);
-  all(ContactKind::ShapeShape, c.shapeShape, c.tracked.shapeShape);
-  const std::size_t between = c.vertexTriangle.size() + c.triangleVertex.size() + c.edgeEdge.size();
+    if (kind <= ContactKind::EdgeEdge) between += list.size();
+  });
   std::size_t next = 0;
   for (const auto* passages : {&c.crossings, &c.rememberedSides})
     for (const Crossing& passage : *passages)
@@ -166,15 +158,11 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
     file.need(row.contact >= next && row.contact < between, "a row belongs to no contact");
     next = row.contact + std::size_t{1};
   }
-  beside(c.smooth.vertexTriangle, c.vertexTriangle);
-  beside(c.smooth.triangleVertex, c.triangleVertex);
-  beside(c.smooth.edgeEdge, c.edgeEdge);
-  beside(c.smooth.shape, c.shape);
   for (const auto* list :
        {&c.validity.outsideBand, &c.validity.nearThreshold, &c.validity.unreliableSign})
     for (const std::uint32_t index : *list)
       file.need(index < c.shape.size(), "a list names a contact that does not exist");
-  const std::size_t size = sizeOf(c);
+  const std::size_t size = contactCount(c);
   file.need(c.validity.atEnd <= size && c.validity.atImpact <= size - c.validity.atEnd,
             "a number of contacts is wrong");
 }
@@ -182,17 +170,17 @@ void checkLists(const ArchiveReader& file, const Contents& c) {
 template <class File>
 void describeContents(File& file, Contents& c) {
   const auto values = [&](auto&... each) { (valueOf(file, each), ...); };
-  values(c.vertexTriangle, c.triangleVertex, c.edgeEdge, c.shape, c.shapeShape);
+  forEachContactList(c, [&](ContactKind, auto& list) { values(list); });
   values(c.intersectingTriangles, c.earliestTimeOfImpact, c.errorBound, c.validity);
-  auto& t = c.tracked;
-  values(t.vertexTriangle, t.triangleVertex, t.edgeEdge, t.shape, t.shapeShape, t.ended);
-  values(c.crossings, c.rememberedSides, t.elementsOfSecond, c.step.elementsOfSecond);
+  for (auto& each : c.columns) values(each.tracked);
+  values(c.ended, c.crossings, c.rememberedSides, c.trackedOfSecond, c.step.elementsOfSecond);
   itemsOf(file, c.step.endRows, 84, [&](Contents::Step::EndRow& row) {
     values(row.contact, row.stencil, row.normal, row.gap);
   });
-  for (auto& list : c.tags) valueOf(file, list);
-  auto& s = c.smooth;
-  values(s.vertexTriangle, s.triangleVertex, s.edgeEdge, s.shape);
+  for (auto& each : c.columns) values(each.tags);
+  forEachContactList(c, [&](ContactKind kind, auto&) {
+    if (kind != ContactKind::ShapeShape) values(c.columnsOf(kind).smooth);
+  });
   if constexpr (File::kReads) checkLists(file, c);
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 
 namespace palpate {
 

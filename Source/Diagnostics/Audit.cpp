@@ -8,6 +8,7 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Order.h"
 #include "NarrowPhase/Piercing.h"
+#include "Contact/ContactLists.h"
 #include "Shapes/DistinctContacts.h"
 #include "Core/Assert.h"
 
@@ -46,19 +47,6 @@ std::vector<std::uint64_t> drawNumbers(std::uint64_t count, std::uint64_t size,
   return drawn;
 }
 
-/// The ids by which contacts are ordered and distinguished.
-std::array<std::uint32_t, 2> idsOf(const VertexTriangleContact& c) {
-  return {c.vertex, c.triangle};
-}
-std::array<std::uint32_t, 4> idsOf(const EdgeEdgeContact& c) {
-  return {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
-}
-std::array<std::uint32_t, 2> idsOf(const ElementPair& pair) { return {pair.a, pair.b}; }
-std::array<std::uint32_t, 3> idsOf(const ShapeContact& c) {
-  return {static_cast<std::uint32_t>(c.element), c.id, c.vertices[1]};
-}
-int idsOf(const ShapeShapeContact&) { return 0; }  // there is one
-
 /// Decides which contacts a sample of features covers. Brute force for the sample finds every
 /// covered contact. Of Intersection all contacts are covered: they follow from the triangles that
 /// the answer lists.
@@ -74,20 +62,18 @@ class Coverage {
     PALPATE_ASSERT(std::is_sorted(sample.trianglesOfA.begin(), sample.trianglesOfA.end()));
   }
 
-  bool coversVertexTriangle(const VertexTriangleContact& c) const {
-    if (c.vertex >= ofA().vertexCount) return true;  // there is no such vertex
-    return m_byTriangles || holds(m_sample.verticesOfA, c.vertex);
+  bool covers(ContactKind kind, const VertexTriangleContact& c) const {
+    const bool ofSecond = kind == ContactKind::TriangleVertex;
+    if (!ofSecond && c.vertex >= ofA().vertexCount) return true;  // there is no such vertex
+    return m_byTriangles || holds(ofSecond ? m_sample.verticesOfB : m_sample.verticesOfA, c.vertex);
   }
-  bool coversTriangleVertex(const VertexTriangleContact& c) const {
-    return m_byTriangles || holds(m_sample.verticesOfB, c.vertex);
-  }
-  bool coversEdges(const EdgeEdgeContact& c) const {
+  bool covers(ContactKind, const EdgeEdgeContact& c) const {
     const std::uint32_t edgeA = ofA().edgeOf(c.edgeA), edgeB = ofB().edgeOf(c.edgeB);
     if (edgeA == kNoEdge || edgeB == kNoEdge) return true;  // there are no such edges
     return m_byTriangles || holds(m_sample.edgesOfA, edgeA);
   }
   /// Vertices and edges are covered by the element that owns them.
-  bool coversShape(const ShapeContact& c) const {
+  bool covers(ContactKind, const ShapeContact& c) const {
     const MeshTopology& mesh = m_question.mesh().mesh.topology;
     if (c.element == ShapeElement::Face) return holds(m_sample.trianglesOfA, c.id);
     const bool isVertex = c.element == ShapeElement::Vertex;
@@ -96,7 +82,8 @@ class Coverage {
     const auto owners = isVertex ? mesh.vertexTriangles[c.id] : mesh.edgeTriangles[edge];
     return owners.empty() || holds(m_sample.trianglesOfA, owners.front());
   }
-  bool coversTriangles(const ElementPair& pair) const {
+  bool covers(ContactKind, const ShapeShapeContact&) const { return true; }
+  bool covers(const ElementPair& pair) const {
     return holds(m_sample.trianglesOfA, m_question.self() ? std::min(pair.a, pair.b) : pair.a);
   }
 
@@ -119,7 +106,7 @@ void addListed(const MeshPair& meshes, const Coverage& coverage, const Collision
   const std::size_t countA = meshes.a.topology.elements.size(),
                     countB = meshes.b.topology.elements.size();
   for (const ElementPair& pair : answer.intersectingTriangles())
-    if (pair.a < countA && pair.b < countB && !coverage.coversTriangles(pair))
+    if (pair.a < countA && pair.b < countB && !coverage.covers(pair))
       addIntersection(meshes, pair, contacts);
   ContactBuffers* const found[] = {&contacts};
   PiercingContacts().find(meshes, found, pierced);
@@ -168,11 +155,11 @@ class KnownVertices {
 };
 
 /// Calls report(fault, expected, found) where two lists differ. A contact that was found but not
-/// expected counts only if it is covered.
-template <class Contact, class Covered, class Report>
-void compare(CountedVector<Contact> expected, std::span<const Contact> allFound, Covered&& covered,
-             Report&& report) {
-  const auto before = [](const Contact& l, const Contact& r) { return idsOf(l) < idsOf(r); };
+/// expected counts only if it is covered. idsOf(contact): by which contacts are distinguished.
+template <class Contact, class IdsOf, class Covered, class Report>
+void compare(CountedVector<Contact> expected, std::span<const Contact> allFound, IdsOf&& idsOf,
+             Covered&& covered, Report&& report) {
+  const auto before = [&](const Contact& l, const Contact& r) { return idsOf(l) < idsOf(r); };
   CountedVector<Contact> found;
   std::stable_sort(expected.begin(), expected.end(), before);
   std::copy_if(allFound.begin(), allFound.end(), std::back_inserter(found), [&](const Contact& c) {
@@ -261,7 +248,7 @@ void audit(const Question& question, bool sidesAreKnown, const CollisionData& da
     };
   };
   if (meshes.settings.continuous.earliestTimeOnly) {
-    return forEachTimed(expected, [&](const auto& all) {
+    return forEachContactList(expected, [&](ContactKind, const auto& all) {
       for (const auto& contact : all)
         if (contact.timeOfImpact < data.earliestTimeOfImpact())
           reporterFor(List::Earliest)(Fault::FalseNegative, contact, {});
@@ -272,22 +259,24 @@ void audit(const Question& question, bool sidesAreKnown, const CollisionData& da
   if (needsAll) {
     DistinctContacts distinct;
     keepDistinct(question, distinct, expected.shape);
-    std::erase_if(expected.shape, [&](const ShapeContact& c) { return !coverage.coversShape(c); });
+    std::erase_if(expected.shape,
+                  [&](const ShapeContact& c) { return !coverage.covers(ContactKind::Shape, c); });
   }
-  const auto compareList = [&](const auto& truth, const auto& found, auto covers, List list) {
-    compare(truth, found, std::bind_front(covers, &coverage), reporterFor(list));
+  constexpr std::array kListOf{List::VertexTriangle, List::TriangleVertex, List::EdgeEdge,
+                               List::Shape, List::ShapeShape};
+  const CollisionData::Contents& found = CollisionData::Contents::read(data);
+  const auto compareList = [&](auto kind, const auto& truth) {
+    compare(
+        truth, std::span(contactList<kind()>(found)), [&](const auto& c) { return keyOf(kind, c); },
+        [&](const auto& c) { return coverage.covers(kind, c); },
+        reporterFor(kListOf[static_cast<std::size_t>(kind())]));
   };
-  compareList(expected.vertexTriangle, data.vertexTriangle(), &Coverage::coversVertexTriangle,
-              List::VertexTriangle);
-  compareList(expected.triangleVertex, data.triangleVertex(), &Coverage::coversTriangleVertex,
-              List::TriangleVertex);
-  compareList(expected.edgeEdge, data.edgeEdge(), &Coverage::coversEdges, List::EdgeEdge);
-  compareList(expected.intersectingTriangles, data.intersectingTriangles(),
-              &Coverage::coversTriangles, List::IntersectingTriangles);
-  compareList(expected.shape, data.shape(), &Coverage::coversShape, List::Shape);
+  forEachMeshList(expected, compareList);
   compare(
-      expected.shapeShape, data.shapeShape(), [](const auto&) { return true; },
-      reporterFor(List::ShapeShape));
+      expected.intersectingTriangles, data.intersectingTriangles(), std::identity(),
+      [&](const ElementPair& c) { return coverage.covers(c); },
+      reporterFor(List::IntersectingTriangles));
+  forEachShapeList(expected, compareList);
 }
 
 CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {

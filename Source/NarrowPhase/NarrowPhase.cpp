@@ -4,6 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
+#include "Contact/ContactLists.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -35,9 +36,7 @@ void StepFacts::addShape(const ShapeContactBuffers& found, bool isAtStart) {
 }
 
 void ContactBuffers::clear() {
-  vertexTriangle.clear();
-  triangleVertex.clear();
-  edgeEdge.clear();
+  forEachMeshList(*this, [](ContactKind, auto& list) { list.clear(); });
   intersectingTriangles.clear();
   passages.clear();
   crossings.clear();

@@ -2,7 +2,7 @@
 
 #include <palpate/Settings.h>
 
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "Shapes/ShapeContacts.h"
@@ -169,13 +169,6 @@ struct ContactBuffers {
   std::size_t validityPairs = 0;   ///< triangle pairs tested for Validity::startedApart
   void clear();
 };
-
-/// Calls f(list) for each list of contacts that have a time of impact.
-template <class Lists, class F>
-void forEachTimed(Lists& lists, F&& f) {
-  f(lists.vertexTriangle), f(lists.triangleVertex), f(lists.edgeEdge), f(lists.shape);
-  f(lists.shapeShape);
-}
 
 /// Appends the contacts of the candidate triangle pairs. Each contact is appended once over all
 /// batches of a frame. Only Method::Intersection may repeat contacts; orderContacts() removes the

@@ -5,6 +5,7 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Contact/ContactLists.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
@@ -756,8 +757,7 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
       }
     }
     if (opinion.agreement < 0.0) {
-      contact.normal = -contact.normal;
-      contact.distance = -contact.distance;
+      turn(contact);
     }
     return false;
   };

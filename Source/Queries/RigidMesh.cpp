@@ -4,6 +4,7 @@
 #include <palpate/Error.h>
 
 #include "Queries/QuerySource.h"
+#include "Contact/ContactLists.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "NarrowPhase/Order.h"
 #include "Bodies/Body.h"
@@ -114,8 +115,7 @@ void SpatialQueries::contacts(GeometryId id, RigidMesh& mesh, const Pose& placem
   sorted.validity = {};
   sorted.validity.method = Method::Proximity;
   sorted.validity.effectiveThickness = thickness;
-  sorted.validity.atEnd =
-      sorted.vertexTriangle.size() + sorted.triangleVertex.size() + sorted.edgeEdge.size();
+  sorted.validity.atEnd = contactCount(sorted);
   std::swap(CollisionData::Contents::of(out), sorted);
 }
 

@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Bodies/OctreeFrame.h"
+#include "Contact/ContactLists.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RayCrossing.h"
@@ -72,9 +73,11 @@ bool isInside(const Body& inner, const Body& outer, Engine engine, PointQuerySta
 template <class F>
 void forEachPush(std::span<ContactBuffers* const> local, F&& f) {
   for (const ContactBuffers* buffers : local) {
-    for (const auto& contact : buffers->vertexTriangle) f(contact.normal, false);
-    for (const auto& contact : buffers->triangleVertex) f(Vector3d(-contact.normal), false);
-    for (const auto& contact : buffers->edgeEdge) f(contact.normal, true);
+    forEachMeshList(*buffers, [&](ContactKind kind, const auto& list) {
+      const bool swapped = kind == ContactKind::TriangleVertex;
+      for (const auto& contact : list)
+        f(swapped ? Vector3d(-contact.normal) : contact.normal, kind == ContactKind::EdgeEdge);
+    });
   }
 }
 
@@ -123,44 +126,37 @@ bool leaves(const TriangleMesh& body, const VertexTriangleContact& c) {
 bool leaves(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
   return c.normal.dot(normalOfEdge(b, c.edgeB)) < 0 || c.normal.dot(normalOfEdge(a, c.edgeA)) > 0;
 }
-/// Calls f(list, isLeaving) for the three lists. isLeaving: whether a contact is such an impact.
+/// Calls f(impact) for impacts of features that leave a body, until it returns true.
 template <class F>
-void forEachList(const TriangleMesh& a, const TriangleMesh& b, ContactBuffers& found, F&& f) {
-  const auto pass = [&](auto& list, auto&& isOut) {
-    f(list, [&](const auto& contact) { return contact.timeOfImpact < 1.0 && isOut(contact); });
-  };
-  pass(found.vertexTriangle, [&](const auto& c) { return leaves(b, c); });
-  pass(found.triangleVertex, [&](const auto& c) { return leaves(a, c); });
-  pass(found.edgeEdge, [&](const auto& c) { return leaves(a, b, c); });
-}
-
-bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+bool anyLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step, F&& f) {
   TimeCheck check(128);
   bool any = false;
   for (ContactBuffers* found : step)
-    forEachList(a, b, *found, [&](const auto& list, auto&& isLeaving) {
-      any = any || std::any_of(list.begin(), list.end(), [&](const auto& contact) {
+    forEachMeshList(*found, [&](auto kind, auto& list) {
+      any = any || std::any_of(list.begin(), list.end(), [&](auto& contact) {
               check();
-              return isLeaving(contact);
+              if (!(contact.timeOfImpact < 1.0)) return false;
+              if constexpr (kind == ContactKind::EdgeEdge)
+                return leaves(a, b, contact) && f(contact);
+              else
+                return leaves(kind == ContactKind::VertexTriangle ? b : a, contact) && f(contact);
             });
     });
   return any;
 }
 
+bool anyLeaves(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
+  return anyLeaving(a, b, step, [](const auto&) { return true; });
+}
+
 /// Turns these impacts, so that they push the feature on out. Returns whether there were any.
 bool turnLeaving(const TriangleMesh& a, const TriangleMesh& b, BodyContacts::Buffers step) {
-  TimeCheck check(128);
   bool any = false;
-  for (ContactBuffers* found : step)
-    forEachList(a, b, *found, [&](auto& list, auto&& isLeaving) {
-      for (auto& contact : list) {
-        check();
-        if (!isLeaving(contact)) continue;
-        any = true;
-        contact.normal = -contact.normal;
-        contact.distance = -contact.distance;
-      }
-    });
+  anyLeaving(a, b, step, [&](auto& contact) {
+    turn(contact);
+    any = true;
+    return false;
+  });
   return any;
 }
 

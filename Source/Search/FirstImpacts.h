@@ -3,7 +3,7 @@
 #include <palpate/CollisionData.h>
 
 #include "Search/ExcludedImpacts.h"
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 #include "NarrowPhase/Order.h"
 #include "Math/NormalCone.h"
 #include "Core/Buffer.h"

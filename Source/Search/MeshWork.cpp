@@ -6,6 +6,7 @@
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Meeting.h"
 #include "NarrowPhase/StepCheck.h"
+#include "Contact/ContactLists.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
 #include "Core/Stopping.h"
@@ -332,11 +333,11 @@ void MeshWork::join(Jobs jobs, const FrameJoin& join) const {
     results.keepFirstImpacts(m_search, mixes ? 1.0 : std::numeric_limits<double>::infinity());
   std::size_t atImpact = 0;
   if (mixes)
-    forEachTimed(contents, [&](const auto& contacts) {
+    forEachContactList(contents, [&](ContactKind, const auto& contacts) {
       for (const auto& contact : contacts) atImpact += contact.timeOfImpact < 1.0;
     });
   else if (continuous)
-    atImpact = sizeOf(contents) - intersectionCount;
+    atImpact = contactCount(contents) - intersectionCount;
   countContacts(atImpact, contents);
 }
 

@@ -1,5 +1,6 @@
 #include "Search/PairResults.h"
 
+#include "Contact/ContactLists.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -80,13 +81,10 @@ void keepDistinct(const Question& question, DistinctContacts& distinct,
 void takeEarliest(const Search& search, ContactBuffers& contacts) {
   PALPATE_ASSERT(search.question->settings().continuous.earliestTimeOnly);
   std::atomic<double>& earliest = search.answer->earliest;
-  const auto take = [&](auto& list, int = 0) {
+  forEachContactList(contacts, [&](ContactKind, auto& list) {
     for (const auto& contact : list) earliest = std::min(earliest.load(), contact.timeOfImpact);
     list.clear();
-  };
-  forEachImpactList(contacts, take);
-  take(contacts.shapes.shape);
-  take(contacts.shapes.shapeShape);
+  });
 }
 
 void describeExact(CollisionData::Contents& contents) {
@@ -98,16 +96,10 @@ void describeExact(CollisionData::Contents& contents) {
   contents.step.endRows.clear();
 }
 
-std::size_t sizeOf(const CollisionData::Contents& contents) {
-  std::size_t size = 0;
-  forEachTimed(contents, [&](const auto& list) { size += list.size(); });
-  return size;
-}
-
 void countContacts(std::size_t atImpact, CollisionData::Contents& contents) {
-  PALPATE_ASSERT(atImpact <= sizeOf(contents));
+  PALPATE_ASSERT(atImpact <= contactCount(contents));
   contents.validity.atImpact = atImpact;
-  contents.validity.atEnd = sizeOf(contents) - atImpact;
+  contents.validity.atEnd = contactCount(contents) - atImpact;
 }
 
 }  // namespace palpate

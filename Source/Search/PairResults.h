@@ -75,7 +75,6 @@ void takeEarliest(const Search&, ContactBuffers&);
 /// The error bound and the lists of Validity of an answer without an error.
 void describeExact(CollisionData::Contents&);
 
-std::size_t sizeOf(const CollisionData::Contents&);  ///< number of contacts
 /// Writes the numbers of contacts at impact and at the step's end.
 void countContacts(std::size_t atImpact, CollisionData::Contents&);
 

@@ -1,6 +1,7 @@
 #include "Search/ProxyWork.h"
 
 #include "Search/PairResults.h"
+#include "Contact/ContactLists.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopping.h"
@@ -21,11 +22,8 @@ void ProxyWork::run(int, std::size_t job, JobScratch& scratch) const {
 void ProxyWork::join(Jobs jobs, const FrameJoin& join) const {
   PALPATE_ASSERT(m_search.question->plan.kind == PairKind::Proxy);
   CollisionData::Contents& contents = m_search.answer->contents();
-  contents.vertexTriangle.clear();
-  contents.triangleVertex.clear();
-  contents.edgeEdge.clear();
+  forEachContactList(contents, [](ContactKind, auto& list) { list.clear(); });
   contents.intersectingTriangles.clear();
-  contents.shapeShape.clear();
   describeExact(contents);
   std::size_t size = 0;
   for (const auto& job : jobs) size += job->hits.count;

@@ -10,7 +10,7 @@
 #include "DistanceField/FieldContacts.h"
 #include "DistanceField/SurfaceProxy.h"
 #include "Bodies/Body.h"
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Mesh/RestDistance.h"
 #include "Core/Assert.h"

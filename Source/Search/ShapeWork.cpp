@@ -78,7 +78,7 @@ void ShapeWork::join(Jobs jobs, const FrameJoin& join) const {
   describeExact(contents);
   results.assess(m_search, false, join.statistics);
   if (question.plan.kind == PairKind::MeshAndShape) results.keepDistinct(m_search);
-  countContacts(continuous ? sizeOf(contents) : 0, contents);
+  countContacts(continuous ? contactCount(contents) : 0, contents);
 }
 
 }  // namespace palpate

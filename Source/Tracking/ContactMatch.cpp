@@ -7,7 +7,6 @@
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <type_traits>
 #include <utility>
 
 namespace palpate {
@@ -57,22 +56,6 @@ std::uint64_t setOf(const Triangle& vertices) {
   return set;
 }
 
-template <class Contact>
-ContactKey keyOf(ContactKind kind, const Contact& contact) {
-  ContactKey key{kind};
-  auto& ids = key.ids;
-  if constexpr (std::is_same_v<Contact, VertexTriangleContact>) {
-    ids[0] = contact.vertex, ids[1] = contact.triangle;
-    if (kind == ContactKind::TriangleVertex) std::swap(ids[0], ids[1]);
-  } else if constexpr (std::is_same_v<Contact, EdgeEdgeContact>) {
-    ids = {contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]};
-  } else if constexpr (std::is_same_v<Contact, ShapeContact>) {
-    ids = {static_cast<std::uint32_t>(contact.element), contact.id, contact.vertices[1],
-           contact.vertices[2]};
-  }
-  return key;
-}
-
 ContactMatch::Vertices verticesOf(const ContactKey& key, const Triangle& corners) {
   constexpr Triangle kNone{kNoElement, kNoElement, kNoElement};
   const auto& ids = key.ids;
@@ -89,6 +72,17 @@ ContactMatch::Vertices verticesOf(const ContactKey& key, const Triangle& corners
       break;
   }
   return {kNone, kNone};
+}
+
+/// Member by member: a copy of the whole would wait for the stores to its parts.
+void write(TrackedContact& contact, const ContactKey& key, std::uint32_t age,
+           std::uint64_t userData) {
+  contact.key.kind = key.kind;
+  contact.key.ids = key.ids;
+  contact.predecessor.reset();
+  contact.age = age;
+  contact.userData = userData;
+  contact.end = ContactEnd::None;
 }
 
 }  // namespace
@@ -108,65 +102,58 @@ void ContactMatch::match(const Contents& before, std::uint32_t steps, bool other
                          Contents& next) {
   m_ended.clear();
   m_begun.clear();
-  forEachTracked(
-      [&](ContactKind kind, const auto& contactsBefore, const auto& contacts,
-          const auto& trackedBefore, auto& tracked) {
-        PALPATE_ASSERT(trackedBefore.empty() || trackedBefore.size() == contactsBefore.size());
-        const std::size_t countBefore = trackedBefore.size(), count = contacts.size();
-        tracked.resize(count);
-        const bool mayLast = !(otherElements && kind == ContactKind::Shape);
-        // Member by member: a copy of the whole would wait for the stores to its parts.
-        const auto write = [&](std::size_t i, const ContactKey& key, std::uint32_t age,
-                               std::uint64_t userData) {
-          TrackedContact& contact = tracked[i];
-          contact.key.kind = key.kind;
-          contact.key.ids = key.ids;
-          contact.predecessor.reset();
-          contact.age = age;
-          contact.userData = userData;
-          contact.end = ContactEnd::None;
-        };
-        // Room for all; what is left of it is taken back.
-        std::size_t ended = m_ended.size(), begun = m_begun.size();
-        const std::size_t firstEnded = ended, firstBegun = begun;
-        m_ended.resize(ended + countBefore);
-        m_begun.resize(begun + count);
-        std::size_t i = 0, j = 0;
-        while (i < count && j < countBefore) {
-          const ContactKey key = keyOf(kind, contacts[i]);
-          PALPATE_ASSERT(i == 0 || keyOf(kind, contacts[i - 1]) < key);
-          const UnsignedInt128 now = numberOf(key), was = numberOf(trackedBefore[j].key);
-          if (now == was && cornersOf(contactsBefore[j]) == cornersOf(contacts[i]) && mayLast) {
-            write(i++, key, trackedBefore[j].age + steps, trackedBefore[j].userData);
-            ++j;
-            continue;
-          }
-          // Without branches: no processor predicts where two sorted lists interleave.
-          m_ended[ended].contact = &trackedBefore[j];
-          m_begun[begun].contact = &tracked[i];
-          const bool ends = was <= now, begins = now <= was;
-          ended += ends, j += ends;
-          begun += begins, i += begins;
-        }
-        for (; j < countBefore; ++j) m_ended[ended++].contact = &trackedBefore[j];
-        for (; i < count; ++i) m_begun[begun++].contact = &tracked[i];
-        m_ended.resize(ended);
-        m_begun.resize(begun);
-        for (std::size_t k = firstEnded; k < ended; ++k) {
-          const auto place = static_cast<std::size_t>(m_ended[k].contact - trackedBefore.data());
-          m_ended[k].vertices =
-              verticesOf(m_ended[k].contact->key, cornersOf(contactsBefore[place]));
-          m_ended[k].isPredecessor = false;
-        }
-        for (std::size_t k = firstBegun; k < begun; ++k) {
-          const auto place = static_cast<std::size_t>(m_begun[k].contact - tracked.data());
-          const ContactKey key = keyOf(kind, contacts[place]);
-          write(place, key, 0, 0);
-          m_begun[k].vertices = verticesOf(key, cornersOf(contacts[place]));
-          m_begun[k].hasPredecessor = false;
-        }
-      },
-      before, next);
+  forEachContactList(next, [&](auto kind, const auto&) {
+    matchList<kind()>(before, steps, !(otherElements && kind == ContactKind::Shape), next);
+  });
+}
+
+template <ContactKind kKind>
+void ContactMatch::matchList(const Contents& before, std::uint32_t steps, bool mayLast,
+                             Contents& next) {
+  const auto &contactsBefore = contactList<kKind>(before), &contacts = contactList<kKind>(next);
+  const auto& trackedBefore = before.columnsOf(kKind).tracked;
+  auto& tracked = next.columnsOf(kKind).tracked;
+  PALPATE_ASSERT(trackedBefore.empty() || trackedBefore.size() == contactsBefore.size());
+  const std::size_t countBefore = trackedBefore.size(), count = contacts.size();
+  tracked.resize(count);
+  // Room for all; what is left of it is taken back.
+  std::size_t ended = m_ended.size(), begun = m_begun.size();
+  const std::size_t firstEnded = ended, firstBegun = begun;
+  m_ended.resize(ended + countBefore);
+  m_begun.resize(begun + count);
+  std::size_t i = 0, j = 0;
+  while (i < count && j < countBefore) {
+    const ContactKey key = keyOf(kKind, contacts[i]);
+    PALPATE_ASSERT(i == 0 || keyOf(kKind, contacts[i - 1]) < key);
+    const UnsignedInt128 now = numberOf(key), was = numberOf(trackedBefore[j].key);
+    if (now == was && cornersOf(contactsBefore[j]) == cornersOf(contacts[i]) && mayLast) {
+      write(tracked[i++], key, trackedBefore[j].age + steps, trackedBefore[j].userData);
+      ++j;
+      continue;
+    }
+    // Without branches: no processor predicts where two sorted lists interleave.
+    m_ended[ended].contact = &trackedBefore[j];
+    m_begun[begun].contact = &tracked[i];
+    const bool ends = was <= now, begins = now <= was;
+    ended += ends, j += ends;
+    begun += begins, i += begins;
+  }
+  for (; j < countBefore; ++j) m_ended[ended++].contact = &trackedBefore[j];
+  for (; i < count; ++i) m_begun[begun++].contact = &tracked[i];
+  m_ended.resize(ended);
+  m_begun.resize(begun);
+  for (std::size_t k = firstEnded; k < ended; ++k) {
+    const auto place = static_cast<std::size_t>(m_ended[k].contact - trackedBefore.data());
+    m_ended[k].vertices = verticesOf(m_ended[k].contact->key, cornersOf(contactsBefore[place]));
+    m_ended[k].isPredecessor = false;
+  }
+  for (std::size_t k = firstBegun; k < begun; ++k) {
+    const auto place = static_cast<std::size_t>(m_begun[k].contact - tracked.data());
+    const ContactKey key = keyOf(kKind, contacts[place]);
+    write(tracked[place], key, 0, 0);
+    m_begun[k].vertices = verticesOf(key, cornersOf(contacts[place]));
+    m_begun[k].hasPredecessor = false;
+  }
 }
 
 /// Lists contacts that ended by the vertices of their first feature, with self of both.
@@ -286,18 +273,15 @@ void ContactMatch::takePredecessors(std::uint32_t steps) {
 }
 
 void ContactMatch::takeUserData(const Contents& earlier) {
-  for (const Begun& begun : m_begun)
-    forEachTracked(
-        [&](ContactKind kind, const auto& contacts, const auto& tracked) {
-          const ContactKey& key = begun.contact->key;
-          if (kind != key.kind) return;
-          const TrackedContact* const found = findTracked(tracked, key);
-          if (!found) return;
-          const auto& contact = contacts[static_cast<std::size_t>(found - tracked.data())];
-          if (verticesOf(key, cornersOf(contact)) == begun.vertices)
-            begun.contact->userData = found->userData;
-        },
-        earlier);
+  for (const Begun& begun : m_begun) {
+    const ContactKey& key = begun.contact->key;
+    const auto& tracked = earlier.columnsOf(key.kind).tracked;
+    const TrackedContact* const found = findTracked(tracked, key);
+    if (!found) continue;
+    const auto place = static_cast<std::size_t>(found - tracked.data());
+    if (verticesOf(key, cornersAt(earlier, key.kind, place)) == begun.vertices)
+      begun.contact->userData = found->userData;
+  }
 }
 
 }  // namespace palpate

@@ -2,7 +2,8 @@
 
 #include <palpate/Tracking.h>
 
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/ContactLists.h"
+#include "Contact/Contents.h"
 #include "Core/Buffer.h"
 
 #include <algorithm>
@@ -12,24 +13,14 @@
 
 namespace palpate {
 
-/// Calls f(kind, contacts, tracked) for each list, in the order of keys. Of two contents, f takes
-/// the contacts of both, then tracked of both.
-template <class F, class... Contents>
-void forEachTracked(F&& f, Contents&... all) {
-  f(ContactKind::VertexTriangle, all.vertexTriangle..., all.tracked.vertexTriangle...);
-  f(ContactKind::TriangleVertex, all.triangleVertex..., all.tracked.triangleVertex...);
-  f(ContactKind::EdgeEdge, all.edgeEdge..., all.tracked.edgeEdge...);
-  f(ContactKind::Shape, all.shape..., all.tracked.shape...);
-  f(ContactKind::ShapeShape, all.shapeShape..., all.tracked.shapeShape...);
-}
-
-/// Of the element that a contact's key does not describe; else 0.
-template <class Contact>
-Triangle cornersOf(const Contact& contact) {
-  if constexpr (requires { contact.vertices; })
-    return contact.vertices;
-  else
-    return {};
+/// cornersOf() a contact by its place in the list of a kind.
+inline Triangle cornersAt(const CollisionData::Contents& contents, ContactKind kind,
+                          std::size_t place) {
+  Triangle corners{};
+  forEachContactList(contents, [&](ContactKind of, const auto& list) {
+    if (of == kind) corners = cornersOf(list[place]);
+  });
+  return corners;
 }
 
 /// The contact with this key, null if there is none. tracked: of one list.
@@ -56,9 +47,9 @@ class ContactMatch {
     bool isPredecessor;  ///< of a contact of the next answer
   };
 
-  /// Writes Contents::tracked of the next answer, without ended. steps: between the answers.
-  /// self: a mesh with itself. otherElements: Contents::shape has elements of the other geometry
-  /// now, so that equal keys are other contacts.
+  /// Writes the column `tracked` of the next answer, without Contents::ended. steps: between the
+  /// answers. self: a mesh with itself. otherElements: Contents::shape has elements of the other
+  /// geometry now, so that equal keys are other contacts.
   void track(const Contents& before, std::uint32_t steps, bool self, bool otherElements,
              Contents& next);
   /// Contacts that began keep what an earlier answer of the same step was given for them.
@@ -90,6 +81,8 @@ class ContactMatch {
   };
 
   void match(const Contents& before, std::uint32_t steps, bool otherElements, Contents& next);
+  template <ContactKind kKind>
+  void matchList(const Contents& before, std::uint32_t steps, bool mayLast, Contents& next);
   void linkVertices(bool self);
   void findCandidates();
   void findSlides(bool self, bool otherElements);

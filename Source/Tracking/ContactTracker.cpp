@@ -43,16 +43,15 @@ bool ContactTracker::startStep(std::uint64_t step, const Contents& last) noexcep
   m_repeats = false;
   if (std::exchange(m_isDropped, false)) return true;
   m_isHeld = m_hasGrown = false;
-  m_beforeOfSecond = last.tracked.elementsOfSecond;
+  m_beforeOfSecond = last.trackedOfSecond;
   m_elementsBefore = m_elements;
   return true;
 }
 
 bool ContactTracker::hadContacts(const Contents& last) const {
-  bool any = false;
-  forEachTracked([&](ContactKind, const auto&, const auto& tracked) { any |= !tracked.empty(); },
-                 before(last));
-  return any;
+  const auto& columns = before(last).columns;
+  return std::any_of(columns.begin(), columns.end(),
+                     [](const Contents::Columns& each) { return !each.tracked.empty(); });
 }
 
 /// Answers take turns with m_held. Their lists soon have the capacity of the largest one.
@@ -62,13 +61,11 @@ void ContactTracker::reserveAs(const Contents& next) {
     spare.clear();
     spare.reserve(list.capacity());
   };
-  forEachTracked(
-      [&](ContactKind, const auto& contacts, auto& spareContacts, const auto& tracked,
-          auto& spareTracked) {
-        reserve(contacts, spareContacts);
-        reserve(tracked, spareTracked);
-      },
-      next, m_held);
+  forEachContactList(next, [&](auto kind, const auto& contacts) {
+    reserve(contacts, contactList<kind()>(m_held));
+  });
+  for (std::size_t i = 0; i < next.columns.size(); ++i)
+    reserve(next.columns[i].tracked, m_held.columns[i].tracked);
 }
 
 ContactEnd ContactTracker::endOf(const MeshPair& pair, bool collides,
@@ -128,10 +125,10 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   if (std::exchange(m_repeats, true)) scratch.takeUserData(last);
   const bool hasReasons =
       !collides || pair.predicate || pair.nearAtRest || m_elementsBefore != elements;
-  next.tracked.ended.resize(scratch.ended().size());
+  next.ended.resize(scratch.ended().size());
   std::size_t count = 0;
   for (const ContactMatch::Ended& ended : scratch.ended()) {
-    TrackedContact& contact = next.tracked.ended[count];
+    TrackedContact& contact = next.ended[count];
     contact.key.kind = ended.contact->key.kind;
     contact.key.ids = ended.contact->key.ids;
     contact.predecessor.reset();
@@ -141,42 +138,34 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
     if (hasReasons && !ended.isPredecessor) contact.end = endOf(pair, collides, ended);
     count += !ended.isPredecessor;
   }
-  next.tracked.ended.resize(count);
+  next.ended.resize(count);
 }
 
 void ContactTracker::commit(Contents& kept) noexcept {
   if (!std::exchange(m_keeps, false)) return;
-  forEachTracked(
-      [](ContactKind, const auto&, auto& tracked) {
-        for (TrackedContact& contact : tracked) {
-          contact.predecessor.reset();
-          ++contact.age;
-        }
-      },
-      kept);
+  for (Contents::Columns& each : kept.columns)
+    for (TrackedContact& contact : each.tracked) {
+      contact.predecessor.reset();
+      ++contact.age;
+    }
   m_hasGrown = !m_isHeld;
-  kept.tracked.ended.clear();
+  kept.ended.clear();
 }
 
 void ContactTracker::hold(Contents& before) noexcept {
   if (std::exchange(m_isHeld, true)) return;
-  forEachTracked(
-      [](ContactKind, auto& contacts, auto& contactsBefore, auto& tracked, auto& trackedBefore) {
-        contacts.swap(contactsBefore);
-        tracked.swap(trackedBefore);
-      },
-      m_held, before);
+  forEachContactList(
+      before, [&](auto kind, auto& contacts) { contactList<kind()>(m_held).swap(contacts); });
+  for (std::size_t i = 0; i < before.columns.size(); ++i)
+    m_held.columns[i].tracked.swap(before.columns[i].tracked);
 }
 
 void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) noexcept {
   if (m_step != step) {
     // Nothing slid or ended in this step.
-    forEachTracked(
-        [](ContactKind, const auto&, auto& tracked) {
-          for (TrackedContact& contact : tracked) contact.predecessor.reset();
-        },
-        kept);
-    kept.tracked.ended.clear();
+    for (Contents::Columns& each : kept.columns)
+      for (TrackedContact& contact : each.tracked) contact.predecessor.reset();
+    kept.ended.clear();
   }
   if (!drops) return;
   startStep(step, kept);
@@ -184,42 +173,26 @@ void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) noexce
   m_isDropped = true;
 }
 
-void ContactTracker::releaseMemory(Contents& contents) {
-  forEachTracked([](ContactKind, auto&, auto& tracked) { releaseSpare(tracked); }, contents);
-  releaseSpare(contents.tracked.ended);
-  if (m_isHeld)
-    forEachTracked(
-        [](ContactKind, auto& contacts, auto& tracked) {
-          releaseSpare(contacts);
-          releaseSpare(tracked);
-        },
-        m_held);
-  else
-    m_held = {};
+void ContactTracker::releaseMemory() {
+  if (!m_isHeld) m_held = {};
+  m_held.releaseSpare();
 }
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {
-  bool isFound = false;
-  const auto place = [](const auto& tracked, const TrackedContact* contact) {
-    return static_cast<std::size_t>(contact - tracked.data());
-  };
-  forEachTracked(
-      [&](ContactKind kind, const auto& contacts, const auto& contactsBefore, auto& tracked,
-          auto& trackedBefore) {
-        if (kind != key.kind) return;
-        TrackedContact* const found = findTracked(tracked, key);
-        if (!found) return;
-        found->userData = data;
-        isFound = true;
-        if (!m_isHeld) return;
-        // Detections of this step that are repeated read it here.
-        TrackedContact* const before = findTracked(trackedBefore, key);
-        if (before && cornersOf(contactsBefore[place(trackedBefore, before)]) ==
-                          cornersOf(contacts[place(tracked, found)]))
-          before->userData = data;
-      },
-      contents, m_held);
-  return isFound;
+  if (key.kind > ContactKind::ShapeShape) return false;
+  auto &tracked = contents.columnsOf(key.kind).tracked,
+       &trackedBefore = m_held.columnsOf(key.kind).tracked;
+  TrackedContact* const found = findTracked(tracked, key);
+  if (!found) return false;
+  found->userData = data;
+  if (!m_isHeld) return true;
+  // Detections of this step that are repeated read it here.
+  TrackedContact* const before = findTracked(trackedBefore, key);
+  if (before &&
+      cornersAt(m_held, key.kind, static_cast<std::size_t>(before - trackedBefore.data())) ==
+          cornersAt(contents, key.kind, static_cast<std::size_t>(found - tracked.data())))
+    before->userData = data;
+  return true;
 }
 
 }  // namespace palpate

@@ -2,7 +2,7 @@
 
 #include <palpate/Tracking.h>
 
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Tracking/ContactMatch.h"
 #include "Mesh/Revision.h"
@@ -26,8 +26,9 @@ class ContactTracker : public CountedObject {
   bool startStep(std::uint64_t step, const Contents& last) noexcept;
   bool hadContacts(const Contents& last) const;  ///< at the last advance()
 
-  /// Writes Contents::tracked of an answer in this step. last: of the last detection, maybe in this
-  /// step. collides: false if groups exclude the pair. elements: of the pair's geometries.
+  /// Writes the column `tracked` and Contents::ended of an answer in this step. last: of the last
+  /// detection, maybe in this step. collides: false if groups exclude the pair. elements: of the
+  /// pair's geometries.
   void track(const MeshPair&, bool collides, const std::array<ElementsState, 2>& elements,
              const Contents& last, Contents& next, ContactMatch& scratch);
   /// An answer that needs no detection lasts into this step. Call commit() then.
@@ -42,7 +43,7 @@ class ContactTracker : public CountedObject {
   /// answer is compared with it even so.
   void skip(std::uint64_t step, bool drops, Contents& kept) noexcept;
 
-  void releaseMemory(Contents&);  ///< keeps what contacts have been
+  void releaseMemory();  ///< keeps what contacts have been
 
   /// Returns whether the answer has the contact.
   bool setUserData(Contents&, const ContactKey&, std::uint64_t);
@@ -55,7 +56,7 @@ class ContactTracker : public CountedObject {
  private:
   /// Whether Contents::shape has elements of the other geometry now: equal keys are other contacts.
   bool hasOtherElements(const Contents& next) const {
-    return next.tracked.elementsOfSecond != m_beforeOfSecond;
+    return next.trackedOfSecond != m_beforeOfSecond;
   }
   /// The contacts at the last advance().
   const Contents& before(const Contents& last) const { return m_isHeld ? m_held : last; }
@@ -68,7 +69,7 @@ class ContactTracker : public CountedObject {
   /// if m_hasGrown.
   Contents m_held;
   bool m_isHeld = false, m_hasGrown = false;
-  bool m_beforeOfSecond = false;  ///< Tracked::elementsOfSecond of these contacts
+  bool m_beforeOfSecond = false;  ///< Contents::trackedOfSecond of these contacts
   std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< theirs; of the last answer
   bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
   bool m_isDropped = false;                 ///< m_held is all that is left of the last answer

@@ -3,6 +3,7 @@
 #include "NarrowPhase/Filters.h"
 #include "NarrowPhase/Proximity.h"
 #include "Tracking/SmoothNormals.h"
+#include "Contact/ContactLists.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
 #include "Exact/Predicates.h"
@@ -302,8 +303,8 @@ VertexTriangleContact contactOfVertex(const MeshPair& pair, const Side& side) {
   }
   VertexTriangleContact contact =
       contactOf(vertex, of.triangleOf(side.passage), side.corners, measured, 0.0);
-  contact.normal = -contact.normal;
-  contact.distance = -contact.distance - (pair.a.largestRadius + pair.b.largestRadius);
+  turn(contact);
+  contact.distance -= pair.a.largestRadius + pair.b.largestRadius;
   return contact;
 }
 
@@ -318,28 +319,18 @@ EdgeEdgeContact contactOfEdges(const MeshPair& pair, const Side& side) {
     if (!side.passage.forward) measured.normal = -measured.normal;
   }
   EdgeEdgeContact contact = contactOf(a, b, measured, 0.0);
-  contact.normal = -contact.normal;
-  contact.distance = -contact.distance - (pair.a.largestRadius + pair.b.largestRadius);
+  turn(contact);
+  contact.distance -= pair.a.largestRadius + pair.b.largestRadius;
   return contact;
-}
-
-Crossing featuresOf(ContactKind kind, const VertexTriangleContact& contact) {
-  Crossing features{kind, {contact.vertex, contact.triangle, kNoElement, kNoElement}};
-  if (kind == ContactKind::TriangleVertex) std::swap(features.ids[0], features.ids[1]);
-  return features;
-}
-Crossing featuresOf(ContactKind kind, const EdgeEdgeContact& contact) {
-  return {kind, {contact.edgeA[0], contact.edgeA[1], contact.edgeB[0], contact.edgeB[1]}};
 }
 
 template <class Contact>
 void insert(CountedVector<Contact>& contacts, ContactKind kind, const Contact& contact) {
-  const auto place = std::lower_bound(contacts.begin(), contacts.end(), contact,
-                                      [&](const Contact& l, const Contact& r) {
-                                        return featuresOf(kind, l).ids < featuresOf(kind, r).ids;
-                                      });
-  PALPATE_ASSERT(place == contacts.end() ||
-                 featuresOf(kind, *place).ids != featuresOf(kind, contact).ids);
+  const ContactKey key = keyOf(kind, contact);
+  const auto place =
+      std::lower_bound(contacts.begin(), contacts.end(), key,
+                       [&](const Contact& l, const ContactKey& r) { return keyOf(kind, l) < r; });
+  PALPATE_ASSERT(place == contacts.end() || keyOf(kind, *place) != key);
   contacts.insert(place, contact);
 }
 
@@ -397,10 +388,9 @@ std::optional<bool> SideMemory::sideOf(ContactKind kind, std::uint32_t vertex) c
 }
 
 /// The side to which vertices with weight had passed; none if they had not, or to both sides.
-template <std::size_t N>
-SideMemory::PartSide SideMemory::sideOf(ContactKind kind, const Part<N>& part) const {
+SideMemory::PartSide SideMemory::sideOf(ContactKind kind, const Part& part) const {
   PartSide found{{}, true};
-  for (std::size_t i = 0; i < N; ++i) {
+  for (std::size_t i = 0; i < part.size; ++i) {
     if (part.weights[i] == 0.0) continue;
     const std::optional<bool> side = sideOf(kind, part.vertices[i]);
     if (side && found.forward && found.forward != side) return {{}, false};
@@ -418,47 +408,40 @@ void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
   constexpr double kClearly = 0.5;  // a cosine; directions along the surface are on no side
   constexpr ContactKind kOfA = ContactKind::VertexTriangle, kOfB = ContactKind::TriangleVertex;
   enum class Change { None, Turned, Removed };
-  const auto changeOf = [&](ContactKind kind, const auto& part, const TriangleMesh& surface,
-                            const auto& onSurface, const Vector3d& direction, double time) {
-    const PartSide side = sideOf(kind, part);
+  // part: of MeshPair::b or a; onSurface: of the other mesh. toA: from b to a.
+  const auto changeOf = [&](const Part& part, const Part& onSurface, bool ofB, const Vector3d& toA,
+                            double time) {
+    const PartSide side = sideOf(ofB ? kOfB : kOfA, part);
     if (!side.forward) return Change::None;
     const Vector3d normal =
-        interpolatedNormal(surface, onSurface.vertices, onSurface.weights.data(), time);
+        interpolatedNormal(ofB ? pair.a : pair.b, onSurface.ids(), onSurface.weights.data(), time);
+    const Vector3d direction = ofB ? Vector3d(-toA) : toA;
     const double back = (*side.forward ? -1.0 : 1.0) * direction.dot(normal);
     if (side.isWhole) return back < kClearly ? Change::Turned : Change::None;
     return back < 0.0 ? Change::Removed : Change::None;
   };
-  // a, b: parts of both meshes. toA: from b to a.
-  const auto change = [&](const auto& contact, const auto& a, const auto& b, const Vector3d& toA) {
-    const double time = contact.timeOfImpact;
-    const Change ofA = changeOf(kOfA, a, pair.b, b, toA, time),
-                 ofB = changeOf(kOfB, b, pair.a, a, -toA, time);
+  const auto changeOfContact = [&](ContactKind kind, const auto& contact) {
+    std::array<Part, 2> parts;
+    const Stencil all = stencil(contact);
+    const auto sides = sidesOf(kind);
+    for (std::size_t i = 0; i < 4; ++i)
+      parts[sides[i]].add(all.vertices[i], std::abs(all.weights[i]));
+    const bool swapped = sides[0] == 1;
+    const Vector3d toA = swapped ? Vector3d(-contact.normal) : contact.normal;
+    const Change ofA = changeOf(parts[0], parts[1], false, toA, contact.timeOfImpact),
+                 ofB = changeOf(parts[1], parts[0], true, toA, contact.timeOfImpact);
     if (ofA == Change::Turned || ofB == Change::Turned) return Change::Turned;
     return ofA == Change::None ? ofB : ofA;
   };
-  const auto apply = [&](auto& contacts, auto&& changeOfContact) {
-    std::erase_if(contacts, [&](const auto& c) { return changeOfContact(c) == Change::Removed; });
+  forEachMeshList(contents, [&](ContactKind kind, auto& contacts) {
+    std::erase_if(contacts, [&](const auto& contact) {
+      return changeOfContact(kind, contact) == Change::Removed;
+    });
     for (auto& contact : contacts) {
-      if (changeOfContact(contact) != Change::Turned) continue;
-      contact.normal = -contact.normal;
-      contact.distance = -contact.distance - 2.0 * (pair.a.largestRadius + pair.b.largestRadius);
+      if (changeOfContact(kind, contact) != Change::Turned) continue;
+      turn(contact);
+      contact.distance -= 2.0 * (pair.a.largestRadius + pair.b.largestRadius);
     }
-  };
-  const auto vertexOf = [](const VertexTriangleContact& c) { return Part<1>{{c.vertex}, {1.0}}; };
-  const auto cornersOf = [](const VertexTriangleContact& c) {
-    return Part<3>{c.vertices, {c.weights[0], c.weights[1], c.weights[2]}};
-  };
-  const auto endsOf = [](const Segment& edge, double weight) {
-    return Part<2>{edge, {1.0 - weight, weight}};
-  };
-  apply(contents.vertexTriangle, [&](const VertexTriangleContact& c) {
-    return change(c, vertexOf(c), cornersOf(c), c.normal);
-  });
-  apply(contents.triangleVertex, [&](const VertexTriangleContact& c) {
-    return change(c, cornersOf(c), vertexOf(c), -c.normal);
-  });
-  apply(contents.edgeEdge, [&](const EdgeEdgeContact& c) {
-    return change(c, endsOf(c.edgeA, c.weightA), endsOf(c.edgeB, c.weightB), c.normal);
   });
 }
 
@@ -717,24 +700,21 @@ void SideMemory::apply(const MeshPair& pair, Contents& contents) const {
       return (i < m_here.size() || isLater) && contains(pair, course, features);
     });
   };
-  const auto replace = [&](ContactKind kind, auto& contacts, auto&& cornersOf) {
+  forEachMeshList(contents, [&](ContactKind kind, auto& contacts) {
     std::erase_if(contacts, [&](const auto& contact) {
-      return isReplaced({featuresOf(kind, contact), cornersOf(contact)}, contact.timeOfImpact);
+      return isReplaced({{kind, keyOf(kind, contact).ids}, cornersOf(contact)},
+                        contact.timeOfImpact);
     });
-  };
-  const auto ofTriangle = [](const VertexTriangleContact& contact) { return contact.vertices; };
-  const auto ofEdges = [](const EdgeEdgeContact&) { return Triangle{}; };
-  replace(ContactKind::VertexTriangle, contents.vertexTriangle, ofTriangle);
-  replace(ContactKind::TriangleVertex, contents.triangleVertex, ofTriangle);
-  replace(ContactKind::EdgeEdge, contents.edgeEdge, ofEdges);
+  });
   if (!pair.self()) turnPassed(pair, contents);
   for (const Side& side : m_here)
-    if (isEdges(side.passage))
-      insert(contents.edgeEdge, side.passage.kind, contactOfEdges(pair, side));
-    else
-      insert(side.passage.kind == ContactKind::VertexTriangle ? contents.vertexTriangle
-                                                              : contents.triangleVertex,
-             side.passage.kind, contactOfVertex(pair, side));
+    forEachMeshList(contents, [&](auto kind, auto& contacts) {
+      if (side.passage.kind != kind) return;
+      if constexpr (kind == ContactKind::EdgeEdge)
+        insert(contacts, kind, contactOfEdges(pair, side));
+      else
+        insert(contacts, kind, contactOfVertex(pair, side));
+    });
 }
 
 std::vector<Crossing> SideMemory::list(const MeshPair& pair, std::uint64_t step) const {

@@ -2,8 +2,9 @@
 
 #include <palpate/Tracking.h>
 
-#include "NarrowPhase/CollisionContents.h"
+#include "Contact/Contents.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/MemoryBudget.h"
 
@@ -59,10 +60,16 @@ class SideMemory : public CountedObject {
 
  private:
   /// The vertices of one mesh that hold a closest point, with their weights.
-  template <std::size_t N>
   struct Part {
-    std::array<std::uint32_t, N> vertices;
-    std::array<double, N> weights;
+    std::array<std::uint32_t, 3> vertices{};
+    std::array<double, 3> weights{};
+    std::size_t size = 0;
+
+    void add(std::uint32_t vertex, double weight) {
+      PALPATE_ASSERT(size < 3);
+      vertices[size] = vertex, weights[size++] = weight;
+    }
+    std::span<const std::uint32_t> ids() const { return std::span(vertices).first(size); }
   };
   struct PartSide {
     std::optional<bool> forward;
@@ -96,8 +103,7 @@ class SideMemory : public CountedObject {
   template <class F>
   bool anyCourse(const Crossing& features, F&&) const;
   std::optional<bool> sideOf(ContactKind, std::uint32_t vertex) const;
-  template <std::size_t N>
-  PartSide sideOf(ContactKind, const Part<N>&) const;
+  PartSide sideOf(ContactKind, const Part&) const;
   void turnPassed(const MeshPair&, Contents&) const;
   bool contains(const MeshPair&, const Course&, const Side&, bool* isSame = nullptr) const;
   bool hasPassedEnd(const Crossing&) const;

@@ -1,5 +1,6 @@
 #include "Tracking/SmoothNormals.h"
 
+#include "Contact/ContactLists.h"
 #include "Mesh/FaceAtCorner.h"
 #include "Mesh/FaceBlock.h"
 #include "Math/StableLength.h"
@@ -134,35 +135,35 @@ Vector3d interpolatedNormal(const TriangleMesh& mesh, std::span<const std::uint3
 void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& threads,
                        CollisionData::Contents& contents) {
   constexpr std::size_t kGrain = 256;  // contacts; any number will do
-  CollisionData::Contents::Smooth& all = contents.smooth;
-  all.vertexTriangle.resize(contents.vertexTriangle.size());
-  all.triangleVertex.resize(contents.triangleVertex.size());
-  all.edgeEdge.resize(contents.edgeEdge.size());
-  all.shape.resize(contents.shape.size());
+  std::size_t size = 0;
+  forEachContactList(contents, [&](ContactKind kind, const auto& list) {
+    if (kind == ContactKind::ShapeShape) return;
+    contents.columnsOf(kind).smooth.resize(list.size());
+    size += list.size();
+  });
   const bool meshIsB = !pair.a.topology.hasFaces();
-  const std::size_t size = all.vertexTriangle.size() + all.triangleVertex.size() +
-                           all.edgeEdge.size() + all.shape.size();
   threads.forChunks(size, kGrain, [&](std::size_t, std::size_t begin, std::size_t end) {
     ContactNormals known(pair);
-    std::size_t first = 0;  // of the list, among all contacts
-    const auto fill = [&](const auto& contacts, CountedVector<Vector3d>& normals, auto&& smooth) {
-      for (std::size_t i = std::max(begin, first); i < std::min(end, first + contacts.size());
-           ++i) {
-        const auto& contact = contacts[i - first];
-        Vector3d& normal = normals[i - first];
-        normal = onSideOf(contact.normal, smooth(contact));
-        PALPATE_ASSERT(std::abs(normal.norm() - 1.0) < 1e-9);
-      }
-      first += contacts.size();
+    const auto smooth = [&](auto kind, const auto& contact) -> Vector3d {
+      if constexpr (kind == ContactKind::EdgeEdge)
+        return known.ofEdges(contact);
+      else if constexpr (kind == ContactKind::Shape)
+        return smoothsShape ? known.ofElement(meshIsB, contact) : contact.normal;
+      else
+        return known.ofElement(kind == ContactKind::VertexTriangle, contact);
     };
-    fill(contents.vertexTriangle, all.vertexTriangle,
-         [&](const auto& contact) { return known.ofElement(true, contact); });
-    fill(contents.triangleVertex, all.triangleVertex,
-         [&](const auto& contact) { return known.ofElement(false, contact); });
-    fill(contents.edgeEdge, all.edgeEdge,
-         [&](const auto& contact) { return known.ofEdges(contact); });
-    fill(contents.shape, all.shape, [&](const ShapeContact& contact) -> Vector3d {
-      return smoothsShape ? known.ofElement(meshIsB, contact) : contact.normal;
+    std::size_t first = 0;  // of the list, among all contacts
+    forEachContactList(contents, [&](auto kind, const auto& list) {
+      if constexpr (kind != ContactKind::ShapeShape) {
+        const std::size_t last = std::min(end, first + list.size());
+        for (std::size_t i = std::max(begin, first); i < last; ++i) {
+          const auto& contact = list[i - first];
+          Vector3d& normal = contents.columnsOf(kind).smooth[i - first];
+          normal = onSideOf(contact.normal, smooth(kind, contact));
+          PALPATE_ASSERT(std::abs(normal.norm() - 1.0) < 1e-9);
+        }
+        first += list.size();
+      }
     });
   });
 }

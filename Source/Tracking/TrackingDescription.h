@@ -32,13 +32,12 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
   std::vector<Entry> entries;
   if constexpr (!File::kReads)
     if (m_step != kNoStep)
-      forEachTracked(
-          [&](ContactKind, const auto& contacts, const auto& tracked) {
-            for (std::size_t i = 0; i < tracked.size(); ++i)
-              entries.push_back({tracked[i].key, cornersOf(contacts[i]),
-                                 tracked[i].age - (m_hasGrown ? 1 : 0), tracked[i].userData});
-          },
-          before(kept));
+      forEachContactList(before(kept), [&](ContactKind kind, const auto& contacts) {
+        const auto& tracked = before(kept).columnsOf(kind).tracked;
+        for (std::size_t i = 0; i < tracked.size(); ++i)
+          entries.push_back({tracked[i].key, cornersOf(contacts[i]),
+                             tracked[i].age - (m_hasGrown ? 1 : 0), tracked[i].userData});
+      });
   itemsOf(file, entries, 1 + sizeof(ContactKey::ids) + sizeof(Triangle) + 12, [&](Entry& entry) {
     description::contactKeyOf(file, entry.key);
     fieldOf(file, entry.corners);
@@ -58,20 +57,18 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
     m_held = {};
     m_isHeld = true;
     m_hasGrown = false;
-    forEachTracked(
-        [&](ContactKind kind, auto& contacts, auto& tracked) {
-          for (const Entry& entry : entries) {
-            if (entry.key.kind != kind) continue;
-            tracked.push_back({entry.key, {}, entry.age, entry.userData, ContactEnd::None});
-            auto& contact = contacts.emplace_back();
-            if constexpr (requires { contact.vertices; }) contact.vertices = entry.corners;
-          }
-        },
-        m_held);
+    forEachContactList(m_held, [&](ContactKind kind, auto& contacts) {
+      for (const Entry& entry : entries) {
+        if (entry.key.kind != kind) continue;
+        m_held.columnsOf(kind).tracked.push_back(
+            {entry.key, {}, entry.age, entry.userData, ContactEnd::None});
+        auto& contact = contacts.emplace_back();
+        if constexpr (requires { contact.vertices; }) contact.vertices = entry.corners;
+      }
+    });
     // These lists are those of the last answer.
-    const auto& t = kept.tracked;
-    const std::size_t size = t.vertexTriangle.size() + t.triangleVertex.size() + t.edgeEdge.size() +
-                             t.shape.size() + t.shapeShape.size();
+    std::size_t size = 0;
+    for (const Contents::Columns& each : kept.columns) size += each.tracked.size();
     file.need(!m_keeps || entries.size() == size, "a number of tracked contacts is wrong");
     file.need(!m_isDropped || !isCurrent || entries.size() == size,
               "tracked contacts are not those of the answer");

@@ -1,6 +1,7 @@
 #include "Validity/IntersectionAtEnd.h"
 
 #include "NarrowPhase/Continuous.h"
+#include "Contact/ContactLists.h"
 #include "Math/MotionBound.h"
 #include "Core/Assert.h"
 #include "Core/Stopping.h"
@@ -36,8 +37,7 @@ IntersectionAtEnd checkEnd(const MeshPair& pair, const CollisionData::Contents& 
   const MeshTopology &ofA = pair.a.topology, &ofB = pair.b.topology;
   const double rounding = pair.step.motionWithRounding - pair.step.motion;
   PALPATE_ASSERT(!(rounding < 0.0));
-  std::size_t checksLeft = kFreeChecks;
-  forEachTimed(contacts, [&](const auto& list) { checksLeft += list.size(); });
+  std::size_t checksLeft = kFreeChecks + contactCount(contacts);
   Buffer<ElementPair>& batch = counts.part;
   batch.clear();
   IntersectionAtEnd end;

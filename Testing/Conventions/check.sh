@@ -29,19 +29,21 @@ allowedIn() {
     Math) echo "Math/ Exact/ Core/" ;;
     Mesh) echo "Mesh/ Math/ Exact/ Core/" ;;
     Shapes) echo "Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Contact) echo "Contact/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Octree) echo "Octree/ Math/Box Core/" ;;
     Bodies) echo "Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
-    NarrowPhase) echo "NarrowPhase/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
-    Queries) echo "Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    NarrowPhase) echo "NarrowPhase/ Contact/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
+    Queries) echo "Queries/ Bodies/ NarrowPhase/ Contact/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     DistanceField) echo "DistanceField/ Queries/ Bodies/ Octree/ Shapes/ Mesh/ Math/ Exact/ Core/" ;;
     Simplify) echo "Simplify/ Queries/ Bodies/ Octree/ Mesh/ Math/ Exact/ Core/" ;;
-    Validity) echo "Validity/ NarrowPhase/ Mesh/ Math/ Core/" ;;
-    Tracking) echo "Tracking/ NarrowPhase/ Mesh/ Math/ Exact/ Core/" ;;
-    Search) echo "Search/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
-    CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
+    Validity) echo "Validity/ NarrowPhase/ Contact/ Mesh/ Math/ Core/" ;;
+    Tracking) echo "Tracking/ NarrowPhase/ Contact/ Mesh/ Math/ Exact/ Core/" ;;
+    Search) echo "Search/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Contact/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
+    CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Contact/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Contact/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
-    C | Python) echo "$1/ Fields/" ;;
+    C) echo "C/ Fields/" ;;
+    Python) echo "Python/ Fields/ Contact/ContactLists.h" ;;
     Vtk | Fcl | iMSTK) echo "$1/" ;;
   esac
 }

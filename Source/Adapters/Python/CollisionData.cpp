@@ -1,8 +1,10 @@
 #include "Python/Classes.h"
 #include "Python/Collisions.h"
 #include "Python/Records.h"
+#include "Contact/ContactLists.h"
 
 #include <algorithm>
+#include <array>
 
 namespace palpate::python {
 namespace {
@@ -51,30 +53,27 @@ void addNormals(DataClass& data, const char* name,
 
 py::object stencils(const CollisionData& data, const py::object& firstA, const py::object& firstB) {
   const std::uint32_t a = elementIndex(firstA, "first_a"), b = elementIndex(firstB, "first_b");
-  const std::size_t count =
-      data.vertexTriangle().size() + data.triangleVertex().size() + data.edgeEdge().size();
+  const CollisionData::Parts parts = data.parts();
+  std::size_t count = 0;
+  forEachMeshList(parts, [&](ContactKind, const auto& list) { count += list.size(); });
   auto ids = newArray<std::uint32_t>(count, 4);
   auto weights = newArray<double>(count, 4), normals = newArray<double>(count, 3),
        distances = newArray<double>(count);
   std::uint32_t* id = ids.mutable_data();
   double *weight = weights.mutable_data(), *normal = normals.mutable_data(),
          *distance = distances.mutable_data();
-  // ofFirst: how many of the four vertices are of the first side, whose numbers begin at `first`.
-  const auto append = [&](const auto& contacts, int ofFirst, std::uint32_t first,
-                          std::uint32_t other) {
+  const auto append = [&](ContactKind kind, const auto& contacts) {
     for (const auto& contact : contacts) {
       const Stencil s = stencil(contact);
-      for (int i = 0; i < 4; ++i) {
-        *id++ = s.vertices[static_cast<std::size_t>(i)] + (i < ofFirst ? first : other);
-        *weight++ = s.weights[static_cast<std::size_t>(i)];
+      for (std::size_t i = 0; i < 4; ++i) {
+        *id++ = s.vertices[i] + (sidesOf(kind)[i] == 0 ? a : b);
+        *weight++ = s.weights[i];
       }
       for (int axis = 0; axis < 3; ++axis) *normal++ = contact.normal[axis];
       *distance++ = contact.distance;
     }
   };
-  append(data.vertexTriangle(), 1, a, b);
-  append(data.triangleVertex(), 1, b, a);
-  append(data.edgeEdge(), 2, a, b);
+  forEachMeshList(parts, append);
   return lookedUp<Stencil>("palpate", "Stencils")(ids, weights, normals, distances);
 }
 
@@ -171,10 +170,14 @@ py::array motions(const CollisionData& data, const py::object& a, const py::obje
 
 py::tuple state(const CollisionData& data) {
   const CollisionData::Parts parts = data.parts();
-  return py::make_tuple(recordsOf(data.vertexTriangle()), recordsOf(data.triangleVertex()),
-                        recordsOf(data.edgeEdge()), recordsOf(data.intersectingTriangles()),
-                        recordsOf(data.shape()), recordsOf(data.shapeShape()),
-                        parts.earliestTimeOfImpact, parts.errorBound, parts.validity);
+  py::list items;
+  const auto append = [&](ContactKind, const auto& list) { items.append(recordsOf(list)); };
+  forEachMeshList(parts, append);
+  items.append(recordsOf(parts.intersectingTriangles));
+  forEachShapeList(parts, append);
+  items.append(parts.earliestTimeOfImpact), items.append(parts.errorBound);
+  items.append(parts.validity);
+  return py::tuple(items);
 }
 
 std::shared_ptr<CollisionData> ofState(const py::tuple& state) {
@@ -190,12 +193,13 @@ std::shared_ptr<CollisionData> ofState(const py::tuple& state) {
 }
 
 bool equal(const CollisionData& a, const CollisionData& b) {
-  const auto sameList = [&](auto list) { return std::ranges::equal((a.*list)(), (b.*list)()); };
-  return sameList(&CollisionData::vertexTriangle) && sameList(&CollisionData::triangleVertex) &&
-         sameList(&CollisionData::edgeEdge) && sameList(&CollisionData::intersectingTriangles) &&
-         sameList(&CollisionData::shape) && sameList(&CollisionData::shapeShape) &&
-         a.earliestTimeOfImpact() == b.earliestTimeOfImpact() && a.errorBound() == b.errorBound() &&
-         a.validity() == b.validity();
+  const CollisionData::Parts ofA = a.parts(), ofB = b.parts();
+  bool areEqual = std::ranges::equal(ofA.intersectingTriangles, ofB.intersectingTriangles);
+  forEachContactList(ofA, [&](auto kind, const auto& list) {
+    areEqual = areEqual && std::ranges::equal(list, contactList<kind()>(ofB));
+  });
+  return areEqual && a.earliestTimeOfImpact() == b.earliestTimeOfImpact() &&
+         a.errorBound() == b.errorBound() && a.validity() == b.validity();
 }
 
 std::string describeData(const CollisionData& data) {
@@ -203,12 +207,15 @@ std::string describeData(const CollisionData& data) {
   const auto add = [&](std::size_t count, const char* name) {
     if (count > 0) text += " " + std::to_string(count) + " " + name + ",";
   };
-  add(data.vertexTriangle().size(), "vertex-triangle");
-  add(data.triangleVertex().size(), "triangle-vertex");
-  add(data.edgeEdge().size(), "edge-edge");
-  add(data.intersectingTriangles().size(), "intersecting triangles");
-  add(data.shape().size(), "shape");
-  add(data.shapeShape().size(), "shape-shape");
+  constexpr std::array kNames{"vertex-triangle", "triangle-vertex", "edge-edge", "shape",
+                              "shape-shape"};
+  const auto addList = [&](ContactKind kind, const auto& list) {
+    add(list.size(), kNames[static_cast<std::size_t>(kind)]);
+  };
+  const CollisionData::Parts parts = data.parts();
+  forEachMeshList(parts, addList);
+  add(parts.intersectingTriangles.size(), "intersecting triangles");
+  forEachShapeList(parts, addList);
   if (text.back() == ':') text += " no contacts,";
   return text + " by " + toString(data.validity().method) +
          (data.validity().trusted ? ", trusted>" : ", not trusted>");

@@ -2,6 +2,8 @@
 
 #include <palpate/CollisionData.h>
 
+#include "Contact/ContactLists.h"
+#include "Core/Buffer.h"
 #include "Core/CountedVector.h"
 #include "Core/MemoryBudget.h"
 
@@ -25,20 +27,37 @@ struct CollisionData::Contents : CountedObject {
   double earliestTimeOfImpact = std::numeric_limits<double>::infinity();
   double errorBound = 0.0;
   Validity validity;
-  struct Tracked {  ///< PairSettings::trackContacts: parallel to the lists
-    CountedVector<TrackedContact> vertexTriangle, triangleVertex, edgeEdge, shape, shapeShape;
-    CountedVector<TrackedContact> ended;
-    bool elementsOfSecond = false;  ///< shape() has elements of the pair's second geometry
-  } tracked{};
-  CountedVector<Crossing> crossings{};
-  std::array<CountedVector<ContactTags>, 5> tags{};  ///< by ContactKind, parallel to the lists
-
-  CountedVector<ContactTags>& tagsOf(ContactKind kind) {
-    return tags[static_cast<std::size_t>(kind)];
+  /// What is known about each contact of a list. A column is empty, or parallel to the list.
+  struct Columns {
+    CountedVector<TrackedContact> tracked{};  ///< PairSettings::trackContacts
+    CountedVector<ContactTags> tags{};        ///< OctreeBasedCD::setTags()
+    CountedVector<Eigen::Vector3d> smooth{};  ///< PairSettings::smoothNormals; none of two shapes
+  };
+  std::array<Columns, 5> columns{};  ///< by ContactKind
+  Columns& columnsOf(ContactKind kind) { return columns[static_cast<std::size_t>(kind)]; }
+  const Columns& columnsOf(ContactKind kind) const {
+    return columns[static_cast<std::size_t>(kind)];
   }
-  struct Smooth {  ///< PairSettings::smoothNormals: parallel to the lists
-    CountedVector<Eigen::Vector3d> vertexTriangle, triangleVertex, edgeEdge, shape;
-  } smooth{};
+  /// Gives back memory beyond the sizes of the lists and columns.
+  void releaseSpare() {
+    forEachContactList(*this, [](ContactKind, auto& list) { palpate::releaseSpare(list); });
+    for (auto& [tracked, tags, smooth] : columns) {
+      palpate::releaseSpare(tracked);
+      palpate::releaseSpare(tags);
+      palpate::releaseSpare(smooth);
+    }
+    for (auto* list : {&crossings, &rememberedSides}) palpate::releaseSpare(*list);
+    palpate::releaseSpare(intersectingTriangles);
+    palpate::releaseSpare(ended);
+  }
+  /// Empties a column of all lists, and gives its memory back.
+  template <class T>
+  void drop(CountedVector<T> Columns::*column) {
+    for (Columns& each : columns) CountedVector<T>().swap(each.*column);
+  }
+  CountedVector<TrackedContact> ended{};
+  bool trackedOfSecond = false;  ///< tracked contacts with shapes are of the second geometry
+  CountedVector<Crossing> crossings{};
   CountedVector<Crossing> rememberedSides{};
   /// What CollisionData::appendRows() needs beside the contacts.
   struct Step {
@@ -63,6 +82,8 @@ struct CollisionData::Contents : CountedObject {
   /// Null if `data` has none.
   static const Contents* in(const CollisionData& data) { return data.m_contents.get(); }
   static bool isIn(const CollisionData& data) { return data.m_contents != nullptr; }
+  /// Without contacts if `data` has none.
+  static const Contents& read(const CollisionData& data) { return data.read(); }
   /// Makes them if `data` has none.
   static Contents& of(CollisionData& data) {
     if (!data.m_contents) data.m_contents = std::make_unique<Contents>();
