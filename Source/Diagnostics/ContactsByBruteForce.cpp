@@ -3,7 +3,7 @@
 #include "Search/ShapeWork.h"
 #include "DistanceField/FieldContacts.h"
 #include "NarrowPhase/Continuous.h"
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/Piercing.h"

@@ -1,7 +1,7 @@
 #include "NarrowPhase/Continuous.h"
 
 #include "NarrowPhase/ElementBoxes.h"
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/PassageFinder.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"

@@ -2,6 +2,7 @@
 
 #include <palpate/Types.h>
 
+#include "Contact/ContactBuffers.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/TriangleMesh.h"
 #include "Core/Buffer.h"
@@ -22,20 +23,6 @@ struct FloatPair {
   const FloatPoint *beforeA = nullptr, *beforeB = nullptr;
   std::array<float, 4> shiftLower{}, shiftUpper{};
   float upTo = 1.0f;  ///< fraction of the step: boxes sweep [0, upTo]
-};
-
-/// Two features by their indices: a vertex and a triangle, or two edges of MeshTopology::edges.
-struct FeaturePair {
-  std::uint32_t a, b;
-};
-
-/// Feature pairs of one batch of triangle pairs. Each batch overwrites those of the last.
-struct FeaturePairs {
-  Buffer<FeaturePair> vertexTriangle;  ///< vertices of the first mesh, triangles of the second
-  Buffer<FeaturePair>
-      triangleVertex;  ///< triangles of the first, vertices of the second; none for self-collision
-  Buffer<FeaturePair> edgeEdge;  ///< self-collision: lower edge first
-  std::size_t owned = 0;         ///< number of pairs before their boxes were compared
 };
 
 /// Lists the feature pairs that the triangle pairs own and whose boxes overlap, each once. Without

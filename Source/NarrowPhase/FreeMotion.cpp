@@ -1,6 +1,6 @@
 #include "NarrowPhase/FreeMotion.h"
 
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/OwnedTests.h"
 #include "Math/ClosestPoint.h"
 #include "Math/FreeMotion.h"

@@ -1,7 +1,7 @@
 #include "NarrowPhase/Intersection.h"
 
 #include "NarrowPhase/FeatureTests.h"
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/IntersectionFilter.h"
 #include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/Proximity.h"

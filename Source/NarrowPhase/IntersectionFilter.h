@@ -2,6 +2,7 @@
 
 #include <palpate/Types.h>
 
+#include "Contact/ContactBuffers.h"
 #include "Mesh/Positions.h"
 #include "Math/TriangleIntersection.h"
 #include "Core/Buffer.h"
@@ -14,12 +15,6 @@ namespace palpate {
 struct PlacedTriangles {
   std::span<const Triangle> triangles;
   Positions positions;
-};
-
-struct PossibleIntersection {
-  ElementPair triangles;
-  TriangleIntersection intersection;  ///< if known: which edges cross; no features touch
-  bool isKnown() const { return intersection.intersect(); }
 };
 
 /// Keeps the pairs that may intersect, in their order; all other pairs are proven not to. Where

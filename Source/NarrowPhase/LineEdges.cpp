@@ -1,6 +1,6 @@
 #include "NarrowPhase/LineEdges.h"
 
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/TouchNormal.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/ClosestPoint.h"

@@ -1,7 +1,7 @@
 #include "NarrowPhase/PassageFinder.h"
 
 #include "NarrowPhase/Continuous.h"
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/Surroundings.h"
 #include "Math/PassageFilter.h"
 

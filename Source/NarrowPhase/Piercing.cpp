@@ -1,7 +1,7 @@
 #include "NarrowPhase/Piercing.h"
 
 #include "NarrowPhase/FeatureStar.h"
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/Intersection.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"

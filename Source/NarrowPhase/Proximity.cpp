@@ -1,6 +1,6 @@
 #include "NarrowPhase/Proximity.h"
 
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/OwnedTests.h"
 #include "NarrowPhase/SharedVertex.h"

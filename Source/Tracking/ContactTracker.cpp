@@ -1,6 +1,6 @@
 #include "Tracking/ContactTracker.h"
 
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "Core/Assert.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "Tracking/SideMemory.h"
 
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 #include "NarrowPhase/Proximity.h"
 #include "Tracking/SmoothNormals.h"
 #include "Contact/ContactLists.h"

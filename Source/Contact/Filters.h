@@ -1,7 +1,7 @@
 #pragma once
 
-#include "NarrowPhase/NarrowPhase.h"
-#include "NarrowPhase/Proximity.h"
+#include "Contact/MeshFeature.h"
+#include "Contact/MeshPair.h"
 #include "Core/Assert.h"
 
 #include <cstdint>

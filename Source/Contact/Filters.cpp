@@ -1,4 +1,4 @@
-#include "NarrowPhase/Filters.h"
+#include "Contact/Filters.h"
 
 #include "Math/ClosestPoint.h"
 #include "Core/Assert.h"

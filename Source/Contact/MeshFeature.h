@@ -1,0 +1,109 @@
+#pragma once
+
+#include <palpate/CollisionData.h>
+#include <palpate/FeaturePairs.h>
+
+#include "Mesh/TriangleMesh.h"
+#include "Math/ImpactQuery.h"
+
+#include <array>
+#include <compare>
+#include <cstdint>
+
+namespace palpate {
+
+/// A feature of a mesh that holds a closest point, by the mesh's own ids.
+struct MeshFeature {
+  enum class Kind : std::uint8_t { Vertex, Edge, Face } kind;
+  std::uint32_t id;
+  auto operator<=>(const MeshFeature&) const = default;
+};
+
+/// The two meshes of feature pairs of one kind: vertices of `first` with triangles of `second`, or
+/// edges of `first` with edges of `second`. firstId, secondId: the features' ids in these meshes.
+template <ImpactQuery::Kind kind>
+struct Features {
+  const TriangleMesh& first;
+  const TriangleMesh& second;
+
+  std::array<std::uint32_t, 4> vertices(std::uint32_t firstId, std::uint32_t secondId) const {
+    if constexpr (kind == ImpactQuery::Kind::VertexTriangle) {
+      const auto& [a, b, c] = second.topology.elements[secondId];
+      return {firstId, a, b, c};
+    } else {
+      const Segment &p = first.topology.edges[firstId], &q = second.topology.edges[secondId];
+      return {p[0], p[1], q[0], q[1]};
+    }
+  }
+  const TriangleMesh& meshOf(int vertex) const {
+    return vertex < (kind == ImpactQuery::Kind::VertexTriangle ? 1 : 2) ? first : second;
+  }
+  ImpactQuery query(std::uint32_t firstId, std::uint32_t secondId) const {
+    return query(vertices(firstId, secondId));
+  }
+  ImpactQuery query(const std::array<std::uint32_t, 4>& ids) const {
+    ImpactQuery result{kind, {}};
+    for (int i = 0; i < 4; ++i)
+      result.vertices[i] = {meshOf(i).before[ids[i]], meshOf(i).now[ids[i]]};
+    return result;
+  }
+};
+
+inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangle,
+                             TriangleFeature feature) {
+  const int i = static_cast<int>(feature);
+  if (i < 3) return {MeshFeature::Kind::Vertex, topology.elements[triangle][i]};
+  if (i < 6) return {MeshFeature::Kind::Edge, topology.triangleEdges[triangle][i - 3]};
+  return {MeshFeature::Kind::Face, triangle};
+}
+
+inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge,
+                             EdgeFeature feature) {
+  if (feature == EdgeFeature::Interior) return {MeshFeature::Kind::Edge, edge};
+  return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
+}
+
+inline bool containsVertex(const Triangle& triangle, std::uint32_t vertex) {
+  return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;
+}
+
+/// The feature that the corners with weights other than 0 span. In a segment {p, q, q} or a point
+/// {p, p, p} a feature has several names; returns the first.
+inline TriangleFeature spannedFeature(const Triangle& corners, const Eigen::Vector3d& weights) {
+  bool a = weights[0] != 0.0, b = weights[1] != 0.0, c = weights[2] != 0.0;
+  if (corners[1] == corners[2]) b = b || c, c = false;
+  if (corners[0] == corners[1]) a = a || b, b = false;
+  if (a && b && c) return TriangleFeature::Face;
+  if (a && b) return TriangleFeature::EdgeAB;
+  if (b && c) return TriangleFeature::EdgeBC;
+  if (a && c) return TriangleFeature::EdgeCA;
+  return a ? TriangleFeature::CornerA : b ? TriangleFeature::CornerB : TriangleFeature::CornerC;
+}
+
+inline EdgeFeature spannedFeature(double weight) {
+  if (weight == 0.0) return EdgeFeature::Start;
+  return weight == 1.0 ? EdgeFeature::End : EdgeFeature::Interior;
+}
+
+/// The contact of two features whose distance was measured at `time`: the step's end or an impact.
+inline VertexTriangleContact contactOf(std::uint32_t vertex, std::uint32_t triangle,
+                                       const Triangle& corners,
+                                       const VertexTriangleDistance& answer, double time = 1.0) {
+  return {vertex,        triangle,        corners, answer.weights,
+          answer.normal, answer.distance, time,    spannedFeature(corners, answer.weights)};
+}
+
+inline EdgeEdgeContact contactOf(const Segment& a, const Segment& b, const EdgeEdgeDistance& answer,
+                                 double time = 1.0) {
+  return {a,
+          b,
+          answer.weightA,
+          answer.weightB,
+          answer.normal,
+          answer.distance,
+          time,
+          spannedFeature(answer.weightA),
+          spannedFeature(answer.weightB)};
+}
+
+}  // namespace palpate
