@@ -6,7 +6,7 @@
 #include "Search/PairResults.h"
 #include "Diagnostics/DistinctImpacts.h"
 #include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/Order.h"
+#include "Contact/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Contact/ContactLists.h"
 #include "Shapes/DistinctContacts.h"

@@ -6,7 +6,7 @@
 #include "Queries/QuerySource.h"
 #include "Contact/ContactLists.h"
 #include "NarrowPhase/NarrowPhase.h"
-#include "NarrowPhase/Order.h"
+#include "Contact/Order.h"
 #include "Bodies/Body.h"
 #include "Bodies/InputChecks.h"
 #include "Bodies/OctreeFrame.h"

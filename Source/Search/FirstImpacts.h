@@ -4,7 +4,7 @@
 
 #include "Search/ExcludedImpacts.h"
 #include "Contact/Contents.h"
-#include "NarrowPhase/Order.h"
+#include "Contact/Order.h"
 #include "Math/NormalCone.h"
 #include "Core/Buffer.h"
 

@@ -8,7 +8,7 @@
 #include "Search/JobScratch.h"
 #include "Search/Question.h"
 #include "NarrowPhase/NarrowPhase.h"
-#include "NarrowPhase/Order.h"
+#include "Contact/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Shapes/DistinctContacts.h"
 #include "Core/Buffer.h"
