@@ -2,6 +2,7 @@
 
 #include "Contact/ContactLists.h"
 #include "Contact/Contents.h"
+#include "Contact/MeshFeature.h"
 #include "Math/ImpactQuery.h"
 #include "Math/Nearing.h"
 #include "Core/Assert.h"
@@ -31,19 +32,6 @@ Placed(const Contact&, const Geometry&, const Geometry&) -> Placed<Contact>;
 
 ImpactQuery::Step stepOf(const Geometry& geometry, std::uint32_t v) {
   return {geometry.body.mesh.before[v], geometry.body.mesh.now[v]};
-}
-ImpactQuery queryOf(const Placed<VertexTriangleContact>& placed) {
-  const auto& [contact, vertices, triangles] = placed;
-  const auto& [a, b, c] = contact.vertices;
-  return {ImpactQuery::Kind::VertexTriangle,
-          {{stepOf(vertices, contact.vertex), stepOf(triangles, a), stepOf(triangles, b),
-            stepOf(triangles, c)}}};
-}
-ImpactQuery queryOf(const Placed<EdgeEdgeContact>& placed) {
-  const auto& [contact, first, second] = placed;
-  return {ImpactQuery::Kind::EdgeEdge,
-          {{stepOf(first, contact.edgeA[0]), stepOf(first, contact.edgeA[1]),
-            stepOf(second, contact.edgeB[0]), stepOf(second, contact.edgeB[1])}}};
 }
 
 /// How a point of a placed geometry moves in the step as it is now.
@@ -139,7 +127,8 @@ class TouchFinder {
   /// certainly part.
   template <class Contact>
   static bool partsAtStart(const Placed<Contact>& placed, GuardedTouch& touch) {
-    const ImpactQuery query = queryOf(placed);
+    const ImpactQuery query =
+        queryOf(placed.first.body.mesh, placed.second.body.mesh, placed.contact);
     ImpactQuery start = query;
     for (ImpactQuery::Step& step : start.vertices) step.now = step.before;
     touch.atStart = findTouch(start, kGuardTolerance).impact;

@@ -104,21 +104,20 @@ void checkIds(const ArchiveReader& file, const Contents& c, const PairStates& st
   const auto need = [&](std::uint32_t id, std::size_t count) {
     file.need(id < count, "a contact names a vertex or element that does not exist");
   };
-  const auto needVertices = [&](ContactKind kind, const Stencil& stencil) {
-    for (std::size_t i = 0; i < 4; ++i)
-      need(stencil.vertices[i], states[sidesOf(kind)[i]].vertexCount);
+  const auto needVertices = [&](ContactKind kind, const std::array<std::uint32_t, 4>& ids) {
+    for (std::size_t i = 0; i < 4; ++i) need(ids[i], states[sidesOf(kind)[i]].vertexCount);
   };
   std::size_t first = 0;
   auto row = c.step.endRows.begin();
   forEachMeshList(c, [&](auto kind, const auto& list) {
     for (const auto& contact : list) {
-      needVertices(kind, stencil(contact));
+      needVertices(kind, verticesOf(contact));
       if constexpr (kind != ContactKind::EdgeEdge)
         need(contact.triangle, states[sidesOf(kind)[1]].elementCount);
     }
     first += list.size();
     for (; row != c.step.endRows.end() && row->contact < first; ++row)
-      needVertices(kind, row->stencil);
+      needVertices(kind, row->stencil.vertices);
   });
   for (const auto& x : c.intersectingTriangles)
     need(x.a, a.elementCount), need(x.b, b.elementCount);

@@ -71,6 +71,14 @@ constexpr std::array<std::size_t, 4> sidesOf(ContactKind kind) {
   return {0, 0, 1, 1};
 }
 
+/// The vertices of stencil().
+inline std::array<std::uint32_t, 4> verticesOf(const VertexTriangleContact& c) {
+  return {c.vertex, c.vertices[0], c.vertices[1], c.vertices[2]};
+}
+inline std::array<std::uint32_t, 4> verticesOf(const EdgeEdgeContact& c) {
+  return {c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
+}
+
 /// Contacts of a list are sorted by their keys, and each key is there once.
 template <class Contact>
 ContactKey keyOf(ContactKind kind, const Contact& contact) {

@@ -69,7 +69,7 @@ struct CollisionData::Contents : CountedObject {
     /// Of a copy: the offset of each row, if the step was not over.
     bool hasOffsets = false;
     CountedVector<double> offsets{};
-    /// The row of an impact at the step's end (FirstImpacts).
+    /// The row of an impact at the step's end (EndRows).
     struct EndRow {
       std::uint32_t contact = 0;  ///< its number in vertexTriangle, triangleVertex and edgeEdge
       Stencil stencil{};          ///< its vertices are on the sides of those of the contact's

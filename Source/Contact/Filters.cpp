@@ -143,4 +143,20 @@ bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& featur
          (pair.b.outerSideOnly && Surface(pair.b, time).isBelow(features[1], direction));
 }
 
+std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
+                                        std::uint32_t edgeB, double* gap) {
+  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  if (pair.excludesEdges(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
+  const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
+                                                          pair.b.now[q[0]], pair.b.now[q[1]]);
+  if (gap) *gap = centres.distance - pair.largestRadii(p, q);
+  const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
+  const double distance = centres.distance - radii;
+  if (!(distance <= pair.settings.thickness) || rejectsEdges(pair, edgeA, edgeB)) return {};
+  return NearbyEdges{centres,
+                     distance,
+                     {featureOf(pair.a.topology, edgeA, centres.featureA),
+                      featureOf(pair.b.topology, edgeB, centres.featureB)}};
+}
+
 }  // namespace palpate

@@ -4,7 +4,9 @@
 #include "Contact/MeshPair.h"
 #include "Core/Assert.h"
 
+#include <array>
 #include <cstdint>
+#include <optional>
 
 namespace palpate {
 
@@ -60,5 +62,19 @@ inline bool pointInwardAtEnd(const MeshPair& pair, std::uint32_t edgeA, std::uin
                        featureOf(pair.b.topology, edgeB, measured.featureB)},
                       measured.normal, 1.0);
 }
+
+/// Two edges, at least one of a line mesh, whose distance less their radii is at most the
+/// thickness.
+struct NearbyEdges {
+  EdgeEdgeDistance centres;
+  double distance;                      ///< L, less the radii
+  std::array<MeshFeature, 2> features;  ///< vertices or edges that hold the closest points
+};
+
+/// Returns nothing if the edges are excluded, filtered or too far apart. Self-collision: pass the
+/// lower edge first. gap: if not null, receives the distance less the largest radii, L, of edges
+/// that are not excluded, filtered or not.
+std::optional<NearbyEdges> measureEdges(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB,
+                                        double* gap = nullptr);
 
 }  // namespace palpate

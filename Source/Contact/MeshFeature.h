@@ -3,12 +3,15 @@
 #include <palpate/CollisionData.h>
 #include <palpate/FeaturePairs.h>
 
+#include "Contact/ContactLists.h"
 #include "Mesh/TriangleMesh.h"
 #include "Math/ImpactQuery.h"
 
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <span>
+#include <type_traits>
 
 namespace palpate {
 
@@ -49,6 +52,15 @@ struct Features {
   }
 };
 
+/// The step of a contact's vertices. first: the mesh of the vertex, or of edge a.
+template <class Contact>
+ImpactQuery queryOf(const TriangleMesh& first, const TriangleMesh& second, const Contact& contact) {
+  constexpr auto kKind = std::is_same_v<Contact, EdgeEdgeContact>
+                             ? ImpactQuery::Kind::EdgeEdge
+                             : ImpactQuery::Kind::VertexTriangle;
+  return Features<kKind>{first, second}.query(verticesOf(contact));
+}
+
 inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t triangle,
                              TriangleFeature feature) {
   const int i = static_cast<int>(feature);
@@ -61,6 +73,14 @@ inline MeshFeature featureOf(const MeshTopology& topology, std::uint32_t edge,
                              EdgeFeature feature) {
   if (feature == EdgeFeature::Interior) return {MeshFeature::Kind::Edge, edge};
   return {MeshFeature::Kind::Vertex, topology.edges[edge][feature == EdgeFeature::End]};
+}
+
+/// The triangles that hold a vertex or an edge. None of a face.
+inline std::span<const std::uint32_t> holdersOf(const MeshTopology& topology,
+                                                const MeshFeature& feature) {
+  if (feature.kind == MeshFeature::Kind::Vertex) return topology.vertexTriangles[feature.id];
+  if (feature.kind == MeshFeature::Kind::Edge) return topology.edgeTriangles[feature.id];
+  return {};
 }
 
 inline bool containsVertex(const Triangle& triangle, std::uint32_t vertex) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -58,6 +59,7 @@ struct MeshPair {
     return thicknessAtEnd() + (a.largestRadius + b.largestRadius);
   }
   bool self() const { return &a == &b; }
+  const TriangleMesh& meshOf(std::size_t side) const { return side == 0 ? a : b; }
   /// L: the radius of a vertex plus that of the other element at its closest point. swapped: the
   /// vertex is of b.
   double radii(std::uint32_t vertex, const Triangle& corners, const Eigen::Vector3d& weights,

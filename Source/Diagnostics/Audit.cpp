@@ -9,7 +9,7 @@
 #include "Contact/Order.h"
 #include "NarrowPhase/Piercing.h"
 #include "Contact/ContactLists.h"
-#include "Shapes/DistinctContacts.h"
+#include "Contact/DistinctShapeContacts.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -257,7 +257,7 @@ void audit(const Question& question, bool sidesAreKnown, const CollisionData& da
   dropExcludedImpacts(meshes, expected);
   dropRepeatedImpacts(meshes, data, expected);
   if (needsAll) {
-    DistinctContacts distinct;
+    DistinctShapeContacts distinct;
     keepDistinct(question, distinct, expected.shape);
     std::erase_if(expected.shape,
                   [&](const ShapeContact& c) { return !coverage.covers(ContactKind::Shape, c); });

@@ -5,15 +5,17 @@
 #include "NarrowPhase/Continuous.h"
 #include "Contact/Filters.h"
 #include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/Piercing.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
 #include "NarrowPhase/TouchNormal.h"
+#include "Mesh/ExcludedDirections.h"
 #include "Math/ClosestPoint.h"
+#include "Math/NormalCone.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <vector>
@@ -205,11 +207,18 @@ std::vector<std::uint32_t> edgesOf(const MeshTopology& topology, const MeshFeatu
   return holders;
 }
 
-/// The condition for Contacts::Distinct that testLineEdges() describes. Measures every pair of
-/// edges that hold the two features, and determines the lowest at the end.
-bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
-                       const std::array<MeshFeature, 2>& features) {
-  if (!areReportedByEdges(pair, features)) return false;
+/// Vertices of lines are tested against whole triangles, and not against their edges.
+bool areOfEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
+  constexpr auto kVertex = MeshFeature::Kind::Vertex;
+  return (!pair.b.topology.hasFaces() || features[0].kind != kVertex) &&
+         (!pair.a.topology.hasFaces() || features[1].kind != kVertex);
+}
+
+/// Contacts::Distinct for edges of lines: whether no other pair of edges has the contact. Measures
+/// every pair of edges that hold the two features, and determines the lowest at the end.
+bool areLowestOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
+                      const std::array<MeshFeature, 2>& features) {
+  if (!areOfEdges(pair, features)) return false;
   std::array<std::uint32_t, 2> lowest = edges;
   for (const std::uint32_t a : edgesOf(pair.a.topology, features[0]))
     for (const std::uint32_t b : edgesOf(pair.b.topology, features[1])) {
@@ -229,6 +238,53 @@ bool isDistinctOfLines(const MeshPair& pair, const std::array<std::uint32_t, 2>&
   return lowest == edges;
 }
 
+/// Contacts::Distinct for an edge of a line and one of a triangle mesh: whether a triangle into
+/// which the direction to the line leads has a contact of the line's edge that is at least as near.
+/// Tests all triangles.
+bool excludesLine(const MeshPair& pair, const std::array<std::uint32_t, 2>& edges,
+                  const NearbyEdges& nearby) {
+  const bool swapped = pair.a.topology.hasFaces();
+  const TriangleMesh &line = pair.meshOf(swapped), &mesh = pair.meshOf(!swapped);
+  if (!mesh.topology.hasFaces()) return false;
+  const Segment& ofLine = line.topology.edges[edges[swapped]];
+  const MeshFeature& closest = nearby.features[!swapped];
+  const Segment ends = closest.kind == MeshFeature::Kind::Vertex ? Segment{closest.id, closest.id}
+                                                                 : mesh.topology.edges[closest.id];
+  const Vector3d up = swapped ? Vector3d(-nearby.centres.normal) : nearby.centres.normal;
+  const auto leadsTo = [&](std::uint32_t corner) {
+    if (corner == ends[0] || corner == ends[1]) return false;
+    const Vector3d p = mesh.now[ends[0]], q = mesh.now[ends[1]], r = mesh.now[corner];
+    return ends[0] == ends[1] ? leadsTowards(up, p, r) : leadsInto(up, p, q, r);
+  };
+  const auto hasOver = [&](std::uint32_t vertex, std::uint32_t triangle) {
+    const auto& [a, b, c] = mesh.topology.elements[triangle];
+    const VertexTriangleDistance over =
+        finiteVertexTriangleDistance(line.now[vertex], mesh.now[a], mesh.now[b], mesh.now[c]);
+    return over.feature == TriangleFeature::Face &&
+           over.distance - line.radius(vertex) <= nearby.distance &&
+           !rejectsVertex(pair, vertex, triangle, swapped) &&
+           !pointsInwardAtEnd(pair, vertex, {MeshFeature::Kind::Face, triangle}, over, swapped);
+  };
+  const auto hasNearer = [&](std::uint32_t side) {
+    if (side == kNoEdge) return false;
+    const auto other =
+        swapped ? measureEdges(pair, side, edges[1]) : measureEdges(pair, edges[0], side);
+    return other && other->distance < nearby.distance &&
+           (areOfEdges(pair, other->features) || !pair.hasFilters());
+  };
+  const double length = (line.now[ofLine[1]] - line.now[ofLine[0]]).norm();
+  for (std::uint32_t t = 0; t < mesh.topology.elements.size(); ++t) {
+    const Triangle& corners = mesh.topology.elements[t];
+    const auto& sides = mesh.topology.triangleEdges[t];
+    if (mesh.topology.isEnabled(t) && containsVertex(corners, ends[0]) &&
+        containsVertex(corners, ends[1]) && std::any_of(corners.begin(), corners.end(), leadsTo) &&
+        (hasOver(ofLine[0], t) || hasOver(ofLine[1], t) ||
+         std::any_of(sides.begin(), sides.end(), hasNearer)))
+      return !hasRidge(mesh, ends, up, length, pair.settings.thickness);
+  }
+  return false;
+}
+
 void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
                    ContactBuffers& out) {
   const CountedVector<Segment>&a = pair.a.topology.edges, &b = pair.b.topology.edges;
@@ -237,10 +293,12 @@ void findLineEdges(const MeshPair& pair, std::span<const std::uint32_t> sample,
     for (std::uint32_t j = 0; j < b.size(); ++j) {
       if (!areInOrder(pair, i, j) || pair.b.topology.edgeTriangles[j].empty()) continue;
       ++out.featurePairs;
-      const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &check);
+      double gap = std::numeric_limits<double>::infinity();
+      const std::optional<NearbyEdges> nearby = measureEdges(pair, i, j, &gap);
+      check.recordGap(i, j, gap);
       if (!nearby ||
-          (pair.reportsDistinct() && (!isDistinctOfLines(pair, {i, j}, nearby->features) ||
-                                      isExcludedByFaces(pair, i, j, *nearby))) ||
+          (pair.reportsDistinct() && (!areLowestOfLines(pair, {i, j}, nearby->features) ||
+                                      excludesLine(pair, {i, j}, *nearby))) ||
           pointInwardAtEnd(pair, i, j, nearby->centres))
         continue;
       out.exactDecisions += nearby->centres.exact;

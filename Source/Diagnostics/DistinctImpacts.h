@@ -6,7 +6,7 @@
 
 namespace palpate {
 
-// Contacts::Distinct for impacts, as an audit expects it of ExcludedImpacts and FirstImpacts.
+// Contacts::Distinct for impacts, as an audit expects it. Includes nothing of the rule in Contact.
 // Without effect on pairs that report no impacts.
 
 /// Drops excluded impacts for which others stand.

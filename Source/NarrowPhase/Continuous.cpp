@@ -266,6 +266,18 @@ template bool addImpact(const MeshPair&, const Features<Kind::VertexTriangle>&, 
 template bool addImpact(const MeshPair&, const Features<Kind::EdgeEdge>&, std::uint32_t,
                         std::uint32_t, bool, ContactBuffers&);
 
+bool addImpactOf(const MeshPair& pair, ContactKind kind, const VertexTriangleContact& c,
+                 ContactBuffers& out) {
+  const bool swapped = kind == ContactKind::TriangleVertex;
+  const Features<Kind::VertexTriangle> features{pair.meshOf(swapped), pair.meshOf(!swapped)};
+  return addImpact(pair, features, c.vertex, c.triangle, swapped, out);
+}
+bool addImpactOf(const MeshPair& pair, ContactKind, const EdgeEdgeContact& c, ContactBuffers& out) {
+  const Features<Kind::EdgeEdge> features{pair.a, pair.b};
+  return addImpact(pair, features, pair.a.topology.edgeOf(c.edgeA), pair.b.topology.edgeOf(c.edgeB),
+                   false, out);
+}
+
 void findFastImpacts(const MeshPair& pair, std::span<const ElementPair> candidates,
                      ContactBuffers& out) {
   FastImpactFinder finder(pair, out);

@@ -24,6 +24,10 @@ template <ImpactQuery::Kind kind>
 bool addImpact(const MeshPair&, const Features<kind>&, std::uint32_t firstId,
                std::uint32_t secondId, bool swapped, ContactBuffers& out);
 
+/// Calls addImpact() for the features of a contact of the step's end.
+bool addImpactOf(const MeshPair&, ContactKind, const VertexTriangleContact&, ContactBuffers& out);
+bool addImpactOf(const MeshPair&, ContactKind, const EdgeEdgeContact&, ContactBuffers& out);
+
 /// Method::Auto: appends the impacts of feature pairs for which proximity at the step's end does
 /// not suffice (StepCheck::proximitySuffices()).
 void findFastImpacts(const MeshPair&, std::span<const ElementPair> candidates, ContactBuffers& out);

@@ -1,7 +1,8 @@
 #include "NarrowPhase/Proximity.h"
 
+#include "Contact/DistinctLines.h"
+#include "Contact/DistinctVertices.h"
 #include "Contact/Filters.h"
-#include "NarrowPhase/LineEdges.h"
 #include "NarrowPhase/OwnedTests.h"
 #include "NarrowPhase/SharedVertex.h"
 #include "NarrowPhase/StepCheck.h"
@@ -11,6 +12,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -23,21 +25,15 @@ using Eigen::Vector3d;
 /// Tests vertices of one mesh against triangles of the other mesh, or of the same one.
 class VertexTriangleFinder {
  public:
-  /// Contacts of a vertex and a corner that this finder may report: all, only those whose vertex is
-  /// lower than the corner's vertex, or none.
-  enum class Corners { All, LowerVertexOnly, None };
-
-  VertexTriangleFinder(const MeshPair& pair, bool swapped, Corners corners, ContactBuffers& out)
+  VertexTriangleFinder(const MeshPair& pair, bool swapped, ContactBuffers& out)
       : m_pair(pair),
         m_features{swapped ? pair.b : pair.a, swapped ? pair.a : pair.b},
         m_swapped(swapped),
         m_vertices(m_features.first.now),
         m_positions(m_features.second.now),
         m_topology(m_features.second.topology),
-        m_self(pair.self()),
         m_thickness(pair.thicknessAtEnd()),
-        m_distinct(pair.reportsDistinct()),
-        m_corners(corners),
+        m_distinct(pair, swapped),
         m_check(pair, out),
         m_buffers(out),
         m_out(swapped && !pair.self() ? out.triangleVertex : out.vertexTriangle),
@@ -57,7 +53,7 @@ class VertexTriangleFinder {
     if (!(answer.distance - radii <= m_thickness)) return;
     if (rejectsVertex(m_pair, vertex, triangle, m_swapped)) return;
     const MeshFeature feature = featureOf(m_topology, triangle, answer.feature);
-    if (m_distinct && !isDistinct(vertex, triangle, feature)) return;
+    if (m_pair.reportsDistinct() && !m_distinct.reports(vertex, triangle, feature)) return;
     if (pointsInwardAtEnd(m_pair, vertex, feature, answer, m_swapped)) {
       if (m_pair.step.reportsImpacts)
         addImpact(m_pair, m_features, vertex, triangle, m_swapped, m_buffers);
@@ -71,74 +67,13 @@ class VertexTriangleFinder {
   }
 
  private:
-  /// Whether this triangle reports the contact. Of the other triangles that hold the feature, none
-  /// may be nearer, and none with a lower id may have its closest point on the feature.
-  bool isDistinct(std::uint32_t vertex, std::uint32_t triangle, const MeshFeature& feature) const {
-    if (feature.kind == MeshFeature::Kind::Face) return true;
-    const bool isVertex = feature.kind == MeshFeature::Kind::Vertex;
-    if (isVertex && m_corners == Corners::None) return false;
-    if (isVertex && m_corners == Corners::LowerVertexOnly && feature.id < vertex) return false;
-    const auto incidentTriangles =
-        isVertex ? m_topology.vertexTriangles[feature.id] : m_topology.edgeTriangles[feature.id];
-    const Vector3d p = m_vertices[vertex];
-    return std::none_of(
-        incidentTriangles.begin(), incidentTriangles.end(), [&](std::uint32_t other) {
-          if (other == triangle || (m_self && containsVertex(m_topology.elements[other], vertex)) ||
-              rejectsVertex(m_pair, vertex, other, m_swapped))
-            return false;
-          const bool isNearer = isVertex ? isNearerThanVertex(p, feature.id, other)
-                                         : isNearerThanEdge(p, feature.id, other);
-          return (isNearer || (other < triangle && closestFeatureOf(p, other) == feature)) &&
-                 isNearEnough(vertex, other);
-        });
-  }
-
-  /// Whether a vertex and a triangle are within the thickness. The triangle is at least as near as
-  /// one that is within the thickness, so only differing radii can make this false.
-  bool isNearEnough(std::uint32_t vertex, std::uint32_t triangle) const {
-    if (m_features.second.radii.empty()) return true;
-    const Triangle& corners = m_topology.elements[triangle];
-    const VertexTriangleDistance measured =
-        finiteVertexTriangleDistance(m_vertices[vertex], m_positions[corners[0]],
-                                     m_positions[corners[1]], m_positions[corners[2]]);
-    return measured.distance - m_pair.radii(vertex, corners, measured.weights, m_swapped) <=
-           m_thickness;
-  }
-
-  MeshFeature closestFeatureOf(const Vector3d& p, std::uint32_t triangle) const {
-    const auto& [a, b, c] = m_topology.elements[triangle];
-    return featureOf(m_topology, triangle,
-                     closestTriangleFeature(p, m_positions[a], m_positions[b], m_positions[c]));
-  }
-
-  /// Whether a triangle at a vertex comes nearer to p than the vertex.
-  bool isNearerThanVertex(const Vector3d& p, std::uint32_t vertex, std::uint32_t triangle) const {
-    const Triangle& corners = m_topology.elements[triangle];
-    return std::any_of(corners.begin(), corners.end(), [&](std::uint32_t other) {
-      return other != vertex && comesNearer(p, m_positions[vertex], m_positions[other]);
-    });
-  }
-
-  /// Whether a triangle at an edge comes nearer to p than the edge. The edge's point nearest to p
-  /// is inside the edge.
-  bool isNearerThanEdge(const Vector3d& p, std::uint32_t edge, std::uint32_t triangle) const {
-    const auto& sides = m_topology.triangleEdges[triangle];
-    const auto side = std::find(sides.begin(), sides.end(), edge) - sides.begin();
-    PALPATE_ASSERT(side < 3);
-    const Triangle& corners = m_topology.elements[triangle];
-    return liesInwards(p, m_positions[corners[side]], m_positions[corners[(side + 1) % 3]],
-                       m_positions[corners[(side + 2) % 3]]);
-  }
-
   const MeshPair& m_pair;
   const Features<ImpactQuery::Kind::VertexTriangle> m_features;
   const bool m_swapped;
   const Positions &m_vertices, &m_positions;
   const MeshTopology& m_topology;
-  bool m_self;
   double m_thickness;
-  bool m_distinct;
-  Corners m_corners;
+  DistinctVertices m_distinct;
   StepCheck m_check;
   ContactBuffers& m_buffers;
   Buffer<VertexTriangleContact>& m_out;
@@ -194,6 +129,25 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
   out.edgeEdge.push_back(contactOf(p, q, *answer));
 }
 
+/// Two edges, of which at least one is of a line mesh.
+void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
+                   ContactBuffers& out) {
+  double gap = std::numeric_limits<double>::infinity();
+  const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB, &gap);
+  check.recordGap(edgeA, edgeB, gap);
+  if (!nearby) return;
+  out.exactDecisions += nearby->centres.exact;
+  if (pair.reportsDistinct() && !areDistinct(pair, edgeA, edgeB, *nearby, out.exactDecisions))
+    return;
+  if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
+  EdgeEdgeDistance centres = nearby->centres;
+  turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, edgeA, edgeB, centres,
+                 out.exactDecisions);
+  out.edgeEdge.push_back(
+      contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], centres));
+  out.edgeEdge.back().distance = nearby->distance;
+}
+
 /// The number of set bits, for `bits` below 2^16. The baseline processor has no instruction for it.
 std::size_t countOf(std::uint32_t bits) {
   PALPATE_ASSERT(bits >> 16 == 0);
@@ -212,12 +166,8 @@ class ProximityFinder {
       : m_pair(pair),
         m_out(out),
         m_check(pair, out),
-        m_verticesOfA(pair, false, pair.self() ? Corners::LowerVertexOnly : Corners::All, out),
-        m_verticesOfB(pair, true,
-                      pair.self()                  ? Corners::LowerVertexOnly
-                      : pair.b.topology.hasFaces() ? Corners::None
-                                                   : Corners::All,
-                      out),
+        m_verticesOfA(pair, false, out),
+        m_verticesOfB(pair, true, out),
         m_sharedVertex(pair.a.topology, pair.self() ? pair.floats : nullptr, candidates),
         m_tests(pair),
         m_distinct(pair.reportsDistinct() && !pair.has(GeometryType::Lines)) {}
@@ -228,8 +178,6 @@ class ProximityFinder {
   }
 
  private:
-  using Corners = VertexTriangleFinder::Corners;
-
   void add(const ElementPair& candidate) {
     const std::uint32_t tests = m_tests.of(candidate);
     m_out.featurePairs += countOf(tests);

@@ -1,5 +1,6 @@
 #include "NarrowPhase/StepCheck.h"
 
+#include "Contact/ContactLists.h"
 #include "Math/ClosestPoint.h"
 #include "Math/MotionBound.h"
 #include "Math/Tolerances.h"
@@ -9,6 +10,8 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
+#include <span>
 
 namespace palpate {
 
@@ -65,32 +68,22 @@ void StepCheck::recordImpact(const Features<kind>& features, std::uint32_t first
 void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuffers& found,
                       ContactBuffers& out) {
   TimeCheck check(32);
-  const auto isTouched = [&](const Buffer<std::uint32_t>& sorted, auto... vertices) {
-    return (std::binary_search(sorted.begin(), sorted.end(), vertices) || ...);
+  const std::array touchedOf{std::span(touched.verticesA),
+                             std::span(pair.self() ? touched.verticesA : touched.verticesB)};
+  for (const auto& ids : touchedOf) PALPATE_ASSERT(std::is_sorted(ids.begin(), ids.end()));
+  const auto isTouched = [&](ContactKind kind, const std::array<std::uint32_t, 4>& vertices) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto& sorted = touchedOf[sidesOf(kind)[i]];
+      if (std::binary_search(sorted.begin(), sorted.end(), vertices[i])) return true;
+    }
+    return false;
   };
-  const auto &ofA = touched.verticesA, &ofB = pair.self() ? ofA : touched.verticesB;
-  PALPATE_ASSERT(std::is_sorted(ofA.begin(), ofA.end()) && std::is_sorted(ofB.begin(), ofB.end()));
-  const auto moveImpacts = [&](Buffer<VertexTriangleContact>& list, bool swapped) {
-    const Features<Kind::VertexTriangle> features{swapped ? pair.b : pair.a,
-                                                  swapped ? pair.a : pair.b};
-    const auto &vertices = swapped ? ofB : ofA, &corners = swapped ? ofA : ofB;
-    std::erase_if(list, [&](const VertexTriangleContact& c) {
+  forEachMeshList(found, [&](ContactKind kind, auto& list) {
+    std::erase_if(list, [&](const auto& contact) {
       check();
-      return c.timeOfImpact == 1.0 &&
-             (isTouched(vertices, c.vertex) ||
-              isTouched(corners, c.vertices[0], c.vertices[1], c.vertices[2])) &&
-             addImpact(pair, features, c.vertex, c.triangle, swapped, out);
+      return contact.timeOfImpact == 1.0 && isTouched(kind, verticesOf(contact)) &&
+             addImpactOf(pair, kind, contact, out);
     });
-  };
-  moveImpacts(found.vertexTriangle, false);
-  moveImpacts(found.triangleVertex, true);
-  const Features<Kind::EdgeEdge> edges{pair.a, pair.b};
-  std::erase_if(found.edgeEdge, [&](const EdgeEdgeContact& c) {
-    check();
-    return c.timeOfImpact == 1.0 &&
-           (isTouched(ofA, c.edgeA[0], c.edgeA[1]) || isTouched(ofB, c.edgeB[0], c.edgeB[1])) &&
-           addImpact(pair, edges, pair.a.topology.edgeOf(c.edgeA), pair.b.topology.edgeOf(c.edgeB),
-                     false, out);
   });
 }
 

@@ -11,7 +11,7 @@
 #include "Queries/RayHits.h"
 #include "Queries/VertexSearch.h"
 #include "Bodies/Body.h"
-#include "Shapes/DistinctContacts.h"
+#include "Contact/DistinctShapeContacts.h"
 #include "Shapes/PlacedShape.h"
 #include "Shapes/ShapeContacts.h"
 #include "Core/FloatingPoint.h"
@@ -51,7 +51,7 @@ class SpatialQueries::Source {
     std::vector<std::uint32_t> elements;
     Buffer<std::uint32_t> nearShape;
     ShapeContactBuffers shapeContacts;
-    DistinctContacts distinctContacts;
+    DistinctShapeContacts distinctContacts;
     KeptShapes shapes;
     PathScratch path;
     std::unique_ptr<PairScratch> pairs;  ///< null before distance() first needs it

@@ -69,7 +69,7 @@ void PairResults::keepFirstImpacts(const Search& search, double end) {
   m_firstImpacts.keep(pair, end, m_orderScratch, search.answer->contents());
 }
 
-void keepDistinct(const Question& question, DistinctContacts& distinct,
+void keepDistinct(const Question& question, DistinctShapeContacts& distinct,
                   CountedVector<ShapeContact>& contacts) {
   PALPATE_ASSERT(question.plan.kind == PairKind::MeshAndShape);
   const Body& shape = question.shape();

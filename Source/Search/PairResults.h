@@ -4,13 +4,13 @@
 #include <palpate/FrameStatistics.h>
 
 #include "Search/BodyContacts.h"
-#include "Search/FirstImpacts.h"
 #include "Search/JobScratch.h"
 #include "Search/Question.h"
 #include "NarrowPhase/NarrowPhase.h"
+#include "Contact/FirstImpacts.h"
 #include "Contact/Order.h"
 #include "NarrowPhase/Piercing.h"
-#include "Shapes/DistinctContacts.h"
+#include "Contact/DistinctShapeContacts.h"
 #include "Core/Buffer.h"
 
 #include <cstddef>
@@ -22,7 +22,7 @@
 namespace palpate {
 
 /// Contacts::Distinct for the contacts of a mesh and a shape.
-void keepDistinct(const Question&, DistinctContacts&, CountedVector<ShapeContact>&);
+void keepDistinct(const Question&, DistinctShapeContacts&, CountedVector<ShapeContact>&);
 
 /// From what the jobs of a pair found to the pair's results, in steps that the kinds of work share.
 /// Its scratch remembers its peak.
@@ -65,7 +65,7 @@ class PairResults {
   std::vector<ContactBuffers*> m_found, m_intersections;
   OrderScratch m_orderScratch;
   FirstImpacts m_firstImpacts;
-  DistinctContacts m_distinctContacts;
+  DistinctShapeContacts m_distinctContacts;
   Buffer<std::uint8_t> m_flags;
 };
 

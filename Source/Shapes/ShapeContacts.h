@@ -40,7 +40,7 @@ struct ShapeContactBuffers {
 ///
 /// All: reports every vertex, edge and triangle whose distance from the shape is at most the
 /// thickness plus its radius, at its point nearest to the shape. Distinct: reports those of them
-/// whose nearest point is strictly inside the feature. DistinctContacts drops some of them.
+/// whose nearest point is strictly inside the feature. DistinctShapeContacts drops some of them.
 ///
 /// Continuous: features within the distance before the step are reported at time 0, as with
 /// Distinct. Otherwise, vertices are tested against the shape, edges against its edges, and

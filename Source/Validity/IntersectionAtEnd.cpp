@@ -1,7 +1,8 @@
 #include "Validity/IntersectionAtEnd.h"
 
-#include "NarrowPhase/Continuous.h"
+#include "NarrowPhase/Meeting.h"
 #include "Contact/ContactLists.h"
+#include "Contact/MeshFeature.h"
 #include "Math/MotionBound.h"
 #include "Core/Assert.h"
 #include "Core/Stopping.h"
@@ -19,14 +20,10 @@ constexpr std::size_t kFreeChecks = 32, kChecksTogether = 16;
 
 double motionOf(const TriangleMesh& vertices, const TriangleMesh& triangles,
                 const VertexTriangleContact& c) {
-  constexpr auto kKind = ImpactQuery::Kind::VertexTriangle;
-  const auto& [i, j, k] = c.vertices;
-  return motionBound<kKind>(Features<kKind>{vertices, triangles}.query({c.vertex, i, j, k}));
+  return motionBound<ImpactQuery::Kind::VertexTriangle>(queryOf(vertices, triangles, c));
 }
 double motionOf(const TriangleMesh& a, const TriangleMesh& b, const EdgeEdgeContact& c) {
-  constexpr auto kKind = ImpactQuery::Kind::EdgeEdge;
-  return motionBound<kKind>(
-      Features<kKind>{a, b}.query({c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]}));
+  return motionBound<ImpactQuery::Kind::EdgeEdge>(queryOf(a, b, c));
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ allowedIn() {
     Tracking) echo "Tracking/ NarrowPhase/ Contact/ Mesh/ Math/ Exact/ Core/" ;;
     Search) echo "Search/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Contact/ Octree/ Shapes/ Mesh/ Math/ Core/" ;;
     CollisionDetection) echo "CollisionDetection/ Search/ Tracking/ Validity/ DistanceField/ Queries/ Bodies/ NarrowPhase/ Contact/ Octree/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
-    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Contact/ Shapes/ Mesh/ Math/ Fields/ Core/" ;;
+    Diagnostics) echo "Diagnostics/ CollisionDetection/ Search/ DistanceField/ Bodies/ NarrowPhase/ Contact/Contact Contact/Contents.h Contact/DistinctShape Contact/Filters.h Contact/Mesh Contact/Order.h Contact/Piercing.h Contact/TouchNormal.h Shapes/ Mesh/ Math/ Fields/ Core/" ;;
     MeshFiles) echo "MeshFiles/ Core/WholeFile.h" ;;
     C) echo "C/ Fields/" ;;
     Python) echo "Python/ Fields/ Contact/ContactLists.h" ;;

@@ -1,4 +1,4 @@
-#include "Shapes/DistinctContacts.h"
+#include "Contact/DistinctShapeContacts.h"
 
 #include <palpate/ConstraintRows.h>
 #include <palpate/OctreeBasedCD.h>
@@ -102,7 +102,7 @@ double tiltOf(const AnalyticalGeometry& shape) {
   return std::holds_alternative<Sphere>(shape) ? 1e-9 : 0x1p-10 + 1e-9;
 }
 
-TEST(DistinctContacts, OfAFlatFloorHaveItsNormal) {
+TEST(DistinctShapeContacts, OfAFlatFloorHaveItsNormal) {
   Random random(1);
   std::size_t contacts = 0, impacts = 0, tilted = 0;
   for (const bool irregular : {false, true})
@@ -150,7 +150,7 @@ std::set<std::uint32_t> sorted(const Triangle& vertices) {
 }
 
 /// The definition, on flat and other meshes, with motion and without.
-TEST(DistinctContacts, MatchTheDefinition) {
+TEST(DistinctShapeContacts, MatchTheDefinition) {
   Random random(2);
   Mesh soups = soup(random, 200, 0.4);
   for (Vector3d& p : soups.positions) p = 2 * (p - Vector3d::Constant(0.5));
@@ -248,7 +248,7 @@ Mesh prism(std::uint32_t n) {
 }
 
 /// A wall at the rim, seen along the floor, is on one side or on the other by rounding.
-TEST(DistinctContacts, OfARimOnAFlatSideStayWhateverTheTilt) {
+TEST(DistinctShapeContacts, OfARimOnAFlatSideStayWhateverTheTilt) {
   Random random(9);
   ConvexHull hull;
   for (int i = 0; i < 8; ++i)
@@ -316,7 +316,7 @@ Sliding slide(const Mesh& floor, const AnalyticalGeometry& shape, const Matrix3d
   return result;
 }
 
-TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
+TEST(DistinctShapeContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
   Random random(4);
   for (const bool irregular : {false, true}) {
     const Matrix3d floorTurn = randomTurn(random);
@@ -342,7 +342,7 @@ TEST(DistinctContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
 }
 
 /// A cylinder that turns over a regular grid comes near whole triangles at their corners.
-TEST(DistinctContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
+TEST(DistinctShapeContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
   Random random(6);
   const Mesh floor = floorOf(random, 20, 1.0, false, [](double, double) { return 0.0; });
   const Cylinder cylinder{{-2, 0, 0}, {2, 0, 0}, 1.0};
@@ -371,7 +371,7 @@ TEST(DistinctContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
 
 /// A body that stands in a floor, or touches it: several of its surfaces may be equally near to an
 /// edge or a triangle. The one that lies along it counts, and no contact leads to a side.
-TEST(DistinctContacts, OfABodyThatStandsInAFloorLeadOut) {
+TEST(DistinctShapeContacts, OfABodyThatStandsInAFloorLeadOut) {
   Random random(8);
   std::size_t contacts = 0;
   for (int run = 0; run < casesOf(60); ++run) {

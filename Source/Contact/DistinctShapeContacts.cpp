@@ -1,5 +1,6 @@
-#include "Shapes/DistinctContacts.h"
+#include "Contact/DistinctShapeContacts.h"
 
+#include "Contact/DistinctRule.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Mesh/PointMotion.h"
 #include "Math/NormalCone.h"
@@ -32,7 +33,7 @@ double sizeOf(const Shape& shape, const Pose& pose) {
 }  // namespace
 
 /// One pair's mesh, and its shape at the step's end.
-class DistinctContacts::Step {
+class DistinctShapeContacts::Step {
  public:
   Step(const TriangleMesh& mesh, const Shape& shape, const Pose& before, const Pose& now,
        const PairSettings& settings)
@@ -117,9 +118,7 @@ class DistinctContacts::Step {
     return plane.hasInFront(lowest, m_shape.isCylinder() ? 0.0 : m_shape.radius());
   }
   bool isIn(const TangentPlane& plane, const ShapeContact& c) const {
-    return std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
-      return plane.touches(m_mesh.now[v], m_mesh.radius(v));
-    });
+    return areIn(plane, m_mesh, c.vertices);
   }
   /// Whether two contacts have one normal at different points of the shape.
   bool areOfOnePart(const ShapeContact& a, const ShapeContact& b) const {
@@ -128,9 +127,8 @@ class DistinctContacts::Step {
   }
   /// Whether `s` is early enough to stand for `c`.
   bool isInTime(const ShapeContact& s, const ShapeContact& c) const {
-    return isFirst(s, c) ||
-           (s.element == ShapeElement::Face &&
-            s.timeOfImpact <= c.timeOfImpact + m_settings.continuous.timeTolerance);
+    return standsInTime(s.element == ShapeElement::Face, s.timeOfImpact, s.distance, c.timeOfImpact,
+                        c.distance, m_settings);
   }
 
  private:
@@ -155,8 +153,8 @@ class DistinctContacts::Step {
   const double m_size;  ///< L: of the shape
 };
 
-void DistinctContacts::dropAlongFlatParts(const Step& step,
-                                          std::span<const ShapeContact> contacts) {
+void DistinctShapeContacts::dropAlongFlatParts(const Step& step,
+                                               std::span<const ShapeContact> contacts) {
   m_parts.clear();
   m_flat.clear();
   m_sunk.clear();
@@ -201,9 +199,10 @@ void DistinctContacts::dropAlongFlatParts(const Step& step,
   }
 }
 
-std::size_t DistinctContacts::keep(const TriangleMesh& mesh, const Shape& shape, const Pose& before,
-                                   const Pose& now, const PairSettings& settings,
-                                   std::span<ShapeContact> contacts) {
+std::size_t DistinctShapeContacts::keep(const TriangleMesh& mesh, const Shape& shape,
+                                        const Pose& before, const Pose& now,
+                                        const PairSettings& settings,
+                                        std::span<ShapeContact> contacts) {
   if (settings.contacts == Contacts::All || shape.isPlane()) return contacts.size();
   const Step step(mesh, shape, before, now, settings);
   m_states.resize(contacts.size());

@@ -1,7 +1,5 @@
-#include "NarrowPhase/LineEdges.h"
+#include "Contact/DistinctLines.h"
 
-#include "Contact/Filters.h"
-#include "NarrowPhase/TouchNormal.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
@@ -32,9 +30,17 @@ bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f)
   return true;
 }
 
-/// The condition for Contacts::Distinct that testLineEdges() describes.
-bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
-                const std::array<MeshFeature, 2>& features, ContactBuffers& out) {
+/// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
+/// They do not report a vertex against a triangle mesh.
+bool areReportedByEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
+  constexpr auto kVertex = MeshFeature::Kind::Vertex;
+  return !(pair.b.topology.hasFaces() && features[0].kind == kVertex) &&
+         !(pair.a.topology.hasFaces() && features[1].kind == kVertex);
+}
+
+/// Whether the two edges are those that report the contact of these features.
+bool areLowest(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+               const std::array<MeshFeature, 2>& features, std::size_t& exactDecisions) {
   if (!areReportedByEdges(pair, features)) return false;
   return allEdgesAt(pair.a.topology, features[0], [&](std::uint32_t a) {
     return allEdgesAt(pair.b.topology, features[1], [&](std::uint32_t b) {
@@ -43,7 +49,7 @@ bool isDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
       const std::uint32_t first = swapped ? b : a, second = swapped ? a : b;
       const std::optional<NearbyEdges> other = measureEdges(pair, first, second);
       if (!other) return true;
-      out.exactDecisions += other->centres.exact;
+      exactDecisions += other->centres.exact;
       auto otherFeatures = other->features;
       if (swapped) std::swap(otherFeatures[0], otherFeatures[1]);
       return otherFeatures == features && (edgeA == first ? pair.b.topology.precedes(edgeB, second)
@@ -79,8 +85,7 @@ bool isNearerToSide(const MeshPair& pair, std::uint32_t edge, std::uint32_t tria
   });
 }
 
-}  // namespace
-
+/// Whether triangles exclude the contact. False for two line meshes.
 bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
                        const NearbyEdges& nearby) {
   const bool swapped = pair.a.topology.hasFaces();
@@ -99,8 +104,7 @@ bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t 
     const Vector3d r = mesh.now[corner];
     return isVertex ? leadsTowards(towardsLine, p, r) : leadsInto(towardsLine, p, q, r);
   };
-  const auto around =
-      isVertex ? topology.vertexTriangles[feature.id] : topology.edgeTriangles[feature.id];
+  const auto around = holdersOf(topology, feature);
   const bool isExcluded = std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
     const Triangle& corners = topology.elements[triangle];
     if (std::none_of(corners.begin(), corners.end(), leadsTo)) return false;
@@ -115,38 +119,13 @@ bool isExcludedByFaces(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t 
                                  pair.settings.thickness);
 }
 
-std::optional<NearbyEdges> measureEdges(const MeshPair& pair, std::uint32_t edgeA,
-                                        std::uint32_t edgeB, StepCheck* check) {
-  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  if (pair.excludesEdges(edgeA, edgeB) || areNearAtRest(pair, p, q)) return {};
-  const EdgeEdgeDistance centres = finiteEdgeEdgeDistance(pair.a.now[p[0]], pair.a.now[p[1]],
-                                                          pair.b.now[q[0]], pair.b.now[q[1]]);
-  if (check) check->recordGap(edgeA, edgeB, centres.distance - pair.largestRadii(p, q));
-  const double radii = pair.a.radius(p, centres.weightA) + pair.b.radius(q, centres.weightB);
-  const double distance = centres.distance - radii;
-  if (!(distance <= pair.settings.thickness) || rejectsEdges(pair, edgeA, edgeB)) return {};
-  return NearbyEdges{centres,
-                     distance,
-                     {featureOf(pair.a.topology, edgeA, centres.featureA),
-                      featureOf(pair.b.topology, edgeB, centres.featureB)}};
-}
+}  // namespace
 
-void testLineEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, StepCheck& check,
-                   ContactBuffers& out) {
+bool areDistinct(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                 const NearbyEdges& nearby, std::size_t& exactDecisions) {
   PALPATE_ASSERT(pair.has(GeometryType::Lines));
-  const std::optional<NearbyEdges> nearby = measureEdges(pair, edgeA, edgeB, &check);
-  if (!nearby) return;
-  out.exactDecisions += nearby->centres.exact;
-  if (pair.reportsDistinct() && (!isDistinct(pair, edgeA, edgeB, nearby->features, out) ||
-                                 isExcludedByFaces(pair, edgeA, edgeB, *nearby)))
-    return;
-  if (pointInwardAtEnd(pair, edgeA, edgeB, nearby->centres)) return;
-  EdgeEdgeDistance centres = nearby->centres;
-  turnToSeparate(Features<ImpactQuery::Kind::EdgeEdge>{pair.a, pair.b}, edgeA, edgeB, centres,
-                 out.exactDecisions);
-  out.edgeEdge.push_back(
-      contactOf(pair.a.topology.edges[edgeA], pair.b.topology.edges[edgeB], centres));
-  out.edgeEdge.back().distance = nearby->distance;
+  return areLowest(pair, edgeA, edgeB, nearby.features, exactDecisions) &&
+         !isExcludedByFaces(pair, edgeA, edgeB, nearby);
 }
 
 }  // namespace palpate

@@ -44,7 +44,7 @@ namespace palpate {
 ///          nearest contacts. Where the shape has sunk in, also the product of the planes of the
 ///          mesh in which contacts are excluded and the contacts that are sunk, some nanoseconds
 ///          each.
-class DistinctContacts {
+class DistinctShapeContacts {
  public:
   static constexpr int kMostPlanes = 8;
 

@@ -1,96 +1,22 @@
 #pragma once
 
-#include <palpate/CollisionData.h>
-
-#include "NarrowPhase/NarrowPhase.h"
+#include "Contact/DistinctRule.h"
+#include "Contact/ImpactPlaces.h"
+#include "Contact/MeshPair.h"
+#include "Contact/SidedImpact.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/NormalCone.h"
 #include "Math/StableLength.h"
 #include "Core/Assert.h"
+#include "Core/Buffer.h"
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
-#include <tuple>
 
 namespace palpate {
-
-/// The vertices of an element, or of the part of it that holds a closest point.
-struct ImpactElement {
-  std::array<std::uint32_t, 3> ids{};
-  std::size_t size = 0;
-
-  ImpactElement() = default;
-  explicit ImpactElement(std::uint32_t vertex) : ids{vertex}, size(1) {}
-  explicit ImpactElement(const Segment& edge) : ids{edge[0], edge[1]}, size(2) {}
-  explicit ImpactElement(const Triangle& corners)
-      : ids{corners[0], corners[1], corners[2]}, size(3) {}
-
-  std::span<const std::uint32_t> vertices() const { return {ids.data(), size}; }
-  bool isIn(const ImpactElement& other) const {
-    const auto all = other.vertices();
-    return std::all_of(
-        ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(size),
-        [&](std::uint32_t v) { return std::find(all.begin(), all.end(), v) != all.end(); });
-  }
-  /// As a vertex {v, v} or an edge.
-  Segment feature() const {
-    PALPATE_ASSERT(size == 1 || size == 2);
-    return {ids[0], ids[size - 1]};
-  }
-};
-
-/// An impact of a vertex and a triangle, or of two edges, as both sides of the pair see it.
-struct SidedImpact {
-  std::array<ImpactElement, 2> elements, closest;  ///< of MeshPair::a and MeshPair::b
-  std::array<double, 3> weights;  ///< of a triangle's corners; or of the ends' second ones
-  Eigen::Vector3d normal;         ///< unit, from b to a
-  double time, distance;
-  std::size_t vertexSide;  ///< the side of the vertex; 2: two edges
-  bool isOfFace;           ///< the closest point is in a triangle's interior
-
-  /// swapped: the vertex is of MeshPair::b.
-  SidedImpact(const VertexTriangleContact& c, bool swapped)
-      : weights{c.weights[0], c.weights[1], c.weights[2]},
-        normal(swapped ? Eigen::Vector3d(-c.normal) : c.normal),
-        time(c.timeOfImpact),
-        distance(c.distance),
-        vertexSide(swapped ? 1 : 0),
-        isOfFace(c.feature == TriangleFeature::Face) {
-    elements[vertexSide] = closest[vertexSide] = ImpactElement(c.vertex);
-    elements[1 - vertexSide] = ImpactElement(c.vertices);
-    closest[1 - vertexSide] = closestOf(c);
-  }
-  explicit SidedImpact(const EdgeEdgeContact& c)
-      : elements{ImpactElement(c.edgeA), ImpactElement(c.edgeB)},
-        closest{closestOf(c.edgeA, c.featureA), closestOf(c.edgeB, c.featureB)},
-        weights{c.weightA, c.weightB, 0.0},
-        normal(c.normal),
-        time(c.timeOfImpact),
-        distance(c.distance),
-        vertexSide(2),
-        isOfFace(false) {}
-
-  /// From the other side to this one.
-  Eigen::Vector3d upTo(std::size_t side) const {
-    return side == 0 ? normal : Eigen::Vector3d(-normal);
-  }
-
- private:
-  static ImpactElement closestOf(const VertexTriangleContact& c) {
-    const int i = static_cast<int>(c.feature);
-    if (i < 3) return ImpactElement(c.vertices[i]);
-    if (i < 6) return ImpactElement(Segment{c.vertices[i - 3], c.vertices[(i - 2) % 3]});
-    return ImpactElement(c.vertices);
-  }
-  static ImpactElement closestOf(const Segment& ends, EdgeFeature feature) {
-    if (feature == EdgeFeature::Interior) return ImpactElement(ends);
-    return ImpactElement(ends[feature == EdgeFeature::End]);
-  }
-};
 
 /// Contacts::Distinct for impacts: which impacts are excluded, and which others stand for these.
 ///
@@ -133,8 +59,7 @@ class ExcludedImpacts {
 
   /// Condition (1) for an impact with this time and distance.
   bool isInTime(bool isOfFace, double time, double distance, const SidedImpact& c) const {
-    return isOfFace ? time <= c.time + m_pair.settings.continuous.timeTolerance
-                    : std::tie(time, distance) < std::tie(c.time, c.distance);
+    return standsInTime(isOfFace, time, distance, c.time, c.distance, m_pair.settings);
   }
 
   /// Calls f(side) for each side whose element another impact may hold for this one, or whose
@@ -156,7 +81,8 @@ class ExcludedImpacts {
 
     /// Condition (2).
     bool isBeside(const TangentPlane& plane) const {
-      return m_rule.isIn(plane, 1 - m_side, m_impact.elements[1 - m_side]);
+      return areIn(plane, m_rule.m_pair.meshOf(1 - m_side),
+                   m_impact.elements[1 - m_side].vertices());
     }
     /// Conditions (3) and (4), for an impact that is not excluded and holds `own`, which is the
     /// held element or a part of it. plane: its planeOf(). lowestGap(plane): the least gap of such
@@ -200,10 +126,8 @@ class ExcludedImpacts {
     Vector3d point;
     double radius;  ///< L
   };
-  const TriangleMesh& meshOf(std::size_t side) const { return side == 0 ? m_pair.a : m_pair.b; }
-
   Place placeOf(const SidedImpact& s, std::size_t side) const {
-    const TriangleMesh& mesh = meshOf(side);
+    const TriangleMesh& mesh = m_pair.meshOf(side);
     const auto& [p, q, r] = s.elements[side].ids;
     if (s.elements[side].size == 1) return {mesh.now[p], mesh.radius(p)};
     if (s.vertexSide == 2) {
@@ -218,30 +142,23 @@ class ExcludedImpacts {
   }
 
   bool isExcludedOn(std::size_t side, const SidedImpact& c) const {
-    const TriangleMesh& mesh = meshOf(side);
+    const TriangleMesh& mesh = m_pair.meshOf(side);
     if (!m_haveFaces && (c.vertexSide == side || (c.vertexSide == 2 && !mesh.topology.hasFaces())))
       return false;
     return excludesDirection(mesh, c.closest[side].feature(), c.upTo(1 - side), c.time);
   }
   bool isOnRidge(const SidedImpact& c, std::size_t side) const {
-    const TriangleMesh& mesh = meshOf(side);
+    const TriangleMesh& mesh = m_pair.meshOf(side);
     const auto held = c.elements[side].vertices();
     double length = 0.0;
     for (std::size_t i = 0; i < held.size(); ++i)
       for (std::size_t j = 0; j < i; ++j)
         length = std::max(length, stableLength(mesh.now[held[i]] - mesh.now[held[j]]));
-    return hasRidge(meshOf(1 - side), c.closest[1 - side].feature(), c.upTo(side), length,
+    return hasRidge(m_pair.meshOf(1 - side), c.closest[1 - side].feature(), c.upTo(side), length,
                     m_pair.settings.thickness);
   }
-  bool isIn(const TangentPlane& plane, std::size_t side, const ImpactElement& element) const {
-    const TriangleMesh& mesh = meshOf(side);
-    const auto vertices = element.vertices();
-    return std::all_of(vertices.begin(), vertices.end(),
-                       [&](std::uint32_t v) { return plane.touches(mesh.now[v], mesh.radius(v)); });
-  }
-
   bool isInFront(const TangentPlane& plane, std::size_t side, const ImpactElement& element) const {
-    const TriangleMesh& mesh = meshOf(side);
+    const TriangleMesh& mesh = m_pair.meshOf(side);
     const auto vertices = element.vertices();
     return std::all_of(vertices.begin(), vertices.end(), [&](std::uint32_t v) {
       return plane.hasInFront(mesh.now[v], mesh.radius(v));
@@ -250,6 +167,39 @@ class ExcludedImpacts {
 
   const MeshPair& m_pair;
   const bool m_haveFaces;
+};
+
+/// Finds the excluded impacts of an answer for which others stand. Its scratch remembers its peak.
+class ExcludedSearch {
+ public:
+  /// Drops them.
+  void find(const MeshPair&, const Impacts&, DroppedImpacts&);
+
+ private:
+  /// An impact that is not excluded, and the side of the element that it holds.
+  struct Holder {
+    ImpactPlace place;
+    std::uint32_t side;
+    bool isOfFace;
+    double time, distance;
+    ImpactElement element;
+    std::uint32_t plane;  ///< of m_planes; kNoPlane: not needed yet
+  };
+  static constexpr std::uint32_t kNoPlane = 0xffffffffu;
+
+  std::size_t bucketOf(std::size_t side, std::uint32_t vertex) const;
+  void listHolders(const ExcludedImpacts&, const Impacts&, const PerImpact<std::uint8_t>& excluded);
+  TangentPlane planeOf(const ExcludedImpacts&, const Impacts&, Holder&);
+  template <class IsAsked, class F>
+  bool anyHolder(const SidedImpact&, std::size_t side, IsAsked&&, F&&);
+  void dropIfHeld(const ExcludedImpacts&, const Impacts&, const SidedImpact&, const ImpactPlace&,
+                  DroppedImpacts&);
+
+  bool m_self = false;
+  std::size_t m_buckets = 0;
+  Buffer<Holder> m_holders;        ///< by the bucket of the element's first vertex
+  Buffer<std::uint32_t> m_starts;  ///< of each bucket and size, in m_holders
+  Buffer<TangentPlane> m_planes;   ///< of some m_holders
 };
 
 }  // namespace palpate

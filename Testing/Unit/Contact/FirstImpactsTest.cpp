@@ -29,14 +29,14 @@ namespace {
 using VertexSet = std::set<std::uint32_t>;
 using FeaturePair = std::pair<VertexSet, VertexSet>;
 
-VertexSet verticesOf(const VertexTriangleContact& c) {
+VertexSet closestVerticesOf(const VertexTriangleContact& c) {
   VertexSet vertices;
   for (int i = 0; i < 3; ++i)
     if (c.weights[i] != 0.0) vertices.insert(c.vertices[i]);
   return vertices;
 }
 
-VertexSet verticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
+VertexSet closestVerticesOf(const std::array<std::uint32_t, 2>& edge, double weight) {
   VertexSet vertices;
   if (weight != 1.0) vertices.insert(edge[0]);
   if (weight != 0.0) vertices.insert(edge[1]);
@@ -64,7 +64,7 @@ struct Impact {
 std::vector<Impact> impactsOf(const CollisionData& data) {
   std::vector<Impact> impacts;
   const auto addVertex = [&](const VertexTriangleContact& c, int list, std::size_t index) {
-    const VertexSet vertex{c.vertex}, others = verticesOf(c);
+    const VertexSet vertex{c.vertex}, others = closestVerticesOf(c);
     const std::uint32_t triangle =
         others.size() == 3 ? c.triangle : std::numeric_limits<std::uint32_t>::max();
     impacts.push_back({list == 1 ? FeaturePair{others, vertex} : FeaturePair{vertex, others},
@@ -76,11 +76,12 @@ std::vector<Impact> impactsOf(const CollisionData& data) {
   for (const auto& c : data.triangleVertex()) addVertex(c, 1, index++);
   index = 0;
   for (const EdgeEdgeContact& c : data.edgeEdge())
-    impacts.push_back({{verticesOf(c.edgeA, c.weightA), verticesOf(c.edgeB, c.weightB)},
-                       std::numeric_limits<std::uint32_t>::max(),
-                       c.timeOfImpact,
-                       2,
-                       index++});
+    impacts.push_back(
+        {{closestVerticesOf(c.edgeA, c.weightA), closestVerticesOf(c.edgeB, c.weightB)},
+         std::numeric_limits<std::uint32_t>::max(),
+         c.timeOfImpact,
+         2,
+         index++});
   return impacts;
 }
 
