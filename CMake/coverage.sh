@@ -1,6 +1,6 @@
 #!/bin/bash
 # CMake/coverage.sh: builds the core and its tests with counters, runs them, prints the coverage of each module and writes
-# it to Docs/Notes/Coverage.md. Exit code 1 if a branch of Math, Octree or NarrowPhase is neither reached nor explained in
+# it to Docs/Notes/Coverage.md. Exit code 1 if a branch of Math, Octree, Contact or NarrowPhase is neither reached nor explained in
 # Testing/Coverage/explained.txt. build/coverage/html/index.html shows each line. Arguments go to ctest.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -1,7 +1,7 @@
 #include "CollisionDetection/PairTable.h"
 
 #include "Search/PairResults.h"
-#include "Tracking/SmoothNormals.h"
+#include "Contact/SmoothNormals.h"
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/SettingsCheck.h"
 #include "Contact/ContactLists.h"

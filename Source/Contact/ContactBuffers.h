@@ -4,6 +4,7 @@
 #include <palpate/Tracking.h>
 
 #include "Contact/MeshFeature.h"
+#include "Contact/MeshPair.h"
 #include "Shapes/ShapeContacts.h"
 #include "Math/TriangleIntersection.h"
 #include "Core/Buffer.h"
@@ -34,6 +35,10 @@ struct StepFacts {
   Buffer<std::uint32_t> degenerateA, degenerateB;  ///< triangles without area in contacts
   void clear();
   void add(const StepFacts&);
+  /// Records the triangle of a contact if it has no area, or a triangle at an edge that has none.
+  void recordTriangle(const MeshPair&, std::uint32_t triangle, bool isOfB, const Eigen::Vector3d& a,
+                      const Eigen::Vector3d& b, const Eigen::Vector3d& c);
+  void recordEdges(const MeshPair&, const Segment& p, const Segment& q);
   /// Adds what was found about a shape. atStart: with Continuous.
   void addShape(const ShapeContactBuffers&, bool atStart);
 };
@@ -92,6 +97,11 @@ struct ContactBuffers {
   std::size_t featurePairs = 0;    ///< tested
   std::size_t exactDecisions = 0;  ///< left to exact arithmetic
   std::size_t validityPairs = 0;   ///< triangle pairs tested for Validity::startedApart
+  /// The list of a vertex of MeshPair::a with a triangle, or of one of b. All contacts of a mesh
+  /// with itself are in one list.
+  Buffer<VertexTriangleContact>& ofVertex(const MeshPair& pair, bool ofB) {
+    return ofB && !pair.self() ? triangleVertex : vertexTriangle;
+  }
   void clear();
 };
 

@@ -7,7 +7,7 @@
 #include "Diagnostics/DistinctImpacts.h"
 #include "NarrowPhase/Intersection.h"
 #include "Contact/Order.h"
-#include "NarrowPhase/Piercing.h"
+#include "Contact/Piercing.h"
 #include "Contact/ContactLists.h"
 #include "Contact/DistinctShapeContacts.h"
 #include "Core/Assert.h"

@@ -5,10 +5,10 @@
 #include "NarrowPhase/Continuous.h"
 #include "Contact/Filters.h"
 #include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/Piercing.h"
+#include "Contact/Piercing.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
-#include "NarrowPhase/TouchNormal.h"
+#include "Contact/TouchNormal.h"
 #include "Mesh/ExcludedDirections.h"
 #include "Math/ClosestPoint.h"
 #include "Math/NormalCone.h"
@@ -147,14 +147,8 @@ void findVertexTriangle(const MeshPair& pair, std::span<const std::uint32_t> sam
         if (pair.step.reportsImpacts) addImpact(pair, features, v, t, kSwapped, out);
         continue;
       }
-      const Triangle& corners = triangles.topology.elements[t];
-      check.recordTriangle(t, !kSwapped, triangles.now[corners[0]], triangles.now[corners[1]],
-                           triangles.now[corners[2]]);
-      VertexTriangleDistance separating = *answer;
-      turnToSeparate(features, v, t, separating, out.exactDecisions);
-      auto& list = kSwapped ? out.triangleVertex : out.vertexTriangle;
-      list.push_back(contactOf(v, t, corners, separating));
-      list.back().distance = gap(t);
+      const double radii = pair.radii(v, triangles.topology.elements[t], answer->weights, kSwapped);
+      addAtEnd(pair, v, t, kSwapped, *answer, radii, out);
     }
   }
 }
@@ -174,8 +168,8 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
       if (!areInOrder(pair, i, j) || pair.excludesEdges(i, j) ||
           pair.b.topology.edgeTriangles[j].empty())
         continue;
-      EdgeEdgeDistance answer = finiteEdgeEdgeDistance(pair.a.now[a[i][0]], pair.a.now[a[i][1]],
-                                                       pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
+      const EdgeEdgeDistance answer = finiteEdgeEdgeDistance(
+          pair.a.now[a[i][0]], pair.a.now[a[i][1]], pair.b.now[b[j][0]], pair.b.now[b[j][1]]);
       ++out.featurePairs;
       out.exactDecisions += answer.exact;
       if (!(answer.distance <= pair.thicknessAtEnd())) continue;
@@ -189,9 +183,7 @@ void findEdgeEdge(const MeshPair& pair, std::span<const std::uint32_t> sample,
         if (pair.step.reportsImpacts) addImpact(pair, features, i, j, false, out);
         continue;
       }
-      check.recordEdges(a[i], b[j]);
-      turnToSeparate(features, i, j, answer, out.exactDecisions);
-      out.edgeEdge.push_back(contactOf(a[i], b[j], answer));
+      addAtEnd(pair, i, j, answer, out);
     }
   }
 }

@@ -124,7 +124,7 @@ constexpr double kFreeMotionError = 0x1p-44;
 /// is eight times kApproachError.
 constexpr double kFreeMotionApproach = 8 * kApproachError;
 
-// ---- Normals of features that touch (NarrowPhase/TouchNormal.cpp) ----
+// ---- Normals of features that touch (Contact/TouchNormal.cpp) ----
 
 /// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24
 /// and the rounding of a star's directions, and far below any angle that matters to a solver.
@@ -146,7 +146,7 @@ constexpr int kTaperPieces = 16;
 /// them move further along a surface.
 constexpr int kMostClearances = 32;
 
-// ---- Vertices behind a surface (NarrowPhase/Piercing.cpp) ----
+// ---- Vertices behind a surface (Contact/Piercing.cpp) ----
 
 /// Exit distances that differ by a smaller share are equal, so that rounding does not choose.
 /// Far above the rounding of a crossing's place, and far below any difference that matters.

@@ -5,7 +5,7 @@
 #include "NarrowPhase/PassageFinder.h"
 #include "NarrowPhase/Proximity.h"
 #include "NarrowPhase/StepCheck.h"
-#include "NarrowPhase/TouchNormal.h"
+#include "Contact/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/ImpactFilter.h"
 #include "Math/MotionBound.h"
@@ -167,8 +167,8 @@ class ContactFinder {
       if (isSuppressed(closest, direction, rejectsVertex(m_pair, firstId, secondId, swapped)))
         return false;
       if (!store) return true;
-      (swapped && !m_pair.self() ? m_out.triangleVertex : m_out.vertexTriangle).push_back(contact);
-      m_check.recordTriangle(secondId, !swapped, p[1], p[2], p[3]);
+      m_out.ofVertex(m_pair, swapped).push_back(contact);
+      m_out.facts.recordTriangle(m_pair, secondId, !swapped, p[1], p[2], p[3]);
     } else {
       const MeshTopology &firstTopology = features.first.topology,
                          &secondTopology = features.second.topology;
@@ -182,7 +182,7 @@ class ContactFinder {
         return false;
       if (!store) return true;
       m_out.edgeEdge.push_back(contact);
-      m_check.recordEdges(contact.edgeA, contact.edgeB);
+      m_out.facts.recordEdges(m_pair, contact.edgeA, contact.edgeB);
     }
     return true;
   }

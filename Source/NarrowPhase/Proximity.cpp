@@ -6,7 +6,7 @@
 #include "NarrowPhase/OwnedTests.h"
 #include "NarrowPhase/SharedVertex.h"
 #include "NarrowPhase/StepCheck.h"
-#include "NarrowPhase/TouchNormal.h"
+#include "Contact/TouchNormal.h"
 #include "Math/ClosestPoint.h"
 #include "Math/Tolerances.h"
 #include "Core/Assert.h"
@@ -36,13 +36,12 @@ class VertexTriangleFinder {
         m_distinct(pair, swapped),
         m_check(pair, out),
         m_buffers(out),
-        m_out(swapped && !pair.self() ? out.triangleVertex : out.vertexTriangle),
         m_exactDecisions(out.exactDecisions) {}
 
   void test(std::uint32_t vertex, std::uint32_t triangle) {
     const Triangle& corners = m_topology.elements[triangle];
     const Vector3d p = m_vertices[vertex];
-    VertexTriangleDistance answer = finiteVertexTriangleDistance(
+    const VertexTriangleDistance answer = finiteVertexTriangleDistance(
         p, m_positions[corners[0]], m_positions[corners[1]], m_positions[corners[2]]);
     m_exactDecisions += answer.exact;
     const double gap = answer.distance - m_pair.largestRadii(vertex, corners, m_swapped);
@@ -59,11 +58,7 @@ class VertexTriangleFinder {
         addImpact(m_pair, m_features, vertex, triangle, m_swapped, m_buffers);
       return;
     }
-    m_check.recordTriangle(triangle, !m_swapped, m_positions[corners[0]], m_positions[corners[1]],
-                           m_positions[corners[2]]);
-    turnToSeparate(m_features, vertex, triangle, answer, m_exactDecisions);
-    m_out.push_back(contactOf(vertex, triangle, corners, answer));
-    m_out.back().distance -= radii;
+    addAtEnd(m_pair, vertex, triangle, m_swapped, answer, radii, m_buffers);
   }
 
  private:
@@ -76,7 +71,6 @@ class VertexTriangleFinder {
   DistinctVertices m_distinct;
   StepCheck m_check;
   ContactBuffers& m_buffers;
-  Buffer<VertexTriangleContact>& m_out;
   std::size_t& m_exactDecisions;
 };
 
@@ -123,10 +117,7 @@ void testEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB, S
     if (pair.step.reportsImpacts) addImpact(pair, features, edgeA, edgeB, false, out);
     return;
   }
-  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
-  check.recordEdges(p, q);
-  turnToSeparate(features, edgeA, edgeB, *answer, out.exactDecisions);
-  out.edgeEdge.push_back(contactOf(p, q, *answer));
+  addAtEnd(pair, edgeA, edgeB, *answer, out);
 }
 
 /// Two edges, of which at least one is of a line mesh.

@@ -70,7 +70,9 @@ void replaceByImpacts(const MeshPair& pair, const StepFacts& touched, ContactBuf
   TimeCheck check(32);
   const std::array touchedOf{std::span(touched.verticesA),
                              std::span(pair.self() ? touched.verticesA : touched.verticesB)};
-  for (const auto& ids : touchedOf) PALPATE_ASSERT(std::is_sorted(ids.begin(), ids.end()));
+  PALPATE_ASSERT(std::all_of(touchedOf.begin(), touchedOf.end(), [](const auto& ids) {
+    return std::is_sorted(ids.begin(), ids.end());
+  }));
   const auto isTouched = [&](ContactKind kind, const std::array<std::uint32_t, 4>& vertices) {
     for (std::size_t i = 0; i < 4; ++i) {
       const auto& sorted = touchedOf[sidesOf(kind)[i]];
@@ -102,26 +104,6 @@ bool StepCheck::proximitySuffices(const Features<kind>& features, std::uint32_t 
   if (distance > m_pair.thicknessAtEnd()) return false;
   // Edges whose closest points are ends were measured only up to checkedEdgeDistance().
   return distance > motion || kind == Kind::VertexTriangle;
-}
-
-void StepCheck::recordTriangle(std::uint32_t triangle, bool isOfB, const Vector3d& a,
-                               const Vector3d& b, const Vector3d& c) {
-  const Vector3d u = b - a, v = c - a;
-  if (!(isOfB ? m_pair.b : m_pair.a).topology.hasFaces()) return;  // a segment or a point
-  if (u.cross(v).squaredNorm() > kFlatSquare * u.squaredNorm() * v.squaredNorm() ||
-      hasArea(a, b, c))
-    return;
-  (isOfB && !m_pair.self() ? m_out.facts.degenerateB : m_out.facts.degenerateA).push_back(triangle);
-}
-
-void StepCheck::recordEdges(const Segment& p, const Segment& q) {
-  const auto recordIfDegenerate = [](const TriangleMesh& mesh, const Segment& edge, auto& list) {
-    if (mesh.topology.hasFaces() && mesh.now[edge[0]] == mesh.now[edge[1]])
-      list.push_back(mesh.topology.edgeTriangles[mesh.topology.edgeOf(edge)].front());
-  };
-  recordIfDegenerate(m_pair.a, p, m_out.facts.degenerateA);
-  recordIfDegenerate(m_pair.b, q,
-                     m_pair.self() ? m_out.facts.degenerateA : m_out.facts.degenerateB);
 }
 
 template void StepCheck::recordImpact(const Features<Kind::VertexTriangle>&, std::uint32_t,

@@ -61,11 +61,6 @@ class StepCheck {
   void recordImpact(const Features<kind>&, std::uint32_t firstId, std::uint32_t secondId,
                     double time, double distance);
 
-  /// Records the triangle of a contact if it has no area.
-  void recordTriangle(std::uint32_t triangle, bool isOfB, const Eigen::Vector3d& a,
-                      const Eigen::Vector3d& b, const Eigen::Vector3d& c);
-  void recordEdges(const Segment& p, const Segment& q);
-
  private:
   /// L: features further apart at the step's end did not touch in the step.
   double touchDistance() const {

@@ -7,10 +7,11 @@
 #include "Search/JobScratch.h"
 #include "Search/Question.h"
 #include "NarrowPhase/NarrowPhase.h"
-#include "Contact/FirstImpacts.h"
-#include "Contact/Order.h"
-#include "NarrowPhase/Piercing.h"
 #include "Contact/DistinctShapeContacts.h"
+#include "Contact/FirstImpacts.h"
+#include "Contact/KnownSides.h"
+#include "Contact/Order.h"
+#include "Contact/Piercing.h"
 #include "Core/Buffer.h"
 
 #include <cstddef>

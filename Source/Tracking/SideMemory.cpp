@@ -2,7 +2,7 @@
 
 #include "Contact/Filters.h"
 #include "NarrowPhase/Proximity.h"
-#include "Tracking/SmoothNormals.h"
+#include "Contact/SmoothNormals.h"
 #include "Contact/ContactLists.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"

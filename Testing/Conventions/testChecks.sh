@@ -8,7 +8,7 @@ trap 'rm -rf "$tree"' EXIT
 missed=0
 
 # A tree with every module, without faults.
-for module in Core Math Mesh Shapes Octree NarrowPhase CollisionDetection Adapters/MeshFiles Adapters/Vtk Adapters/Fcl Adapters/iMSTK \
+for module in Core Math Mesh Shapes Contact Octree NarrowPhase CollisionDetection Diagnostics Adapters/MeshFiles Adapters/Vtk Adapters/Fcl Adapters/iMSTK \
   Public/palpate Adapters/Vtk/Public/palpate/vtk; do
   mkdir -p "$tree/Source/$module"
 done
@@ -45,6 +45,8 @@ plant Includes Source/Octree/A.cpp '#include "Mesh/TriangleMesh.h"\n'
 plant Includes Source/NarrowPhase/A.h '#include "Octree/Pool.h"\n'
 plant Includes Source/Mesh/A.h '#include "Shapes/Shape.h"\n'
 plant Includes Source/Shapes/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
+plant Includes Source/Contact/A.h '#include "NarrowPhase/NarrowPhase.h"\n'
+plant Includes Source/Diagnostics/A.h '#include "Contact/FirstImpacts.h"\n'
 plant Includes Source/Adapters/MeshFiles/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Adapters/Vtk/A.cpp '#include "Core/Buffer.h"\n'
 plant Includes Source/Adapters/iMSTK/A.cpp '#include "Core/Buffer.h"\n'

@@ -10,7 +10,7 @@ import pathlib
 import re
 import sys
 
-CHECKED = ("Math", "Octree", "NarrowPhase")
+CHECKED = ("Math", "Octree", "Contact", "NarrowPhase")
 root = pathlib.Path(__file__).resolve().parents[2]
 page = root / "Docs/Notes/Coverage.md"
 

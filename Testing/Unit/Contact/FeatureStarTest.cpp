@@ -1,4 +1,4 @@
-#include "NarrowPhase/FeatureStar.h"
+#include "Contact/FeatureStar.h"
 
 #include "Common/FieldMeshes.h"
 #include "Common/Sanitized.h"

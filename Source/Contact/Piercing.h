@@ -1,6 +1,7 @@
 #pragma once
 
-#include "NarrowPhase/NarrowPhase.h"
+#include "Contact/ContactBuffers.h"
+#include "Contact/MeshPair.h"
 #include "Math/TriangleIntersection.h"
 #include "Core/Buffer.h"
 
@@ -12,7 +13,6 @@
 #include <functional>
 #include <initializer_list>
 #include <span>
-#include <utility>
 
 namespace palpate {
 
@@ -47,7 +47,8 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          by rounding, the first one, and then the nearest. Triangles whose boxes are at most 1.5
 ///          times the first exit distance from the vertex must connect the feature with one that
 ///          such an edge crosses: the vertex does not leave through another sheet.
-/// Pairs    triangles that pierce each other have the contact of Intersection.h, unless an end of
+/// Pairs    triangles that pierce each other have the contact of IntersectionContacts.h, unless an
+/// end of
 ///          one of the crossing edges is behind: that end's contact then stands for the pair.
 /// Ridges   the convex edges at the corners of a crossed triangle. An edge is below the nearest one
 ///          that it has crossed, if both closest points are between the ends.
@@ -114,56 +115,6 @@ class PiercingContacts {
   Buffer<EdgeCrossing> m_crossings;
   Buffer<Behind> m_behind;
   Scratch m_scratch;
-};
-
-/// Auto, in a step that begins in intersection: what Intersection's contacts tell about the sides
-/// of other contacts.
-///
-/// Sides    a vertex that is behind the other surface leaves it along the normal of its contact
-///          with a negative distance. A contact is on the wrong side if it moves the vertices of
-///          its closest points against that, by the weighted sum.
-/// Rule     (1) Of vertices that are behind at the step's end: Contacts::Distinct drops all other
-///          contacts of these vertices, because Intersection's contact stands for them.
-///          Contacts::All turns those that are on the wrong side: the normal is reversed and the
-///          distance becomes negative.
-///          (2) Of vertices that are behind at the step's start and not at its end, which leave:
-///          an impact on the wrong side is turned. Contacts::Distinct drops impacts of a vertex
-///          for which another one stands: one in which the vertex meets a triangle, and other
-///          vertices that leave do not disagree.
-///          (3) Of vertices whose edges cross nothing: each that is next to one of (1) or (2), or
-///          to another one of these, and whose own contact is below the surface, is behind as
-///          well. This contact, at the end or an impact, is turned, and those of its edges are
-///          that are on the wrong side.
-class KnownSides {
- public:
-  /// atEnd, atStart: Intersection's contacts.
-  void apply(const MeshPair&, std::span<ContactBuffers* const> atEnd, const ContactBuffers& atStart,
-             std::span<ContactBuffers* const> others);
-
- private:
-  struct Side {
-    bool ofB;
-    std::uint32_t vertex, triangle;
-    Eigen::Vector3d outward;
-    bool isRepresented;  ///< an impact stands for the vertex
-    bool isReached;      ///< by edges from a vertex behind
-  };
-  /// What the sides of a contact's vertices say about it.
-  struct Opinion {
-    bool isKnown = false, isRepresented = false;
-    double agreement = 0.0;  ///< negative: the contact is on the wrong side
-  };
-  static void add(const ContactBuffers&, Buffer<Side>&);
-  static void sort(Buffer<Side>&);
-  void findBeside(const MeshPair&, bool atStart, std::span<ContactBuffers* const> others,
-                  Buffer<Side>& known, Buffer<Side>& beside);
-  static std::span<Side> sidesOf(Buffer<Side>& sorted, bool ofB, std::uint32_t vertex);
-  static Opinion ask(Buffer<Side>& sorted, const Stencil&, const std::array<bool, 4>& ofB,
-                     const Eigen::Vector3d& normal);
-
-  Buffer<Side> m_atEnd, m_atStart;
-  Buffer<Side> m_besideAtEnd, m_besideAtStart;
-  Buffer<std::pair<bool, std::uint32_t>> m_reached;  ///< scratch: vertices, and whether of b
 };
 
 }  // namespace palpate

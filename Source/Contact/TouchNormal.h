@@ -1,7 +1,8 @@
 #pragma once
 
-#include "NarrowPhase/Continuous.h"
-#include "NarrowPhase/Proximity.h"
+#include "Contact/ContactBuffers.h"
+#include "Contact/MeshFeature.h"
+#include "Contact/MeshPair.h"
 
 #include <Eigen/Core>
 
@@ -57,5 +58,12 @@ inline void turnToSeparate(const Features<ImpactQuery::Kind::EdgeEdge>& of, std:
   measured.normal =
       touchNormal(of, edgeA, edgeB, holders, 1.0, measured.normal, exactDecisions).direction;
 }
+
+/// Appends the contact of features that were measured at the step's end, with the normal that
+/// separates them. swapped: the vertex is of MeshPair::b. radii: L, both at the closest points.
+void addAtEnd(const MeshPair&, std::uint32_t vertex, std::uint32_t triangle, bool swapped,
+              VertexTriangleDistance measured, double radii, ContactBuffers& out);
+void addAtEnd(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, EdgeEdgeDistance measured,
+              ContactBuffers& out);
 
 }  // namespace palpate

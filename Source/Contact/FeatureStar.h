@@ -1,6 +1,7 @@
 #pragma once
 
-#include "NarrowPhase/NarrowPhase.h"
+#include "Contact/MeshFeature.h"
+#include "Math/TriangleIntersection.h"
 #include "Exact/Predicates.h"
 
 #include <cstdint>
@@ -27,7 +28,6 @@ class FeatureStar {
   bool hasInside(const Eigen::Vector3d& p) const;
 
  private:
-  std::span<const std::uint32_t> triangles() const;
   /// A triangle's corners in its own order, beginning with the vertex or with the edge.
   Corners from(std::uint32_t triangle) const;
   bool isInWedge(const Eigen::Vector3d& p) const;

@@ -1,4 +1,4 @@
-#include "NarrowPhase/TouchNormal.h"
+#include "Contact/TouchNormal.h"
 
 #include "Math/ClosestPoint.h"
 #include "Math/Foot.h"
@@ -112,9 +112,7 @@ class Star {
       f(topology.elements[m_feature.id]);
       return;
     }
-    const IndexLists& lists = m_feature.kind == MeshFeature::Kind::Vertex ? topology.vertexTriangles
-                                                                          : topology.edgeTriangles;
-    const auto around = lists[m_feature.id];
+    const auto around = holdersOf(topology, m_feature);
     const std::size_t stride = around.size() > most ? around.size() / most + 1 : 1;
     for (std::size_t i = 0; i < around.size(); i += stride)
       if (f(topology.elements[around[i]])) return;
@@ -289,5 +287,27 @@ template TouchNormal touchNormal(const Features<Kind::VertexTriangle>&, std::uin
 template TouchNormal touchNormal(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
                                  const std::array<MeshFeature, 2>&, double, const Vector3d&,
                                  std::size_t&);
+
+void addAtEnd(const MeshPair& pair, std::uint32_t vertex, std::uint32_t triangle, bool swapped,
+              VertexTriangleDistance measured, double radii, ContactBuffers& out) {
+  const Features<Kind::VertexTriangle> features{pair.meshOf(swapped), pair.meshOf(!swapped)};
+  const Triangle& corners = features.second.topology.elements[triangle];
+  const Positions& at = features.second.now;
+  out.facts.recordTriangle(pair, triangle, !swapped, at[corners[0]], at[corners[1]],
+                           at[corners[2]]);
+  turnToSeparate(features, vertex, triangle, measured, out.exactDecisions);
+  auto& list = out.ofVertex(pair, swapped);
+  list.push_back(contactOf(vertex, triangle, corners, measured));
+  list.back().distance -= radii;
+}
+
+void addAtEnd(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+              EdgeEdgeDistance measured, ContactBuffers& out) {
+  const Segment &p = pair.a.topology.edges[edgeA], &q = pair.b.topology.edges[edgeB];
+  out.facts.recordEdges(pair, p, q);
+  turnToSeparate(Features<Kind::EdgeEdge>{pair.a, pair.b}, edgeA, edgeB, measured,
+                 out.exactDecisions);
+  out.edgeEdge.push_back(contactOf(p, q, measured));
+}
 
 }  // namespace palpate

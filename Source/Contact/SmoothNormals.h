@@ -1,6 +1,7 @@
 #pragma once
 
-#include "NarrowPhase/NarrowPhase.h"
+#include "Contact/Contents.h"
+#include "Contact/MeshPair.h"
 #include "Core/Threads.h"
 
 #include <Eigen/Core>

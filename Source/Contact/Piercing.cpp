@@ -1,11 +1,8 @@
-#include "NarrowPhase/Piercing.h"
+#include "Contact/Piercing.h"
 
-#include "NarrowPhase/FeatureStar.h"
+#include "Contact/FeatureStar.h"
 #include "Contact/Filters.h"
-#include "NarrowPhase/Intersection.h"
-#include "NarrowPhase/Proximity.h"
-#include "NarrowPhase/StepCheck.h"
-#include "Contact/ContactLists.h"
+#include "Contact/IntersectionContacts.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/StableLength.h"
@@ -246,10 +243,11 @@ class NearestInFront {
   void walk() {
     for (bool isNearer = true; isNearer;) {
       isNearer = false;
-      for (const std::uint32_t t : holders(feature())) isNearer |= isAllowed(t) && enter(t);
+      for (const std::uint32_t t : holdersOf(m_mesh.topology, feature()))
+        isNearer |= isAllowed(t) && enter(t);
     }
     const MeshFeature last = feature();
-    for (const std::uint32_t t : holders(last)) {
+    for (const std::uint32_t t : holdersOf(m_mesh.topology, last)) {
       if (t >= m_triangle) return;
       if (!isAllowed(t)) continue;
       const VertexTriangleDistance found = measure(t);
@@ -303,17 +301,6 @@ class NearestInFront {
 
  private:
   MeshFeature feature() const { return featureOf(m_mesh.topology, m_triangle, m_nearest.feature); }
-  std::span<const std::uint32_t> holders(const MeshFeature& feature) const {
-    switch (feature.kind) {
-      case MeshFeature::Kind::Vertex:
-        return m_mesh.topology.vertexTriangles[feature.id];
-      case MeshFeature::Kind::Edge:
-        return m_mesh.topology.edgeTriangles[feature.id];
-      case MeshFeature::Kind::Face:
-        break;
-    }
-    return {};
-  }
   /// From the vertex to where its edges cross the surface.
   void findCrossings(std::span<const PiercingContacts::Behind> crossings,
                      Buffer<Eigen::Vector3d>& found) const {
@@ -401,7 +388,7 @@ class NearestInFront {
     return std::isnormal(limitSquared) && (1.0 - 0x1p-20) * height * height >= limitSquared;
   }
   bool goesOn() const {
-    const auto around = holders(feature());
+    const auto around = holdersOf(m_mesh.topology, feature());
     return std::any_of(around.begin(), around.end(), [&](std::uint32_t t) {
       return measure(t).distance < m_nearest.distance && isAllowed(t);
     });
@@ -513,7 +500,6 @@ bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t ed
 }
 
 void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
-  StepCheck check(pair, out);
   for (auto first = m_behind.begin(); first != m_behind.end();) {
     const bool ofB = first->ofB;
     const std::uint32_t vertex = first->vertex;
@@ -529,7 +515,7 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
     if (!atStart) {
       if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;
       const auto [a, b, c] = nearest.corners();
-      check.recordTriangle(nearest.triangle(), !ofB, a, b, c);
+      out.facts.recordTriangle(pair, nearest.triangle(), !ofB, a, b, c);
     }
     const VertexTriangleContact contact = nearest.contact();
     (ofB ? out.triangleVertex : out.vertexTriangle).push_back(contact);
@@ -627,155 +613,6 @@ bool PiercingContacts::addBelow(const MeshPair& pair, const PiercedPair& pierced
   addOf(false, pierced.triangles.a, pierced.edgesOfA, pierced.triangles.b);
   addOf(true, pierced.triangles.b, pierced.edgesOfB, pierced.triangles.a);
   return any;
-}
-
-void KnownSides::add(const ContactBuffers& found, Buffer<Side>& sides) {
-  for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
-    for (const VertexTriangleContact& c : *list)
-      if (c.distance < 0.0)
-        sides.push_back(
-            {list == &found.triangleVertex, c.vertex, c.triangle, c.normal, false, false});
-}
-
-void KnownSides::sort(Buffer<Side>& sides) {
-  std::sort(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
-    return std::tie(l.ofB, l.vertex, l.triangle) < std::tie(r.ofB, r.vertex, r.triangle);
-  });
-  const auto last = std::unique(sides.begin(), sides.end(), [](const Side& l, const Side& r) {
-    return std::tie(l.ofB, l.vertex, l.triangle) == std::tie(r.ofB, r.vertex, r.triangle);
-  });
-  sides.erase(last, sides.end());
-}
-
-std::span<KnownSides::Side> KnownSides::sidesOf(Buffer<Side>& sides, bool ofB,
-                                                std::uint32_t vertex) {
-  const auto isBefore = [&](const Side& side) {
-    return std::tie(side.ofB, side.vertex) < std::tie(ofB, vertex);
-  };
-  const auto first = std::partition_point(sides.begin(), sides.end(), isBefore);
-  return {first, std::find_if(first, sides.end(), [&](const Side& side) {
-            return side.ofB != ofB || side.vertex != vertex;
-          })};
-}
-
-void KnownSides::findBeside(const MeshPair& pair, bool atStart,
-                            std::span<ContactBuffers* const> others, Buffer<Side>& known,
-                            Buffer<Side>& beside) {
-  beside.clear();
-  m_reached.clear();
-  if (known.empty()) return;
-  for (const ContactBuffers* found : others)
-    for (const auto* list : {&found->vertexTriangle, &found->triangleVertex}) {
-      const bool ofB = list == &found->triangleVertex;
-      const TriangleMesh& surface = ofB || pair.self() ? pair.a : pair.b;
-      for (const VertexTriangleContact& c : *list)
-        if ((c.timeOfImpact < 1.0) == atStart && sidesOf(known, ofB, c.vertex).empty() &&
-            liesBelow(surface, featureOf(surface.topology, c.triangle, c.feature), c.normal,
-                      c.timeOfImpact) &&
-            (atStart ||
-             sideOf(cornersOf(c.vertices, surface.now), (ofB ? pair.b : pair.a).now[c.vertex]) < 0))
-          beside.push_back({ofB, c.vertex, c.triangle, -c.normal, false, false});
-    }
-  if (beside.empty()) return;
-  sort(beside);
-  for (const Side& side : known) m_reached.push_back({side.ofB, side.vertex});
-  while (!m_reached.empty()) {
-    const auto [ofB, vertex] = m_reached.back();
-    m_reached.pop_back();
-    const MeshTopology& topology = (ofB ? pair.b : pair.a).topology;
-    for (const std::uint32_t t : topology.vertexTriangles[vertex])
-      for (const std::uint32_t next : topology.elements[t]) {
-        const std::span<Side> sides = sidesOf(beside, ofB, next);
-        if (sides.empty() || sides.front().isReached) continue;
-        for (Side& side : sides) side.isReached = true;
-        m_reached.push_back({ofB, next});
-      }
-  }
-  std::erase_if(beside, [](const Side& side) { return !side.isReached; });
-}
-
-KnownSides::Opinion KnownSides::ask(Buffer<Side>& sides, const Stencil& stencil,
-                                    const std::array<bool, 4>& ofB, const Eigen::Vector3d& normal) {
-  Opinion opinion;
-  for (int i = 0; i < 4; ++i) {
-    if (stencil.weights[i] == 0.0) continue;
-    for (const Side& side : sidesOf(sides, ofB[i], stencil.vertices[i])) {
-      opinion.isKnown = true;
-      opinion.isRepresented |= side.isRepresented;
-      opinion.agreement += stencil.weights[i] * normal.dot(side.outward);
-    }
-  }
-  return opinion;
-}
-
-void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> atEnd,
-                       const ContactBuffers& atStart, std::span<ContactBuffers* const> others) {
-  m_atEnd.clear();
-  m_atStart.clear();
-  for (const ContactBuffers* found : atEnd) add(*found, m_atEnd);
-  add(atStart, m_atStart);
-  if (m_atEnd.empty() && m_atStart.empty()) return;
-  sort(m_atEnd);
-  sort(m_atStart);
-  findBeside(pair, false, others, m_atEnd, m_besideAtEnd);
-  findBeside(pair, true, others, m_atStart, m_besideAtStart);
-  const bool drops = pair.reportsDistinct(), b = !pair.self();
-  TimeCheck check(32);
-  // ofB: the mesh of each vertex.
-  const auto represents = [&](const auto& contact, const std::array<bool, 4>& ofB) {
-    check();
-    if constexpr (requires { contact.vertex; }) {
-      const Stencil all = stencil(contact), alone{all.vertices, {1.0, 0.0, 0.0, 0.0}};
-      if (contact.timeOfImpact == 1.0 || ask(m_atEnd, all, ofB, contact.normal).isKnown)
-        return false;
-      const Opinion own = ask(m_atStart, alone, ofB, contact.normal);
-      const double rest = ask(m_atStart, all, ofB, contact.normal).agreement - own.agreement;
-      return own.isKnown && own.agreement * rest >= 0.0;
-    }
-    return false;
-  };
-  // Turns a contact, or returns true if it is dropped.
-  const auto settle = [&](auto& contact, const std::array<bool, 4>& ofB) {
-    check();
-    const Stencil vertices = stencil(contact);
-    Opinion opinion = ask(m_atEnd, vertices, ofB, contact.normal);
-    if (drops && opinion.isKnown) return true;
-    const bool isImpact = contact.timeOfImpact < 1.0;
-    if (!opinion.isKnown && isImpact) {
-      opinion = ask(m_atStart, vertices, ofB, contact.normal);
-      if (drops && opinion.isRepresented && !represents(contact, ofB)) return true;
-    }
-    if (!opinion.isKnown) {
-      Buffer<Side>& beside = isImpact ? m_besideAtStart : m_besideAtEnd;
-      if constexpr (requires { contact.vertex; }) {
-        const auto sides = sidesOf(beside, ofB[0], contact.vertex);
-        if (std::any_of(sides.begin(), sides.end(),
-                        [&](const Side& side) { return side.triangle == contact.triangle; }))
-          opinion.agreement = -1.0;
-      } else {
-        opinion = ask(beside, vertices, ofB, contact.normal);
-      }
-    }
-    if (opinion.agreement < 0.0) {
-      turn(contact);
-    }
-    return false;
-  };
-  const std::array<bool, 4> vertexOfA{false, b, b, b}, vertexOfB{b, false, false, false};
-  if (drops)
-    for (const ContactBuffers* found : others) {
-      for (const VertexTriangleContact& c : found->vertexTriangle)
-        if (represents(c, vertexOfA))
-          for (Side& side : sidesOf(m_atStart, false, c.vertex)) side.isRepresented = true;
-      for (const VertexTriangleContact& c : found->triangleVertex)
-        if (represents(c, vertexOfB))
-          for (Side& side : sidesOf(m_atStart, b, c.vertex)) side.isRepresented = true;
-    }
-  for (ContactBuffers* found : others) {
-    std::erase_if(found->vertexTriangle, [&](auto& c) { return settle(c, vertexOfA); });
-    std::erase_if(found->triangleVertex, [&](auto& c) { return settle(c, vertexOfB); });
-    std::erase_if(found->edgeEdge, [&](auto& c) { return settle(c, {false, false, b, b}); });
-  }
 }
 
 }  // namespace palpate

@@ -1,4 +1,4 @@
-#include "NarrowPhase/FeatureStar.h"
+#include "Contact/FeatureStar.h"
 
 #include "Mesh/Corners.h"
 #include "Core/Assert.h"
@@ -19,11 +19,6 @@ FeatureStar::FeatureStar(const TriangleMesh& mesh, bool atStart, const MeshFeatu
   PALPATE_ASSERT(feature.kind != MeshFeature::Kind::Face);
 }
 
-std::span<const std::uint32_t> FeatureStar::triangles() const {
-  return m_feature.kind == MeshFeature::Kind::Edge ? m_topology.edgeTriangles[m_feature.id]
-                                                   : m_topology.vertexTriangles[m_feature.id];
-}
-
 Corners FeatureStar::from(std::uint32_t triangle) const {
   const Triangle& ids = m_topology.elements[triangle];
   int first = 0;
@@ -37,24 +32,25 @@ Corners FeatureStar::from(std::uint32_t triangle) const {
 
 bool FeatureStar::isClosed() const {
   if (m_feature.kind == MeshFeature::Kind::Vertex) return m_topology.hasClosedStar[m_feature.id];
-  const auto around = triangles();
+  const auto around = holdersOf(m_topology, m_feature);
   return around.size() == 2 && from(around[0])[0] == from(around[1])[1] &&
          from(around[0])[1] == from(around[1])[0];
 }
 
 bool FeatureStar::holds(const Vector3d& p) const {
   const bool isVertex = m_feature.kind == MeshFeature::Kind::Vertex;
-  return std::any_of(triangles().begin(), triangles().end(), [&](std::uint32_t triangle) {
-    const auto [a, b, c] = from(triangle);
-    if (orient3d(a, b, c, p, m_counts) != 0) return false;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int turn = orient2d(axis, a, b, c, m_counts);
-      if (turn == 0) continue;
-      return turn * orient2d(axis, a, b, p, m_counts) >= 0 &&
-             (!isVertex || turn * orient2d(axis, a, p, c, m_counts) >= 0);
-    }
-    return false;
-  });
+  return std::any_of(holdersOf(m_topology, m_feature).begin(),
+                     holdersOf(m_topology, m_feature).end(), [&](std::uint32_t triangle) {
+                       const auto [a, b, c] = from(triangle);
+                       if (orient3d(a, b, c, p, m_counts) != 0) return false;
+                       for (int axis = 0; axis < 3; ++axis) {
+                         const int turn = orient2d(axis, a, b, c, m_counts);
+                         if (turn == 0) continue;
+                         return turn * orient2d(axis, a, b, p, m_counts) >= 0 &&
+                                (!isVertex || turn * orient2d(axis, a, p, c, m_counts) >= 0);
+                       }
+                       return false;
+                     });
 }
 
 bool FeatureStar::hasInside(const Vector3d& p) const {
@@ -64,8 +60,8 @@ bool FeatureStar::hasInside(const Vector3d& p) const {
 }
 
 bool FeatureStar::isInWedge(const Vector3d& p) const {
-  const auto [a, b, c] = from(triangles()[0]);
-  const auto [d, e, f] = from(triangles()[1]);
+  const auto [a, b, c] = from(holdersOf(m_topology, m_feature)[0]);
+  const auto [d, e, f] = from(holdersOf(m_topology, m_feature)[1]);
   const bool isBehindFirst = orient3d(a, b, c, p, m_counts) < 0;
   const bool isBehindSecond = orient3d(d, e, f, p, m_counts) < 0;
   const bool isConvex = orient3d(a, b, c, f, m_counts) < 0;
@@ -80,7 +76,7 @@ bool FeatureStar::isInCone(const Vector3d& p) const {
   const auto side = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
     return orient3d(apex, a, b, c, m_counts);
   };
-  const auto around = triangles();
+  const auto around = holdersOf(m_topology, m_feature);
   const auto last = std::find_if(around.begin(), around.end(), [&](std::uint32_t t) {
     const Corners corners = from(t);
     return side(corners[1], corners[2], p) != 0;

@@ -1,4 +1,4 @@
-#include "Tracking/SmoothNormals.h"
+#include "Contact/SmoothNormals.h"
 
 #include "Contact/ContactLists.h"
 #include "Mesh/FaceAtCorner.h"
