@@ -180,6 +180,28 @@ void compare(CountedVector<Contact> expected, std::span<const Contact> allFound,
   for (; f != found.end(); ++f) report(Fault::FalsePositive, {}, *f);
 }
 
+/// compare() for all lists. reporterFor(list): reports faults of a list.
+template <class ReporterFor>
+void compareAll(const CollisionData::Contents& expected, const CollisionData& data,
+                const Coverage& coverage, ReporterFor&& reporterFor) {
+  using List = AuditFailure::List;
+  constexpr std::array kListOf{List::VertexTriangle, List::TriangleVertex, List::EdgeEdge,
+                               List::Shape, List::ShapeShape};
+  const CollisionData::Contents& found = CollisionData::Contents::read(data);
+  const auto compareList = [&](auto kind, const auto& truth) {
+    compare(
+        truth, std::span(contactList<kind()>(found)), [&](const auto& c) { return keyOf(kind, c); },
+        [&](const auto& c) { return coverage.covers(kind, c); },
+        reporterFor(kListOf[static_cast<std::size_t>(kind())]));
+  };
+  forEachMeshList(expected, compareList);
+  compare(
+      expected.intersectingTriangles, data.intersectingTriangles(), std::identity(),
+      [&](const ElementPair& c) { return coverage.covers(c); },
+      reporterFor(List::IntersectingTriangles));
+  forEachShapeList(expected, compareList);
+}
+
 }  // namespace
 
 FeatureLists drawFeatures(const Question& question, const AuditSettings& settings,
@@ -262,21 +284,7 @@ void audit(const Question& question, bool sidesAreKnown, const CollisionData& da
     std::erase_if(expected.shape,
                   [&](const ShapeContact& c) { return !coverage.covers(ContactKind::Shape, c); });
   }
-  constexpr std::array kListOf{List::VertexTriangle, List::TriangleVertex, List::EdgeEdge,
-                               List::Shape, List::ShapeShape};
-  const CollisionData::Contents& found = CollisionData::Contents::read(data);
-  const auto compareList = [&](auto kind, const auto& truth) {
-    compare(
-        truth, std::span(contactList<kind()>(found)), [&](const auto& c) { return keyOf(kind, c); },
-        [&](const auto& c) { return coverage.covers(kind, c); },
-        reporterFor(kListOf[static_cast<std::size_t>(kind())]));
-  };
-  forEachMeshList(expected, compareList);
-  compare(
-      expected.intersectingTriangles, data.intersectingTriangles(), std::identity(),
-      [&](const ElementPair& c) { return coverage.covers(c); },
-      reporterFor(List::IntersectingTriangles));
-  forEachShapeList(expected, compareList);
+  compareAll(expected, data, coverage, reporterFor);
 }
 
 CollisionProblem reducedToPair(const CollisionProblem& whole, GeometryId idA, GeometryId idB) {
