@@ -89,7 +89,7 @@ struct ContactBuffers {
   Buffer<Crossing> passages;              ///< PairSettings::reportCrossings
   Buffer<EdgeCrossing> crossings;         ///< Intersection: of all batches
   Buffer<EdgeCrossing> crossingsAtStart;  ///< Auto, where the step begins in intersection
-  Buffer<PiercedPair> pierced;            ///< the same
+  Buffer<PiercedPair> pierced;            ///< Intersection: triangles that pierce each other
   FeaturePairs features;                  ///< scratch: of the present batch
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch

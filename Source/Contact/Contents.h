@@ -71,16 +71,14 @@ struct CollisionData::Contents : CountedObject {
     CountedVector<double> offsets{};
     /// The row of an impact at the step's end (EndRows).
     struct EndRow {
-      std::uint32_t contact = 0;  ///< its number in vertexTriangle, triangleVertex and edgeEdge
-      Stencil stencil{};          ///< its vertices are on the sides of those of the contact's
+      std::uint32_t contact = 0;  ///< the number of the impact among contacts between meshes
+      Stencil stencil{};          ///< with vertices on the sides that the contact's vertices have
       Eigen::Vector3d normal{};   ///< unit, not smooth
       double gap = 0.0;           ///< L: at the step's end
     };
     CountedVector<EndRow> endRows{};  ///< ascending; of other contacts the row is at their time
   } step{};
 
-  /// Null if `data` has none.
-  static const Contents* in(const CollisionData& data) { return data.m_contents.get(); }
   static bool isIn(const CollisionData& data) { return data.m_contents != nullptr; }
   /// Without contacts if `data` has none.
   static const Contents& read(const CollisionData& data) { return data.read(); }

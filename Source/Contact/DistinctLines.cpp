@@ -31,7 +31,7 @@ bool allEdgesAt(const MeshTopology& topology, const MeshFeature& feature, F&& f)
 }
 
 /// Whether edge pairs report contacts between these features, of the pair's first and second mesh.
-/// They do not report a vertex against a triangle mesh.
+/// Edges report no contact of a vertex with a triangle mesh.
 bool areReportedByEdges(const MeshPair& pair, const std::array<MeshFeature, 2>& features) {
   constexpr auto kVertex = MeshFeature::Kind::Vertex;
   return !(pair.b.topology.hasFaces() && features[0].kind == kVertex) &&

@@ -18,7 +18,7 @@ namespace palpate {
 /// need, the row at the end has the gap of the nearest pair for which it stands. It is that pair's,
 /// if it is one of the same vertex or edges and no element excludes its normal at the end.
 ///
-/// Its scratch remembers its peak.
+/// The scratch remembers its peak.
 class EndRows {
  public:
   using EndRow = CollisionData::Contents::Step::EndRow;

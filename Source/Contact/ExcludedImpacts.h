@@ -169,7 +169,7 @@ class ExcludedImpacts {
   const bool m_haveFaces;
 };
 
-/// Finds the excluded impacts of an answer for which others stand. Its scratch remembers its peak.
+/// Finds the excluded impacts of an answer for which others stand. The scratch remembers its peak.
 class ExcludedSearch {
  public:
   /// Drops them.

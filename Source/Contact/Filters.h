@@ -44,8 +44,8 @@ bool pointsInward(const MeshPair&, const std::array<MeshFeature, 2>& features,
 bool liesBelow(const TriangleMesh&, const MeshFeature&, const Eigen::Vector3d& direction,
                double time = 1.0);
 
-/// The same at the step's end, for features with a measured distance. Features at distance 0 have
-/// no direction, and never point inward.
+/// pointsInward() at the step's end, for features with a measured distance. Features at distance 0
+/// have no direction, and never point inward.
 inline bool pointsInwardAtEnd(const MeshPair& pair, std::uint32_t vertex,
                               const MeshFeature& ofTriangle, const VertexTriangleDistance& measured,
                               bool swapped) {

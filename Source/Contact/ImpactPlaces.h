@@ -4,6 +4,7 @@
 #include "Contact/Contents.h"
 #include "Contact/Order.h"
 #include "Contact/SidedImpact.h"
+#include "Core/Assert.h"
 #include "Core/Buffer.h"
 #include "Core/Stopping.h"
 
