@@ -3,13 +3,15 @@
 #include <palpate/LooseOctree.h>
 #include <palpate/Settings.h>
 
+#include "Bodies/ElementCuts.h"
+#include "Bodies/OctreeSlices.h"
+#include "Bodies/OrderedElements.h"
 #include "Octree/Octree.h"
 #include "Mesh/FloatPositions.h"
 #include "Mesh/PieceMotion.h"
 #include "Mesh/Revision.h"
 #include "Mesh/TriangleMesh.h"
 #include "Mesh/UnfoldedStars.h"
-#include "Core/ReusableMemory.h"
 #include "Core/Buffer.h"
 #include "Core/Threads.h"
 
@@ -74,7 +76,7 @@ class GeometryOctree {
            m_treeVersion.state().topology == topology && m_lastPositions == mesh.now.bodyRevision();
   }
   /// L: no coordinate of a position is further outside of the boxes of its elements.
-  double lag() const { return m_lag; }
+  double lag() const { return m_slices.lag(); }
   /// Whether the octree lacks the further bounds of these settings. Only a placed body has them,
   /// and only if it does not deform in the step.
   bool needsDops(const TriangleMesh&, OctreeBounds) const;
@@ -108,39 +110,10 @@ class GeometryOctree {
   const FloatPoint* floatsAtStart() const {
     return (m_treeSwept ? m_floatsBefore : m_floats).data();
   }
-  /// Cuts between two updates that kept the nodes: Octree::layout() before and after them, and the
-  /// groups, ascending, that hold elements with a vertex of those that they removed or added, or
-  /// held removed ones.
-  struct Cut {
-    std::uint64_t before = 0, after = 0;
-    CountedVector<std::uint32_t> groups;
-  };
-  const Cut& lastCut() const { return m_cut; }
-  /// Finds the pieces of PieceMotion of those ranges of groups again that hold one of `changed`,
-  /// and calls found(i) for each. pieces: of each range. rangeOf(i): its groups, which ascend.
-  /// changed: groups, ascending.
-  template <class RangeOf, class F>
-  void findPiecesAgain(IndexLists& pieces, std::span<const std::uint32_t> changed,
-                       std::size_t vertexCount, RangeOf&& rangeOf, F&& found) const {
-    CountedVector<std::size_t> again;
-    CountedVector<std::pair<std::uint32_t, std::uint32_t>> places;
-    auto group = changed.begin();
-    for (std::size_t i = 0; i < pieces.size() && group != changed.end(); ++i) {
-      const std::pair<std::uint32_t, std::uint32_t> range = rangeOf(i);
-      if (*group >= range.second) continue;
-      while (group != changed.end() && *group < range.second) ++group;
-      again.push_back(i);
-      places.push_back({m_octree.groups()[range.first], m_octree.groups()[range.second]});
-    }
-    const IndexLists now = piecesOf(m_ordered, places, vertexCount);
-    pieces.reserveMore(0, now.itemCount());
-    for (std::size_t i = 0; i < again.size(); ++i) {
-      pieces.replace(again[i], now[i]);
-      found(again[i]);
-    }
-  }
+  /// The cut that the last update followed, if it kept the nodes.
+  const ElementCuts::Cut& lastCut() const { return m_cuts.last(); }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
-  std::span<const Triangle> ordered() const { return m_ordered; }
+  std::span<const Triangle> ordered() const { return m_ordered.triangles(); }
   std::size_t bytesBesidesOctree() const;
 
   // Of the last update:
@@ -156,62 +129,37 @@ class GeometryOctree {
   void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
                     FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
   FloatBox bounds(const TriangleMesh&, const Threads&);
-  void startOrdered(std::size_t size);
-  bool replaceElements(const TriangleMesh&, const OctreeSettings&, bool keepsBoxes);
-  void findGroups();
-  void orderElements(const MeshTopology&, std::span<const Octree::Move>,
-                     std::span<const Octree::Joining>);
   Strategy strategyFor(const TriangleMesh&, double scale, const OctreeSettings&, const Lag&) const;
   void fitWhole(const TriangleMesh&, double scale, const OctreeSettings&, const Threads&,
                 bool keepsOrder);
   void fitChanged(const TriangleMesh&, const Threads&);
   void fitLagging(const TriangleMesh&, const Lag&, const Threads&);
-  void makeSlices(const TriangleMesh&);
-  void measureLooseness();
-  void refit(const TriangleMesh&, std::size_t slice);
   void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
   void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
-  /// Consecutive groups, whose boxes are fitted together.
-  struct Slice {
-    std::uint32_t firstGroup, endGroup;
-    double moved;  ///< L: of a coordinate, at most, since the boxes were fitted; infinity: cut
-  };
+  OctreeSlices::Tree sliced(const TriangleMesh& mesh) {
+    return {mesh, m_ordered.triangles(), m_frame, m_octree};
+  }
 
   FloatFrame m_frame, m_floatsFrame;
   SampledExtent m_sample;  ///< of the positions of the next update
   double m_spread = 0;
   bool m_swept = false, m_treeSwept = false;
   Buffer<FloatPoint> m_floats, m_floatsBefore;
-  std::span<Triangle> m_ordered;   ///< empty during a build
-  ReusableMemory m_orderedMemory;  ///< of m_ordered, or of the keys during a build
+  OrderedElements m_ordered;
   UnfoldedStars m_stars;
   Octree m_octree;
-  Buffer<std::uint32_t> m_boundsGroups;  ///< scratch of a rebuild
-  Buffer<FloatBox> m_boundsBoxes;
+  ElementCuts m_cuts;     ///< unless !m_isBuilt
+  OctreeSlices m_slices;  ///< of Changed and Lagging
   DerivedFrom<State> m_treeVersion;
-  // Of Changed and Lagging:
-  CountedVector<Slice> m_slices;
-  IndexLists m_slicePieces;          ///< of PieceMotion, for each slice
-  std::uint64_t m_slicesLayout = 0;  ///< Octree::layout() of the slices
-  std::size_t m_nextSlice = 0;
-  double m_lag = 0;
-  // Of cuts:
-  CountedVector<std::uint32_t> m_removed;  ///< since the last update; unless !m_isBuilt
-  std::size_t m_elements = 0;              ///< ids below it were known to the last update
-  std::size_t m_replaced = 0;              ///< elements that left or joined since the last build
-  CountedVector<std::uint32_t> m_groupOf;  ///< per element: its group of the octree, or none
-  std::uint64_t m_groupsLayout = 0;        ///< Octree::layout() of m_groupOf
-  Cut m_cut;
-  bool m_isLagging = false, m_isLoose = false;
-  Revision m_lastPositions;    ///< of the last update of any kind
-  std::size_t m_refitted = 0;  ///< slices that Changed fitted since looseness was measured
-  Buffer<Eigen::Vector3d> m_corners;
-  Buffer<FloatPoint> m_cornerFloats;
-  Buffer<Triangle> m_cornerTriangles;
-
+  Revision m_lastPositions;  ///< of the last update of any kind
   std::uint64_t m_updates = 0;
+  bool m_isLagging = false;
   bool m_isBuilt = false;  ///< for the topology of m_treeVersion; the tree can be refitted
+  struct {
+    Buffer<std::uint32_t> groups;
+    Buffer<FloatBox> boxes;
+  } m_bounds;  ///< scratch of a rebuild
 };
 
 }  // namespace palpate

@@ -55,4 +55,29 @@ IndexLists piecesOf(std::span<const Triangle> elements,
                     std::span<const std::pair<std::uint32_t, std::uint32_t>> ranges,
                     std::size_t vertexCount);
 
+/// Finds the pieces of those ranges of groups again that hold one of `changed`, and calls found(i)
+/// for each. groups: the first element of each, and the number of elements. pieces: of each range.
+/// rangeOf(i): its groups, which ascend. changed: groups, ascending.
+template <class RangeOf, class F>
+void findPiecesAgain(std::span<const Triangle> elements, std::span<const std::uint32_t> groups,
+                     std::span<const std::uint32_t> changed, std::size_t vertexCount,
+                     IndexLists& pieces, RangeOf&& rangeOf, F&& found) {
+  CountedVector<std::size_t> again;
+  CountedVector<std::pair<std::uint32_t, std::uint32_t>> places;
+  auto group = changed.begin();
+  for (std::size_t i = 0; i < pieces.size() && group != changed.end(); ++i) {
+    const std::pair<std::uint32_t, std::uint32_t> range = rangeOf(i);
+    if (*group >= range.second) continue;
+    while (group != changed.end() && *group < range.second) ++group;
+    again.push_back(i);
+    places.push_back({groups[range.first], groups[range.second]});
+  }
+  const IndexLists now = piecesOf(elements, places, vertexCount);
+  pieces.reserveMore(0, now.itemCount());
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    pieces.replace(again[i], now[i]);
+    found(again[i]);
+  }
+}
+
 }  // namespace palpate

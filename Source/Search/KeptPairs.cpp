@@ -88,7 +88,7 @@ void KeptPairs::Parts::make(const Body& body) {
 }
 
 bool KeptPairs::Parts::canCut(const Body& body) const {
-  const GeometryOctree::Cut& cut = body.tree.lastCut();
+  const ElementCuts::Cut& cut = body.tree.lastCut();
   return cut.before == layout && cut.after == body.tree.octree().layout();
 }
 
@@ -96,8 +96,9 @@ bool KeptPairs::Parts::canCut(const Body& body) const {
 void KeptPairs::Parts::cut(const Body& body) {
   PALPATE_ASSERT(canCut(body));
   layout = 0;
-  body.tree.findPiecesAgain(
-      pieces, body.tree.lastCut().groups, body.mesh.topology.vertexCount,
+  findPiecesAgain(
+      body.tree.ordered(), body.tree.octree().groups(), body.tree.lastCut().groups,
+      body.mesh.topology.vertexCount, pieces,
       [&](std::size_t part) { return std::pair(groups[part], groups[part + 1]); },
       [&](std::size_t part) { isCut[part] = 1; });
   layout = body.tree.octree().layout();
