@@ -47,6 +47,37 @@ bool isSameBody(const Geometry& geometry, const SavedGeometry& saved) {
          areEqual(given.rest.empty() ? given.now : given.rest, body.mesh.rest);
 }
 
+/// The ends of the step of a geometry whose body is as it was saved.
+GeometryStep::State restoredStep(const SavedGeometry& saved, Geometry& geometry,
+                                 const Threads& threads) {
+  const CollisionProblem::Geometry& given = saved.problem;
+  const Body& body = geometry.body;
+  const std::span<const Eigen::Vector3d> fixed = body.mesh.now.body();
+  const bool hasPositions = !body.shape && !body.isField();
+  const auto end = [&](std::span<const Eigen::Vector3d> positions, std::size_t i,
+                       std::initializer_list<const Positions*> others) {
+    if (hasPositions) checkPositionCount(geometry, positions.size());
+    return geometry.step.positionsOf(geometry, body.mesh,
+                                     {hasPositions ? positions : fixed, saved.poses[i]},
+                                     {others.begin(), others.size()}, threads);
+  };
+  if (!saved.poses[0] && (saved.poses[1] || saved.poses[2]))
+    throw Error(ErrorCode::InvalidTransform, nameOf(geometry) + " is placed before, but not now",
+                body.id);
+  GeometryStep::State step;
+  step.now = end(given.now, 0, {});
+  step.before = end(given.before, 1, {&step.now});
+  step.detected = end(saved.isDetectedOther    ? saved.detected
+                      : saved.isDetectedBefore ? given.before
+                                               : given.now,
+                      2, {&step.now, &step.before});
+  step.isNew = saved.isNew;
+  step.bodyGiven = saved.bodyGiven;
+  step.transformGiven = saved.transformGiven;
+  step.sets = saved.sets;
+  return step;
+}
+
 }  // namespace
 
 std::unique_ptr<Geometry> GeometryTable::make(const SavedGeometry& saved,
@@ -114,30 +145,7 @@ GeometryTable::Restored GeometryTable::restored(const SavedGeometry& saved,
     result.topology->disable(given.disabled);
     result.revisions.elements.enabled = now.counter.next();
   }
-
-  const std::span<const Eigen::Vector3d> fixed = body.mesh.now.body();
-  const bool hasPositions = !body.shape && !body.isField();
-  const auto end = [&](std::span<const Eigen::Vector3d> positions, std::size_t i,
-                       std::initializer_list<const Positions*> others) {
-    if (hasPositions) checkPositionCount(geometry, positions.size());
-    return geometry.step.positionsOf(geometry, body.mesh,
-                                     {hasPositions ? positions : fixed, saved.poses[i]},
-                                     {others.begin(), others.size()}, threads);
-  };
-  if (!saved.poses[0] && (saved.poses[1] || saved.poses[2]))
-    throw Error(ErrorCode::InvalidTransform, nameOf(geometry) + " is placed before, but not now",
-                body.id);
-  GeometryStep::State& step = result.step;
-  step.now = end(given.now, 0, {});
-  step.before = end(given.before, 1, {&step.now});
-  step.detected = end(saved.isDetectedOther    ? saved.detected
-                      : saved.isDetectedBefore ? given.before
-                                               : given.now,
-                      2, {&step.now, &step.before});
-  step.isNew = saved.isNew;
-  step.bodyGiven = saved.bodyGiven;
-  step.transformGiven = saved.transformGiven;
-  step.sets = saved.sets;
+  result.step = restoredStep(saved, geometry, threads);
   if (!saved.freeMotion.empty() && saved.freeMotion.size() != geometry.freeMotionCount())
     throw Error(ErrorCode::InvalidSettings,
                 nameOf(geometry) + ": the number of free motions is wrong", body.id);

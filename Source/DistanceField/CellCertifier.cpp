@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 namespace palpate {
@@ -75,6 +76,33 @@ bool CellCertifier::isPositiveInPlane(const InterpolatedCell& cell, const Vector
   return !m_sign.isInside(cell.centre + (level - middle) * normal, stack);
 }
 
+namespace {
+
+/// Along `normal` the interpolated function rises by 1 per unit of length, and is between `low` and
+/// `high` more than that.
+struct LinearPart {
+  Vector3d normal;
+  double low = kInfinity, high = -kInfinity;  ///< L
+};
+/// Along the gradient at the centre. None if this is far too small for a distance.
+std::optional<LinearPart> linearPartOf(const InterpolatedCell& cell) {
+  const auto& v = cell.values;
+  Vector3d gradient{(v[1] - v[0]) + (v[3] - v[2]) + (v[5] - v[4]) + (v[7] - v[6]),
+                    (v[2] - v[0]) + (v[3] - v[1]) + (v[6] - v[4]) + (v[7] - v[5]),
+                    (v[4] - v[0]) + (v[5] - v[1]) + (v[6] - v[2]) + (v[7] - v[3])};
+  gradient /= 8.0 * cell.halfSide;
+  if (!(gradient.squaredNorm() > 0.25)) return {};
+  LinearPart part{gradient.normalized()};
+  for (std::size_t i = 0; i < 8; ++i) {
+    const double rest = v[i] - part.normal.dot(cornerOf(i, cell.halfSide));
+    part.low = std::min(part.low, rest);
+    part.high = std::max(part.high, rest);
+  }
+  return part;
+}
+
+}  // namespace
+
 bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
                              PointQueryStack& stack) const {
   PALPATE_ASSERT(bound > 0.0 && cell.halfSide > 0.0);
@@ -97,20 +125,9 @@ bool CellCertifier::isWithin(const InterpolatedCell& cell, double bound,
     if (!affine.sides[0].isWanted && !affine.sides[1].isWanted) return true;
   }
 
-  // The gradient of the interpolated function at the centre, and its deviation from a linear one.
-  const auto& v = cell.values;
-  Vector3d gradient{(v[1] - v[0]) + (v[3] - v[2]) + (v[5] - v[4]) + (v[7] - v[6]),
-                    (v[2] - v[0]) + (v[3] - v[1]) + (v[6] - v[4]) + (v[7] - v[5]),
-                    (v[4] - v[0]) + (v[5] - v[1]) + (v[6] - v[2]) + (v[7] - v[3])};
-  gradient /= 8.0 * cell.halfSide;
-  if (!(gradient.squaredNorm() > 0.25)) return false;
-  const Vector3d normal = gradient.normalized();
-  double low = kInfinity, high = -kInfinity;
-  for (std::size_t i = 0; i < 8; ++i) {
-    const double rest = v[i] - normal.dot(cornerOf(i, cell.halfSide));
-    low = std::min(low, rest);
-    high = std::max(high, rest);
-  }
+  const std::optional<LinearPart> linear = linearPartOf(cell);
+  if (!linear) return false;
+  const auto& [normal, low, high] = *linear;
   const FloatFrame& frame = m_geometry.tree.frame();
   const Vector3d centre = (cell.centre - frame.origin) * frame.scale;
   affine.centre = {centre[0], centre[1], centre[2]};

@@ -195,7 +195,26 @@ void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_
   out.error = 0;
   out.answered = out.count = 0;
   out.hits.resize(end - begin);
-  const bool isSigned = m_proxy->isClosed(), isPlaced = points.now.isPlaced();
+  const bool isPlaced = points.now.isPlaced();
+  Block block;
+  for (std::size_t first = begin; first < end; first += kBlockSize) {
+    const std::size_t size = std::min(kBlockSize, end - first);
+    const Vector3d* world = points.now.body().data() + first;
+    if (isPlaced) {
+      out.world.resize(kBlockSize);
+      for (std::size_t i = 0; i < size; ++i) out.world[i] = points.now[first + i];
+      world = out.world.data();
+    }
+    locate(world, size, block);
+    findLeaves(size, byBruteForce, block);
+    addHits(points, static_cast<std::uint32_t>(first), size, block, step, out);
+  }
+}
+
+/// Adds what the leaves of a block answer for its points, of which the first is given.
+void PlacedProxy::addHits(const TriangleMesh& points, std::uint32_t first, std::size_t size,
+                          const Block& block, const ProxyStep* step, ProxyHits& out) const {
+  const bool isSigned = m_proxy->isClosed();
   const double deepest = isSigned          ? -m_proxy->depth()
                          : m_outerSideOnly ? 0.0
                                            : -std::numeric_limits<double>::infinity();
@@ -209,51 +228,39 @@ void PlacedProxy::find(const TriangleMesh& points, std::size_t begin, std::size_
     return motion > 0.0 &&
            !(distance - points.radius(point) > motion + (isSlow ? 0.0 : step->thickness));
   };
-  Block block;
-  for (std::size_t first = begin; first < end; first += kBlockSize) {
-    const std::size_t size = std::min(kBlockSize, end - first);
-    const Vector3d* world = points.now.body().data() + first;
-    if (isPlaced) {
-      out.world.resize(kBlockSize);
-      for (std::size_t i = 0; i < size; ++i) out.world[i] = points.now[first + i];
-      world = out.world.data();
-    }
-    locate(world, size, block);
-    findLeaves(size, byBruteForce, block);
-    for (std::size_t i = 0; i < size; ++i) {
-      const auto point = static_cast<std::uint32_t>(first + i);
-      const std::uint32_t index = block.leaves[i];
-      if (!points.topology.isEnabled(point)) continue;
-      if (index == SurfaceProxy::kNoLeaf) {
-        if (mayHaveImpact(point, m_proxy->depth() - totalError(0.0), true))
-          out.others.push_back(point);
-        continue;
-      }
-      const SurfaceProxy::Leaf& leaf = leaves[index];
-      const double limit = m_thickness + points.radius(point);
-      ++out.answered;
-      if (!leaf.hasPlane()) {
-        const Nearest nearest = nearestAmong(leaf, {block.x[i], block.y[i], block.z[i]});
-        if (mayHaveImpact(point, std::abs(nearest.distance) - totalError(0.0), false)) {
-          out.others.push_back(point);
-        } else if (!nearest.isHidden && nearest.distance <= limit &&
-                   nearest.distance >= -m_proxy->depth()) {
-          out.hits[out.count++] = {
-              point, ProxyHits::kListed | static_cast<std::uint32_t>(out.normals.size()),
-              nearest.distance};
-          out.normals.push_back(nearest.normal);
-        }
-        continue;
-      }
-      const double distance = leaf.distance(block.x[i], block.y[i], block.z[i]);
-      if (mayHaveImpact(point, std::abs(distance) - totalError(leaf.error), false)) {
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto point = static_cast<std::uint32_t>(first + i);
+    const std::uint32_t index = block.leaves[i];
+    if (!points.topology.isEnabled(point)) continue;
+    if (index == SurfaceProxy::kNoLeaf) {
+      if (mayHaveImpact(point, m_proxy->depth() - totalError(0.0), true))
         out.others.push_back(point);
-        continue;
-      }
-      out.error = std::max(out.error, leaf.error);
-      out.hits[out.count] = {point, index, distance};
-      out.count += ((isSigned ? distance : std::abs(distance)) <= limit) & (distance >= deepest);
+      continue;
     }
+    const SurfaceProxy::Leaf& leaf = leaves[index];
+    const double limit = m_thickness + points.radius(point);
+    ++out.answered;
+    if (!leaf.hasPlane()) {
+      const Nearest nearest = nearestAmong(leaf, {block.x[i], block.y[i], block.z[i]});
+      if (mayHaveImpact(point, std::abs(nearest.distance) - totalError(0.0), false)) {
+        out.others.push_back(point);
+      } else if (!nearest.isHidden && nearest.distance <= limit &&
+                 nearest.distance >= -m_proxy->depth()) {
+        out.hits[out.count++] = {
+            point, ProxyHits::kListed | static_cast<std::uint32_t>(out.normals.size()),
+            nearest.distance};
+        out.normals.push_back(nearest.normal);
+      }
+      continue;
+    }
+    const double distance = leaf.distance(block.x[i], block.y[i], block.z[i]);
+    if (mayHaveImpact(point, std::abs(distance) - totalError(leaf.error), false)) {
+      out.others.push_back(point);
+      continue;
+    }
+    out.error = std::max(out.error, leaf.error);
+    out.hits[out.count] = {point, index, distance};
+    out.count += ((isSigned ? distance : std::abs(distance)) <= limit) & (distance >= deepest);
   }
 }
 

@@ -72,6 +72,8 @@ class PlacedProxy {
   struct Block;
   void locate(const Eigen::Vector3d* points, std::size_t size, Block&) const;
   void findLeaves(std::size_t size, bool byBruteForce, Block&) const;
+  void addHits(const TriangleMesh& points, std::uint32_t first, std::size_t size, const Block&,
+               const ProxyStep*, ProxyHits&) const;
   struct Nearest {
     Eigen::Vector3d normal;  ///< in the body's frame
     double distance;         ///< L, signed where sides count

@@ -69,6 +69,38 @@ double nearestBall(const Eigen::Vector3d& x, const Eigen::Vector3d& p, const Eig
   return std::clamp((m.dot(u) / length + height * (change / std::sqrt(room))) / length, 0.0, 1.0);
 }
 
+namespace {
+
+/// Calls f(range) for the parts of a line that are in the cone between two balls, neither of which
+/// is in the other.
+/// direction: of the line, of length 1. m: from the ball at p to the line's start. u: from p to q.
+template <class F>
+void forEachInCone(const Eigen::Vector3d& direction, const Eigen::Vector3d& m,
+                   const Eigen::Vector3d& u, double radiusP, double radiusQ, F&& f) {
+  // At the place w along the axis the cone's radius is (radiusP + taper w) / cosine. It touches
+  // the balls where w is -taper times their radii from their centres.
+  const double axis = u.norm(), change = radiusQ - radiusP;
+  const Eigen::Vector3d e = u / axis;
+  const double taper = change / axis,
+               squareOfCosine = (axis - change) * (axis + change) / (axis * axis);
+  const double slope = direction.dot(e), start = m.dot(e);
+  const double lowest = -taper * radiusP, highest = axis - taper * radiusQ;
+  Range between{-kInfinite, kInfinite};
+  if (slope != 0.0) {
+    between = {(lowest - start) / slope, (highest - start) / slope};
+    if (slope < 0.0) std::swap(between.first, between.last);
+  } else if (!(start >= lowest && start <= highest)) {
+    return;
+  }
+  const Eigen::Vector3d across = direction - slope * e, from = m - start * e;
+  const double radius = radiusP + taper * start, growth = taper * slope;
+  forEachBelow(squareOfCosine * across.squaredNorm() - growth * growth,
+               squareOfCosine * across.dot(from) - radius * growth,
+               squareOfCosine * from.squaredNorm() - radius * radius, between, f);
+}
+
+}  // namespace
+
 std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& p,
                                         const Eigen::Vector3d& q, double radiusP, double radiusQ) {
   PALPATE_ASSERT(radiusP >= 0.0 && radiusQ >= 0.0);
@@ -102,26 +134,7 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   const bool hasCone = room > 0.0;
   if (hasCone || change <= 0.0) addBall(m, radiusP);
   if (hasCone || change > 0.0) addBall(n, radiusQ);
-  if (hasCone) {
-    // At the place w along the axis the cone's radius is (radiusP + taper w) / cosine. It touches
-    // the balls where w is -taper times their radii from their centres.
-    const Eigen::Vector3d e = u / axis;
-    const double taper = change / axis, squareOfCosine = room / (axis * axis);
-    const double slope = d.dot(e), start = m.dot(e);
-    const double lowest = -taper * radiusP, highest = axis - taper * radiusQ;
-    Range between = line;
-    if (slope != 0.0) {
-      between = {(lowest - start) / slope, (highest - start) / slope};
-      if (slope < 0.0) std::swap(between.first, between.last);
-    }
-    if (slope != 0.0 || (start >= lowest && start <= highest)) {
-      const Eigen::Vector3d across = d - slope * e, from = m - start * e;
-      const double radius = radiusP + taper * start, growth = taper * slope;
-      forEachBelow(squareOfCosine * across.squaredNorm() - growth * growth,
-                   squareOfCosine * across.dot(from) - radius * growth,
-                   squareOfCosine * from.squaredNorm() - radius * radius, between, add);
-    }
-  }
+  if (hasCone) forEachInCone(d, m, u, radiusP, radiusQ, add);
 
   const double size = std::abs(shift) + unit * axis + unit * std::max(radiusP, radiusQ);
   const double first = (shift + unit * all.first) / length,
@@ -132,30 +145,12 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
                      first >= ray.tMin};
 }
 
-std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
-                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
-                                        double radius) {
-  PALPATE_ASSERT(radius > 0.0);
-  // The body is convex: it is the union of three capsules and of the prism between the triangle's
-  // two copies at the radius from its plane.
-  std::optional<RayInterval> all;
-  const auto add = [&](const RayInterval& part) {
-    if (!all) {
-      all = part;
-      return;
-    }
-    // A part that holds the ray's own begin or end is the first or last one.
-    all->first = std::min(all->first, part.first);
-    all->frontFace = all->frontFace && part.frontFace;
-    all->last = std::max(all->last, part.last);
-    all->crossing = std::min(all->crossing, part.crossing);
-    all->error = std::max(all->error, part.error);
-  };
-  const Eigen::Vector3d* const corners[] = {&a, &b, &c};
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
-    if (const auto capsule = intersectRay(ray, p, q, radius, radius)) add(*capsule);
-  }
+namespace {
+
+/// Of a ray with the prism between the two copies of a triangle at `radius` from its plane.
+std::optional<RayInterval> intersectPrism(const RaySegment& ray, const Eigen::Vector3d& a,
+                                          const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                          double radius) {
   const double length = stableLength(ray.direction);
   const Eigen::Vector3d d = ray.direction / length;
   const double shift = (a - ray.origin).dot(d);  // s = 0 where the ray is nearest to a
@@ -164,7 +159,8 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
                    std::max({largest(nearest), largest(b - a), largest(c - a), radius})),
                unit = 1.0 / scale;
   const Eigen::Vector3d n = unitCross(a, b, a, c), from = scale * nearest;
-  if (n.isZero(0.0)) return all;
+  if (n.isZero(0.0)) return {};
+  const Eigen::Vector3d* const corners[] = {&a, &b, &c};
   Range inside{-kInfinite, kInfinite};
   const auto clip = [&](double height, double slope, double most) {  // height + s slope <= most
     if (slope > 0.0) {
@@ -195,12 +191,41 @@ std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vect
   clip((from - start - side).dot(side), d.dot(side), 0.0);
   const double first = (shift + unit * inside.first) / length,
                last = (shift + unit * inside.last) / length;
-  if (first <= last && last >= ray.tMin && first <= ray.tMax) {
-    const double size =
-        std::abs(shift) + 2.0 * (largest(b - a) + largest(c - a)) + radius;  // without overflow
-    add({std::max(first, ray.tMin), std::min(last, ray.tMax), kRoundRayError * size / length,
-         std::int8_t{last <= ray.tMax}, first >= ray.tMin});
+  if (!(first <= last) || last < ray.tMin || first > ray.tMax) return {};
+  const double size =
+      std::abs(shift) + 2.0 * (largest(b - a) + largest(c - a)) + radius;  // without overflow
+  return RayInterval{std::max(first, ray.tMin), std::min(last, ray.tMax),
+                     kRoundRayError * size / length, std::int8_t{last <= ray.tMax},
+                     first >= ray.tMin};
+}
+
+}  // namespace
+
+std::optional<RayInterval> intersectRay(const RaySegment& ray, const Eigen::Vector3d& a,
+                                        const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                                        double radius) {
+  PALPATE_ASSERT(radius > 0.0);
+  // The body is convex: it is the union of three capsules and of the prism between the triangle's
+  // two copies at the radius from its plane.
+  std::optional<RayInterval> all;
+  const auto add = [&](const RayInterval& part) {
+    if (!all) {
+      all = part;
+      return;
+    }
+    // A part that holds the ray's own begin or end is the first or last one.
+    all->first = std::min(all->first, part.first);
+    all->frontFace = all->frontFace && part.frontFace;
+    all->last = std::max(all->last, part.last);
+    all->crossing = std::min(all->crossing, part.crossing);
+    all->error = std::max(all->error, part.error);
+  };
+  const Eigen::Vector3d* const corners[] = {&a, &b, &c};
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d &p = *corners[i], &q = *corners[(i + 1) % 3];
+    if (const auto capsule = intersectRay(ray, p, q, radius, radius)) add(*capsule);
   }
+  if (const auto prism = intersectPrism(ray, a, b, c, radius)) add(*prism);
   return all;
 }
 

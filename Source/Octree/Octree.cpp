@@ -27,6 +27,41 @@ double halfArea(const FloatBox& box) {
 
 }  // namespace
 
+/// By how much the begins of ranges move, as a function of where they were.
+class Octree::RangeShifts {
+  struct Shift {
+    std::uint32_t place, by;  ///< modulo 2^32
+  };
+
+ public:
+  /// From this old place on, which ascends, ranges begin so much further behind.
+  void add(std::uint32_t place, std::uint32_t by) { m_shifts.push_back({place, by}); }
+  std::uint32_t firstPlace() const { return m_shifts.front().place; }
+
+  /// Calls with places that are near each other are cheap.
+  class Cursor {
+   public:
+    explicit Cursor(const RangeShifts& shifts)
+        : m_shifts(shifts.m_shifts), m_last(m_shifts.begin()) {}
+    std::uint32_t operator()(std::uint32_t begin) {
+      if (begin < m_shifts.front().place) return begin;
+      if (begin >= m_shifts.back().place) return begin + m_shifts.back().by;
+      if (begin < m_last->place || begin >= (m_last + 1)->place)
+        m_last = std::prev(std::upper_bound(
+            m_shifts.begin(), m_shifts.end(), begin,
+            [](std::uint32_t place, const Shift& behind) { return place < behind.place; }));
+      return begin + m_last->by;
+    }
+
+   private:
+    const CountedVector<Shift>& m_shifts;
+    CountedVector<Shift>::const_iterator m_last;  ///< of the last call
+  };
+
+ private:
+  CountedVector<Shift> m_shifts;
+};
+
 Octree::Octree() = default;
 Octree::~Octree() = default;
 
@@ -167,13 +202,8 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
   m_stage = Stage::Empty;
   m_dops.directions = 3;
   ++m_layout;
-  Buffer<std::uint32_t>& groups = m_nodes.groups;
-  /// From an old place on, ranges begin so much further behind.
-  struct Shift {
-    std::uint32_t place, by;  ///< modulo 2^32
-  };
   CountedVector<Move> moves;
-  CountedVector<Shift> shifts;
+  RangeShifts shifts;
   CountedVector<std::uint32_t> joined, changed;  // new places of joining elements; groups
   std::uint32_t from = 0, to = 0;
   const auto moveUpTo = [&](std::uint32_t end) {
@@ -181,6 +211,7 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
     to += end - from;
     from = end;
   };
+  const Buffer<std::uint32_t>& groups = m_nodes.groups;
   auto gone = places.begin();
   for (auto joins = joining.begin(); joins != joining.end() || gone != places.end();) {
     if (joins != joining.end() && (gone == places.end() || groups[joins->group + 1] <= *gone)) {
@@ -193,7 +224,7 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
       moveUpTo(*gone++);
       ++from;
     }
-    shifts.push_back({from, to - from});
+    shifts.add(from, to - from);
   }
   moveUpTo(static_cast<std::uint32_t>(size()));
 
@@ -211,21 +242,20 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
   for (int k = 0; k < 3 && keepsBoxes; ++k) moveIn(m_boxes.lower[k]), moveIn(m_boxes.upper[k]);
   m_boxes.resize(newSize);
 
+  shiftRanges(shifts, changed);
+  m_stage = keepsBoxes ? Stage::Built : Stage::LaidOut;
+  return moves;
+}
+
+/// Moves the begins of all ranges, brings the sizes of these groups to their nodes, and unlinks
+/// nodes that became empty.
+void Octree::shiftRanges(const RangeShifts& shifts, std::span<const std::uint32_t> changed) {
   // Where any slot begins, also one without own elements, a group begins, or all end. Groups that
   // were empty before begin where the next one does, and none of them is joined.
-  const std::uint32_t first = shifts.front().place, last = shifts.back().place;
-  auto shift = shifts.begin();  // of the last place, which is often near the next one
-  const auto shifted = [&](std::uint32_t begin) {
-    if (begin < first) return begin;
-    if (begin >= last) return begin + shifts.back().by;
-    if (begin < shift->place || begin >= (shift + 1)->place)
-      shift = std::prev(std::upper_bound(
-          shifts.begin(), shifts.end(), begin,
-          [](std::uint32_t place, const Shift& behind) { return place < behind.place; }));
-    return begin + shift->by;
-  };
-  for (auto begin = std::lower_bound(groups.begin(), groups.end(), first); begin != groups.end();
-       ++begin)
+  Buffer<std::uint32_t>& groups = m_nodes.groups;
+  RangeShifts::Cursor shifted(shifts);
+  for (auto begin = std::lower_bound(groups.begin(), groups.end(), shifts.firstPlace());
+       begin != groups.end(); ++begin)
     *begin = shifted(*begin);
   for (std::size_t block = 0; block < m_nodes.pool.used(); ++block)
     for (std::uint32_t& begin : m_nodes.pool[block].begin) begin = shifted(begin);
@@ -237,8 +267,6 @@ CountedVector<Octree::Move> Octree::replace(std::span<const std::uint32_t> place
   }
   for (const std::uint32_t g : changed)
     if (groups[g] == groups[g + 1]) unlinkIfEmpty(m_nodes.groupNodes[g]);
-  m_stage = keepsBoxes ? Stage::Built : Stage::LaidOut;
-  return moves;
 }
 
 void Octree::fit(const Threads& threads) {

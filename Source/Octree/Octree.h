@@ -269,6 +269,8 @@ class Octree {
   enum class Stage { Empty, LaidOut, Built };
   std::uint32_t groupAt(std::uint32_t place) const;
   void unlinkIfEmpty(OctreeNode);
+  class RangeShifts;
+  void shiftRanges(const RangeShifts&, std::span<const std::uint32_t> changed);
   [[noreturn]] static void throwNotBuilt();
 
   Stage m_stage = Stage::Empty;

@@ -148,6 +148,28 @@ bool OuterSurface::holdsPoint(const Vector3d& q, const Vector3d& from, int numbe
   return false;
 }
 
+namespace {
+
+/// The features of two triangles that a common corner makes meet. Calls f(corner of a) for each.
+template <class F>
+ExcludedFeatures commonCorners(const Triangle& a, const Triangle& b, F&& f) {
+  ExcludedFeatures excluded;
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t l = 0; l < 3; ++l) {
+      if (a[k] != b[l]) continue;
+      f(k);
+      excluded.cornersOfA |= static_cast<std::uint8_t>(1u << k);
+      excluded.cornersOfB |= static_cast<std::uint8_t>(1u << l);
+      for (const std::size_t edgeOfA : {k, (k + 2) % 3})
+        for (const std::size_t edgeOfB : {l, (l + 2) % 3})
+          excluded.edges |= static_cast<std::uint16_t>(
+              TriangleIntersection::edgesBit(static_cast<int>(edgeOfA), static_cast<int>(edgeOfB)));
+    }
+  return excluded;
+}
+
+}  // namespace
+
 /// Finds the triangles that have points in common with others, besides common vertices. Triangles
 /// with a common edge have others only if they are in one plane.
 void OuterSurface::findCreases() const {
@@ -160,18 +182,8 @@ void OuterSurface::findCreases() const {
                    &b = m_geometry.mesh.topology.elements[j];
     const Corners ofA = cornersOf(i), ofB = cornersOf(j);
     std::vector<Vector3d> common;
-    ExcludedFeatures excluded;
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t l = 0; l < 3; ++l) {
-        if (a[k] != b[l]) continue;
-        common.push_back(ofA[k]);
-        excluded.cornersOfA |= static_cast<std::uint8_t>(1u << k);
-        excluded.cornersOfB |= static_cast<std::uint8_t>(1u << l);
-        for (const std::size_t edgeOfA : {k, (k + 2) % 3})
-          for (const std::size_t edgeOfB : {l, (l + 2) % 3})
-            excluded.edges |= static_cast<std::uint16_t>(TriangleIntersection::edgesBit(
-                static_cast<int>(edgeOfA), static_cast<int>(edgeOfB)));
-      }
+    const ExcludedFeatures excluded =
+        commonCorners(a, b, [&](std::size_t corner) { common.push_back(ofA[corner]); });
     if (common.size() > 1) return;
     const TriangleIntersection found = intersectTriangles(ofA, ofB, counts, excluded);
     if (!found.intersect()) return;

@@ -19,6 +19,28 @@ namespace palpate {
 
 using Eigen::Vector3d;
 
+namespace {
+
+/// Moves `enter` and `leave` to where a ray enters a box that is grown by `slack`, and leaves it.
+/// Where it does not enter, `leave` is then less.
+void clipTo(const FloatBox& box, double slack, const Vector3d& origin, const Vector3d& direction,
+            double& enter, double& leave) {
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    const double lower = box.lower[at] - slack, upper = box.upper[at] + slack;
+    if (direction[k] == 0.0) {
+      if (origin[k] < lower || origin[k] > upper) leave = -std::numeric_limits<double>::infinity();
+      continue;
+    }
+    const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
+    const double margin = kNearestError * std::max(std::abs(s), std::abs(t));
+    enter = std::max(enter, std::min(s, t) - margin);
+    leave = std::min(leave, std::max(s, t) + margin);
+  }
+}
+
+}  // namespace
+
 RayHits::RayHits(const Body& geometry, const Ray& ray, bool bruteForce, std::vector<Met>& scratch,
                  double radius)
     : m_geometry(geometry),
@@ -73,18 +95,7 @@ bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
     const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
     clipped.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
   }
-  for (int k = 0; k < 3 && !isNear; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const double lower = root.lower[at] - slack, upper = root.upper[at] + slack;
-    if (direction[k] == 0.0) {
-      if (origin[k] < lower || origin[k] > upper) return false;
-      continue;
-    }
-    const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
-    const double margin = kNearestError * std::max(std::abs(s), std::abs(t));
-    enter = std::max(enter, std::min(s, t) - margin);
-    leave = std::min(leave, std::max(s, t) + margin);
-  }
+  if (!isNear) clipTo(root, slack, origin, direction, enter, leave);
   if (!(enter <= leave)) return false;
   m_start = enter;
   clipped.tMax = OutwardRounding::up((leave - enter) * (1.0 + kNearestError));

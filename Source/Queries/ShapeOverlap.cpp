@@ -221,6 +221,24 @@ std::optional<FloatConvex> floatsOf(const Convex& convex, const Body& geometry) 
   return floats;
 }
 
+/// None for a shape that is not round and has no planes of its own.
+std::optional<Convex> convexOf(const AnalyticalGeometry& analytical, const Pose& pose) {
+  Convex convex;
+  if (const auto* box = std::get_if<Box>(&analytical)) return convexOf(*box, pose);
+  if (const auto* sphere = std::get_if<Sphere>(&analytical)) {
+    convex.p = convex.q = pose(sphere->centre);
+    convex.radius = sphere->radius;
+    return convex;
+  }
+  if (const auto* capsule = std::get_if<Capsule>(&analytical)) {
+    convex.p = pose(capsule->p0);
+    convex.q = pose(capsule->p1);
+    convex.radius = capsule->radius;
+    return convex;
+  }
+  return {};
+}
+
 }  // namespace
 
 void findWithin(const Body& geometry, const Vector3d& point, double distance, bool bruteForce,
@@ -254,20 +272,11 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
     if (meets(mesh, mesh.topology.elements[element], *shape)) out.push_back(element);
   };
   std::optional<Convex> convex;
-  if (const auto* sphere = std::get_if<Sphere>(&analytical)) {
-    convex.emplace();
-    convex->p = convex->q = pose(sphere->centre);
-    convex->radius = sphere->radius;
-  } else if (const auto* capsule = std::get_if<Capsule>(&analytical)) {
-    convex.emplace();
-    convex->p = pose(capsule->p0);
-    convex->q = pose(capsule->p1);
-    convex->radius = capsule->radius;
-  } else if (const auto* box = std::get_if<Box>(&analytical)) {
-    convex = convexOf(*box, pose);
-  } else if (std::holds_alternative<ConvexHull>(analytical)) {
+  if (std::holds_alternative<ConvexHull>(analytical)) {
     build();
     convex = convexOf(*shape);
+  } else {
+    convex = convexOf(analytical, pose);
   }
   if (convex && convex->slabCount == 0 && convex->p == convex->q)
     return findWithin(geometry, convex->p, convex->radius, bruteForce, near, out);

@@ -439,36 +439,52 @@ void TranslationSweep::testTriangles(const Task& task) {
 }
 
 /// Edges are widened by kExitWeight, so that nothing passes between triangles.
+namespace {
+
+/// Where a ray meets boxes first.
+class RayToBox {
+ public:
+  RayToBox(const Vector3d& start, const Vector3d& along) : m_start(start) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double slope = along[static_cast<Eigen::Index>(k)];
+      m_inverse[k] = std::abs(slope) > kAlongPlane ? 1.0 / slope : 0.0;
+    }
+  }
+  /// At `end` at the latest, else never.
+  double operator()(const auto& box, double end) const {
+    if (box.lower[0] > box.upper[0]) return kNever;  // no triangles
+    double first = 0, last = end;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double start = m_start[static_cast<Eigen::Index>(k)];
+      const double low = box.lower[k] - kRaySlack - start, high = box.upper[k] + kRaySlack - start;
+      if (m_inverse[k] == 0.0) {
+        if (low > 0 || high < 0) return kNever;
+        continue;
+      }
+      const double atLow = low * m_inverse[k], atHigh = high * m_inverse[k];
+      first = std::max(first, std::min(atLow, atHigh));
+      last = std::min(last, std::max(atLow, atHigh));
+    }
+    return first <= last ? first : kNever;
+  }
+
+ private:
+  Vector3d m_start;
+  std::array<double, 3> m_inverse{};  ///< of the components; 0: along the planes
+};
+
+}  // namespace
+
 std::optional<TranslationSweep::Hit> TranslationSweep::firstHit(bool ofA, std::uint32_t vertex,
                                                                 const Vector3d& direction,
                                                                 double end) const {
   const Side& side = ofA ? m_scratch.b : m_scratch.a;
   const Vector3d p = m_unit * m_pair.vertices(ofA).positions[vertex],
                  along = ofA ? direction : Vector3d(-direction);
+  const RayToBox entryAt(p, along);
   double t = end * m_unit;
   std::uint32_t element = kNoElement;
-  std::array<double, 3> inverse{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double slope = along[static_cast<Eigen::Index>(k)];
-    inverse[k] = std::abs(slope) > kAlongPlane ? 1.0 / slope : 0.0;
-  }
-  // Where the ray meets a box first; at t at the latest, else never.
-  const auto entryOf = [&](const Box& box) {
-    if (box.lower[0] > box.upper[0]) return kNever;  // no triangles
-    double first = 0, last = t;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto i = static_cast<Eigen::Index>(k);
-      const double low = box.lower[k] - kRaySlack - p[i], high = box.upper[k] + kRaySlack - p[i];
-      if (inverse[k] == 0.0) {
-        if (low > 0 || high < 0) return kNever;
-        continue;
-      }
-      const double atLow = low * inverse[k], atHigh = high * inverse[k];
-      first = std::max(first, std::min(atLow, atHigh));
-      last = std::min(last, std::max(atLow, atHigh));
-    }
-    return first <= last ? first : kNever;
-  };
+  const auto entryOf = [&](const Box& box) { return entryAt(box, t); };
   const auto test = [&](std::size_t i) {
     const auto& [a, b, c] = side.corners[i];
     const Vector3d u = b - a, v = c - a, normal = u.cross(v), from = p - a;

@@ -133,6 +133,11 @@ void listFeatures(const StepFacts& facts, bool reportsImpacts, Validity& validit
   take(validity.untrustedVerticesB, facts.verticesB);
 }
 
+/// Whether a distance field proves that the meshes are apart at both ends of the step.
+bool provesApart(const GeometryInStep& a, const GeometryInStep& b, const PairPlan& plan) {
+  return plan.reason == MethodReason::AllowedError && plan.motion > 0.0 && haveTriangles(a, b);
+}
+
 }  // namespace
 
 std::array<Trust::SurfaceState, 2> Trust::statesOf(const GeometryInStep& a, const Positions& ofA,
@@ -235,9 +240,8 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     m_atStart.meeting = facts.atStart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
   }
-  const bool byField = plan.reason == MethodReason::AllowedError;
-  const bool provenApart = byField && plan.motion > 0.0 && haveTriangles(a, b);
-  if (provenApart) {
+  const bool isProvenApart = provesApart(a, b, plan);
+  if (isProvenApart) {
     m_atStart = {};
     m_atStart.meeting = Meeting::Apart;
     m_atStart.version.commit(statesOf(a, a.mesh.before, b, b.mesh.before));
@@ -262,7 +266,17 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   validity.trusted =
       trustedIfStraight && validity.arcDeviation <= settings.thickness && !validity.unwelded;
   validity.sideMayBeWrong = plan.method != Method::Intersection && !validity.trusted;
-  const bool findsImpacts = plan.swept() || plan.step.reportsImpacts;
+  findEnd(settings, plan, facts, meshes, contents, trustedIfStraight, isProvenApart, counts);
+  PALPATE_ASSERT(!m_atEnd.witness || m_atEnd.meeting == Meeting::Piercing);
+  m_atEnd.version.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
+}
+
+/// Determines m_atEnd, but for its version.
+void Trust::findEnd(const PairSettings& settings, const PairPlan& plan, const StepFacts& facts,
+                    const MeshPair& meshes, const CollisionData::Contents& contents,
+                    bool trustedIfStraight, bool isProvenApart, ContactBuffers& counts) {
+  const bool findsImpacts = plan.swept() || plan.step.reportsImpacts,
+             surfacesApart = m_atStart.meeting == Meeting::Apart;
   m_atEnd = {};
   // Intersection measures no distances: meshes that do not intersect may be arbitrarily near.
   m_atEnd.clearance =
@@ -277,9 +291,9 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
     }
     m_atEnd.meeting = found.piercing ? Meeting::Piercing : Meeting::Touching;
     m_atEnd.witness = found.piercing;
-  } else if (byField) {
+  } else if (plan.reason == MethodReason::AllowedError) {
     m_atEnd = m_atStart;
-    m_atEnd.clearance = provenApart ? plan.motion : 0.0;
+    m_atEnd.clearance = isProvenApart ? plan.motion : 0.0;
   } else if (plan.method == Method::Intersection) {
     if (plan.motion == 0.0 && facts.clearance > 0.0) m_atEnd.meeting = Meeting::Apart;
   } else if ((findsImpacts || plan.motion == 0.0 ? surfacesApart : trustedIfStraight) &&
@@ -288,14 +302,12 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
   } else if (plan.motion == 0.0 && m_atStart.meeting == Meeting::Touching) {
     m_atEnd.meeting = Meeting::Touching;
   } else if (plan.step.motion > 0.0 && findsImpacts) {
-    findEnd(plan, facts, meshes, contents, counts);
+    followToEnd(plan, facts, meshes, contents, counts);
   }
-  PALPATE_ASSERT(!m_atEnd.witness || m_atEnd.meeting == Meeting::Piercing);
-  m_atEnd.version.commit(statesOf(a, a.mesh.now, b, b.mesh.now));
 }
 
-void Trust::findEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
-                    const CollisionData::Contents& contents, ContactBuffers& counts) {
+void Trust::followToEnd(const PairPlan& plan, const StepFacts& facts, const MeshPair& meshes,
+                        const CollisionData::Contents& contents, ContactBuffers& counts) {
   m_atEnd.clearance = 0.0;
   // Where Intersection ran, it has tested all pairs, and found none. With restDistance it has not
   // tested pairs that are near at rest.

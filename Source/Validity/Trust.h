@@ -49,9 +49,12 @@ class Trust {
     std::optional<ElementPair> witness;  ///< if Piercing, a pair that does, if known
   };
 
-  /// Determines m_atEnd where bounds on motion do not.
-  void findEnd(const PairPlan&, const StepFacts&, const MeshPair&, const CollisionData::Contents&,
+  void findEnd(const PairSettings&, const PairPlan&, const StepFacts&, const MeshPair&,
+               const CollisionData::Contents&, bool trustedIfStraight, bool isProvenApart,
                ContactBuffers& counts);
+  /// Determines m_atEnd where bounds on motion do not.
+  void followToEnd(const PairPlan&, const StepFacts&, const MeshPair&,
+                   const CollisionData::Contents&, ContactBuffers& counts);
 
   KnownState m_atStart, m_atEnd;  ///< of the step last detected
   DerivedFrom<std::array<ElementsState, 2>> m_topologies;
