@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 
@@ -60,12 +61,14 @@ inline bool isLongRun() {
 
 /// One case of so many runs: of `ordinary` in an ordinary run, which should be a prime number.
 inline std::size_t shareOfCases(int ordinary) {
-  const int share = kShareOfCases > 1 ? kShareOfCases : isLongRun() ? 1 : ordinary;
+  const int share = kShareOfCases > 1 ? std::max(kShareOfCases, ordinary)
+                    : isLongRun()     ? 1
+                                      : ordinary;
   return static_cast<std::size_t>(share);
 }
 inline bool isLeftOut(std::size_t number, int share) { return number % shareOfCases(share) != 0; }
 inline int casesOf(int all, int few) {
-  return kShareOfCases > 1 ? casesOf(all) : isLongRun() ? all : few;
+  return kShareOfCases > 1 ? std::min(casesOf(all), few) : isLongRun() ? all : few;
 }
 inline std::size_t leastOf(std::size_t all, std::size_t ofFew) {
   return isLongRun() ? leastOf(all) : leastOf(ofFew);

@@ -254,7 +254,9 @@ std::vector<SlidingScene> slidingScenes() {
 TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
   std::size_t slides = 0, lasting = 0, ends = 0;
   std::set<std::string> sliding;
+  std::size_t number = 0;
   for (const SlidingScene& scene : slidingScenes()) {
+    if (isLeftOut(number++)) continue;
     SCOPED_TRACE(scene.name + " by " + toString(scene.settings.method));
     std::vector<Settings> settings = octreeSettings();
     settings.resize(static_cast<std::size_t>(casesOf(static_cast<int>(settings.size()))));
@@ -303,10 +305,10 @@ TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
     EXPECT_GT(oracle.lasting, 0u);
     slides += oracle.slides, lasting += oracle.lasting, ends += oracle.ends;
   }
-  EXPECT_GT(slides, 1000u);
-  EXPECT_GT(lasting, 10000u);
-  EXPECT_GT(ends, 1000u);
-  EXPECT_GE(sliding.size(), 7u);
+  EXPECT_GE(slides, leastOf(1000));
+  EXPECT_GE(lasting, leastOf(10000));
+  EXPECT_GE(ends, leastOf(1000));
+  EXPECT_GE(sliding.size(), leastOf(7));
 }
 
 /// A point over a floor, in contact with it when the step ended.

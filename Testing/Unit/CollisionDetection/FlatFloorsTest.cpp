@@ -4,6 +4,7 @@
 
 #include "Common/PairRun.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -180,10 +181,12 @@ TEST(FlatFloors, BentOnesPushNoMoreThanTheGapNeeds) {
                  floorOf(6, 0, [](double x, double y) { return 0.15 * std::sin(x) * std::cos(y); }),
              roof = floorOf(6, 0, [](double x, double) { return -0.3 * std::abs(x); }),
              valley = floorOf(6, 0, [](double x, double) { return 0.3 * std::abs(x); });
+  std::size_t number = 0;
   for (const double length : {0.05, 0.3, 1.0})
     for (const auto& [floor, name] : {std::pair(wave, "wave"), {roof, "roof"}, {valley, "valley"}})
-      expectNoExcess({floor, puck, {-1.5, 0.2, 1}, {length, 0.1 * length, 0}, true},
-                     name + std::string(" step ") + std::to_string(length));
+      if (!isLeftOut(number++))
+        expectNoExcess({floor, puck, {-1.5, 0.2, 1}, {length, 0.1 * length, 0}, true},
+                       name + std::string(" step ") + std::to_string(length));
 }
 
 }  // namespace

@@ -235,6 +235,7 @@ TEST(Rigid, LinesAndPointsMatchSetPositions) {
                      needle = thread(random, 20, 0.2, 0.02, false),
                      tapering = tapered(random, thread(random, 20, 0.2, 0, true), 0.05),
                      smoke = particles(random, 60, 0.02);
+  std::size_t number = 0;
   for (const auto& [body, other] : Pairs{{&tissue, &needle},
                                          {&tissue, &smoke},
                                          {&needle, &tissue},
@@ -246,6 +247,7 @@ TEST(Rigid, LinesAndPointsMatchSetPositions) {
     for (const PairSettings& pair :
          settingsFor(0.02, body->radii.size() == 1 && other->radii.size() == 1))
       for (const Way way : {Way::Small, Way::Large, Way::Far}) {
+        if (isLeftOut(number++)) continue;
         SCOPED_TRACE(::testing::Message() << "kinds " << int(body->type) << int(other->type)
                                           << " method " << int(pair.method) << " way " << int(way));
         expectAsPositions(random, *body, *other, pair, {way, way != Way::Large, way == Way::Large});

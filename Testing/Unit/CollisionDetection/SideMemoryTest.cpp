@@ -336,10 +336,11 @@ struct CrossedThreads : Motion {
 
 TEST(SideMemory, OfThreadsIsThatOfTheHistoryOfCrossings) {
   Random random(3);
-  std::size_t checked = 0, wrong = 0;
+  std::size_t checked = 0, wrong = 0, number = 0;
   for (const bool self : {false, true})
     for (const double radius : {0.0, 0.01})
       for (const std::uint32_t segments : {3u, 8u}) {
+        if (isLeftOut(number++)) continue;
         CrossedThreads scene(random, segments, radius, self);
         OctreeBasedCD collisions;
         const GeometryId a = scene.a.addTo(collisions), b = self ? a : scene.b.addTo(collisions);
@@ -378,8 +379,8 @@ TEST(SideMemory, OfThreadsIsThatOfTheHistoryOfCrossings) {
           scene.advance();
         }
       }
-  EXPECT_GT(checked, 200u);
-  EXPECT_GT(wrong, 50u);
+  EXPECT_GE(checked, leastOf(200));
+  EXPECT_GE(wrong, leastOf(50));
 }
 
 /// A sheet in the plane z = 0, and one point.

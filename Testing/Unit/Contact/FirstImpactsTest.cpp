@@ -399,7 +399,7 @@ TEST(FirstImpacts, MatchTheDefinitionForEveryPairOfGeometryTypes) {
 TEST(FirstImpacts, OfLinesAndPointsOnAFlatFloorHaveItsNormal) {
   Random random(2);
   std::size_t contacts = 0, dropped = 0;
-  for (int run = 0; run < 8; ++run) {
+  for (int run = 0; run < casesOf(8); ++run) {
     TestGeometry floor = testGeometry(sheet(9, 0, 0));
     const double angle = uniform(random, 0, 3);
     const Eigen::Matrix3d turn =
@@ -431,8 +431,8 @@ TEST(FirstImpacts, OfLinesAndPointsOnAFlatFloorHaveItsNormal) {
         }
       }
   }
-  EXPECT_GT(contacts, 500u);
-  EXPECT_GT(dropped, 1000u);
+  EXPECT_GE(contacts, leastOf(500));
+  EXPECT_GE(dropped, leastOf(1000));
 }
 
 /// With equal positions and equal times, all contacts are tied.
@@ -443,14 +443,15 @@ TEST(FirstImpacts, TiesAreBrokenByOrder) {
   for (Vector3d& p : above.positions) p[2] = 1.0;
   Positions landed = above.positions;
   for (Vector3d& p : landed) p[2] = -0.5;
-  std::size_t dropped = 0;
-  for (const double thickness : {0.0, 0.0625, 0.3}) {
+  std::size_t dropped = 0, number = 0;
+  for (const double thickness : {0.0625, 0.0, 0.3}) {
+    if (isLeftOut(number++)) continue;
     dropped +=
         expectFirstImpacts(above, below, {Method::Continuous, thickness}, landed, below.positions);
     dropped +=
         expectFirstImpacts(below, above, {Method::Continuous, thickness}, below.positions, landed);
   }
-  EXPECT_GT(dropped, 1000u);
+  EXPECT_GE(dropped, leastOf(1000));
 }
 
 /// A refused contact does not represent other contacts.
@@ -485,7 +486,7 @@ TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
   Random random(18);
   std::size_t contacts = 0;
   for (std::uint32_t n = 2; n < 6; ++n)
-    for (int run = 0; run < 40; ++run) {
+    for (int run = 0; run < casesOf(40); ++run) {
       const Mesh floor = sheet(n, 0.0, 0.0), above = sheet(n, 0.0, 0.0);
       const double along = uniform(random, -0.3, 0.3), time = uniform(random, 0.2, 0.8);
       std::vector<Eigen::Vector3d> before = above.positions, now = above.positions;
@@ -512,7 +513,7 @@ TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
       for (const auto& c : data.triangleVertex()) add(c, {1, 0, 0, 0});
       for (const auto& c : data.edgeEdge()) add(c, {0, 0, 1, 1});
     }
-  EXPECT_GT(contacts, 500u);
+  EXPECT_GE(contacts, leastOf(500));
 }
 
 }  // namespace

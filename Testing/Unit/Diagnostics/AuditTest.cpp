@@ -389,7 +389,7 @@ TEST(Audit, FindsNoFaultInCorrectFrames) {
                      second = detection.addTriangleMesh(b.positions, b.triangles);
     detection.addCollisionPair(first, second, settings);
     std::vector<Eigen::Vector3d> now = b.positions;
-    for (int frame = 0; frame < 20; ++frame) {
+    for (int frame = 0; frame < testing::casesOf(20); ++frame) {
       for (Eigen::Vector3d& p : now) p.y() += 0.01;
       detection.setPositions(second, now);
       detection.detectCollision();

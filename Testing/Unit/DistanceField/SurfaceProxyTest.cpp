@@ -101,7 +101,9 @@ struct Exact {
 
 TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
   Random random(1);
+  std::size_t number = 0;
   for (const Scene& scene : scenes()) {
+    if (isLeftOut(number++)) continue;
     SCOPED_TRACE(scene.name);
     Exact exact(scene.body);
     const SpatialQueries queries = exact.detection.queries();
@@ -141,7 +143,9 @@ TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
 
 TEST(SurfaceProxy, PlacesWithoutALeafAreBeyondTheReach) {
   Random random(2);
+  std::size_t number = 0;
   for (const Scene& scene : scenes()) {
+    if (isLeftOut(number++)) continue;
     SCOPED_TRACE(scene.name);
     Exact exact(scene.body);
     const SpatialQueries queries = exact.detection.queries();
@@ -212,12 +216,14 @@ TEST(SurfaceProxy, PlanesAnswerAFineMesh) {
 /// Lists hold spheres in floats, which are coarse far from the origin.
 TEST(SurfaceProxy, ListsAnswerExactlyFarFromTheOrigin) {
   Random random(5);
+  std::size_t number = 0;
   for (const double offset : {0.0, 1e3, 1e5, 1e6, 1e8}) {
     SCOPED_TRACE(offset);
     const Eigen::Vector3d centre = offset * Eigen::Vector3d(1.0, -0.7, 0.3);
     for (const auto& [body, half] :
          {std::pair{boxMesh(centre.array() - 1.0, centre.array() + 1.0), 1.0},
           std::pair{sphere(6, 9, centre, 1.0), 0.8}}) {
+      if (isLeftOut(number++)) continue;
       std::vector<Vector3d> points;
       for (int i = 0; i < casesOf(4000); ++i) {
         Vector3d at = randomPoint(random, -1, 1);

@@ -2,6 +2,7 @@
 #include "Exact/ExactVector.h"
 #include "Exact/FilteredSigns.h"
 #include "Exact/Rational.h"
+#include "Common/Sanitized.h"
 #include "Unit/Math/RationalOracle.h"
 #include "Unit/Math/TrianglePairs.h"
 
@@ -293,7 +294,7 @@ TEST(Rational, IntegersOfPositionsAreExactAndShort) {
 TEST(FilteredSigns, DecidedSignsAreThoseOfExactDifferences) {
   Random random(10);
   int decided = 0;
-  for (int repeat = 0; repeat < 200000; ++repeat) {
+  for (int repeat = 0; repeat < testing::casesOf(200000); ++repeat) {
     const int e = repeat % 4 == 0   ? random.between(-545, -490)
                   : repeat % 4 == 1 ? random.between(-200, 500)
                                     : 0;
@@ -318,7 +319,7 @@ TEST(FilteredSigns, DecidedSignsAreThoseOfExactDifferences) {
           (scaledInteger(a[i]) - scaledInteger(b[i])) * (scaledInteger(c[i]) - scaledInteger(d[i]));
     ASSERT_EQ(sign == Sign::Positive, sgn(truth) > 0) << repeat;
   }
-  EXPECT_GT(decided, 1000);
+  EXPECT_GT(decided, 1000 / testing::kShareOfCases);
 }
 
 TEST(FilteredSigns, PerpendicularAxesAreDecided) {

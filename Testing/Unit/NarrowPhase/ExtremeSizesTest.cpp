@@ -79,12 +79,13 @@ std::size_t compare(const Mesh& a, const Mesh& b, double thickness, double scale
 
 TEST(ExtremeSizes, TrianglesAtOnePointNeedNoExactArithmetic) {
   EXPECT_EQ(compare(atOnePoint(14), atOnePoint(9), 0.125, 1.0), 0u);
-  compare(atOnePoint(14), atOnePoint(9), 0.125);
+  if (!kSanitized) compare(atOnePoint(14), atOnePoint(9), 0.125);
 }
 
 TEST(ExtremeSizes, TrianglesAroundOneVertex) {
+  std::size_t number = 0;
   for (const double thickness : {1e-4, 0.05, 0.4})
-    compare(star(isLongRun() ? 80 : 25), star(7), thickness);
+    if (!isLeftOut(number++)) compare(star(isLongRun() ? 80 : 25), star(7), thickness);
 }
 
 /// The number of pairs of a star's triangles that are near each other only at its vertex.

@@ -6,6 +6,7 @@
 #include "Common/ContactRows.h"
 #include "Common/DegenerateCases.h"
 #include "Common/RandomMeshes.h"
+#include "Common/Sanitized.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -147,8 +148,10 @@ TEST(Proximity, ContactsAgreeWithBruteForce) {
     scenes.push_back({"crowds " + std::to_string(i), a, b, 0.02 * (1 + i)});
     scenes.push_back({"crowd " + std::to_string(i), a, {}, 0.03 * (1 + i), true});
   }
+  std::size_t number = 0;
   for (const Scene& scene : scenes)
     for (const Contacts contacts : {Contacts::Distinct, Contacts::All}) {
+      if (isLeftOut(number++)) continue;
       SCOPED_TRACE(scene.name + (contacts == Contacts::All ? ", all" : ", distinct"));
       const TriangleMesh a = meshOf(scene.a), b = meshOf(scene.b);
       EXPECT_GT(expectBruteForce(

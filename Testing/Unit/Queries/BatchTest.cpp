@@ -127,7 +127,7 @@ TEST(Batch, SignedDistancesAreThoseOfSingleCalls) {
         Random random(304);
         for (const InsideRule rule : {InsideRule::Closed, InsideRule::WindingNumber}) {
           if (rule == InsideRule::Closed && !isClosed) continue;
-          for (const std::size_t size : {0, 1, 9, isLongRun() ? 200 : 50}) {
+          for (const std::size_t size : {0, 1, 9, isLongRun() ? 200 : casesOf(50)}) {
             Positions points = pointsFor(random, geometry, size);
             for (std::size_t i = size / 2; i + 1 < size; ++i)  // a path through the surface
               points[i + 1] = points[i] + randomPoint(random, -0.1, 0.1);

@@ -46,11 +46,13 @@ const std::vector<std::function<bool(Cell)>> kBodies = {
 TEST(InsideVertices, MatchTheCellsOfTheBody) {
   constexpr int n = 4;
   Random random(12);
+  std::size_t number = 0;
   for (const auto& filled : kBodies) {
     const Solid solid = cells(n, random, filled);
     const Mesh surface = surfaceMeshOf(solid);
     for (const GeometryType type :
          {GeometryType::Triangles, GeometryType::Lines, GeometryType::Points}) {
+      if (isLeftOut(number++)) continue;
       const TestGeometry points = lattice(type, n, 0.5);
       std::set<std::uint32_t> expected, found;
       for (std::uint32_t v = 0; v < points.positions.size(); ++v)

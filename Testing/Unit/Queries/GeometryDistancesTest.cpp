@@ -92,10 +92,11 @@ void expectNoNearerPoint(Random& random, const TwoBodies& both, const TestGeomet
 TEST(GeometryDistances, AreThoseOfBruteForceAndOfPointsForEveryPairOfTypes) {
   Random random(201);
   const std::vector<TestGeometry> geometries = geometriesOfEveryType(random);
-  std::size_t apart = 0, touching = 0;
+  std::size_t apart = 0, touching = 0, number = 0;
   const auto test = [&](const TestGeometry& a, const auto& b, double radii, const auto& move) {
     TwoBodies both(a, b);
     for (const double most : {3.0, 1.2, 0.5, 0.1, 0.0}) {
+      if (isLeftOut(number++)) continue;
       const Vector3d shift = randomPoint(random, -most, most);
       both.change([&, turn = randomTurn(random), seed = random()](OctreeBasedCD& each) {
         move(each, both.b, turn, shift, seed);
@@ -124,8 +125,8 @@ TEST(GeometryDistances, AreThoseOfBruteForceAndOfPointsForEveryPairOfTypes) {
            });
     if (HasFailure()) return;
   }
-  EXPECT_GT(apart, 300u);
-  EXPECT_GT(touching, 150u);
+  EXPECT_GE(apart, leastOf(300));
+  EXPECT_GE(touching, leastOf(150));
 }
 
 /// No coordinate is exact after a body was placed, or far from the origin.

@@ -391,7 +391,7 @@ TEST(RayHits, AnyMagnitude) {
     for (Vector3d& p : mesh.positions) p *= std::ldexp(1.0, exponent);
     const Both both(mesh);
     std::size_t hits = 0;
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < casesOf(40); ++i) {
       const Vector3d from = onLattice(random, 4), direction = onLattice(random, 4) - from;
       const Ray ray{std::ldexp(1.0, exponent) * onLattice(random, 4),
                     std::ldexp(1.0, ofDirection) * direction};

@@ -151,9 +151,11 @@ TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
       ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}},
       ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}},
       ConvexHull{{{1, 1, 1}}}};
+  std::size_t number = 0;
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j)
       for (int run = 0; run < 6; ++run) {
+        if (isLeftOut(number++)) continue;
         const auto grid = [&] { return static_cast<double>(random() % 5) - 2; };
         const double x = grid(), y = grid(), z = run < 3 ? 0 : grid();
         const PlacedShape a{all[i]},

@@ -1,6 +1,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
+#include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/TestGeometry.h"
 #include "Shapes/Shape.h"
@@ -224,6 +225,7 @@ PairSettings settingsWith(Method method, double thickness) {
 TEST(ShapeScales, ContactsWithElementsAreCorrectAtAnySize) {
   Random random(1);
   std::array<std::size_t, 2> contacts{};
+  std::size_t number = 0;
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
   for (std::size_t s = 0; s < shapes.size(); ++s)
     for (const int type : {0, 1, 2})
@@ -233,6 +235,7 @@ TEST(ShapeScales, ContactsWithElementsAreCorrectAtAnySize) {
         scene.geometry = geometry;
         scene.now = moved(random, geometry.positions, 0.3);
         for (const int scale : kScales) {
+          if (isLeftOut(number++)) continue;
           SCOPED_TRACE("shape " + std::to_string(s) + " by 2^" + std::to_string(scale) +
                        ", method " + std::to_string(static_cast<int>(method)) + ", type " +
                        std::to_string(type));
@@ -240,14 +243,14 @@ TEST(ShapeScales, ContactsWithElementsAreCorrectAtAnySize) {
               expectSame(scene, settingsWith(method, 0.02), std::ldexp(1, scale));
         }
       }
-  EXPECT_GT(contacts[0], 1000u);
-  EXPECT_GT(contacts[1], 1000u);
+  EXPECT_GE(contacts[0], leastOf(1000));
+  EXPECT_GE(contacts[1], leastOf(1000));
 }
 
 TEST(ShapeScales, ContactsBetweenShapesAreCorrectAtAnySize) {
   Random random(2);
   const std::vector<AnalyticalGeometry> shapes = measuredShapes();
-  std::size_t contacts = 0;
+  std::size_t contacts = 0, number = 0;
   for (std::size_t i = 0; i < shapes.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       if (std::holds_alternative<Plane>(shapes[i]) && std::holds_alternative<Plane>(shapes[j]))
@@ -255,6 +258,7 @@ TEST(ShapeScales, ContactsBetweenShapesAreCorrectAtAnySize) {
       const Scene scene{shapes[i], randomMoves(random), shapes[j], randomMoves(random)};
       for (const int scale : kScales)
         for (const Method method : {Method::Proximity, Method::Continuous}) {
+          if (isLeftOut(number++)) continue;
           SCOPED_TRACE("shapes " + std::to_string(i) + " and " + std::to_string(j) + " by 2^" +
                        std::to_string(scale) + ", method " +
                        std::to_string(static_cast<int>(method)));
@@ -262,7 +266,7 @@ TEST(ShapeScales, ContactsBetweenShapesAreCorrectAtAnySize) {
           contacts += expectSame(scene, settingsWith(method, thickness), std::ldexp(1, scale));
         }
     }
-  EXPECT_GT(contacts, 700u);
+  EXPECT_GE(contacts, leastOf(700));
 }
 
 /// Placed 2^996 from the origin, where the last bit of a coordinate is 2^944.
