@@ -134,7 +134,9 @@ class ValidityCost {
                                  &a == &b, candidatesOf(pair), m_possible);
       }
     });
-    return all / static_cast<double>(candidates) * static_cast<double>(looked);
+    // A step may have no candidates although its start had some to look at.
+    if (candidates > 0) m_millisecondsOfOne = all / static_cast<double>(candidates);
+    return m_millisecondsOfOne * static_cast<double>(looked);
   }
   /// The additional work of the narrow phase: its time with validity, less its time without.
   double narrowPhase(const std::pair<std::size_t, std::size_t>& pair) {
@@ -171,6 +173,7 @@ class ValidityCost {
   std::vector<Eigen::Vector3d> m_copy;
   ContactBuffers m_buffers;
   Buffer<PossibleIntersection> m_possible;
+  double m_millisecondsOfOne = 0;  ///< of one candidate that is looked at, in the last such step
 };
 
 }  // namespace
