@@ -24,7 +24,7 @@ from pathlib import Path
 from sites import File
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = ['Exact', 'Math', 'Octree', 'NarrowPhase', 'Queries']
+MODULES = ['Exact', 'Math', 'Octree', 'Contact', 'NarrowPhase', 'Queries']
 KINDS = ['comparison', 'off by one', 'bound', 'sign', 'logic', 'minimum or maximum']
 PER_MODULE = 84  # faults that are planted in each module, before those that do not compile are taken out
 REQUIRED = 300
