@@ -219,7 +219,7 @@ Frame::Context OctreeBasedCD::Implementation::context(FrameStatistics& next, Tra
 void OctreeBasedCD::Implementation::detect(SeparateSearches all) {
   const MemoryScope memory(MemoryStage::Pairs);
   markSkippedOctrees(false);
-  update(UpdateFor::SeparateSearches, [&] {
+  update(UpdateFor::Separate, [&] {
     for (const auto& own : all) expectPlan(*own);
   });
   outdatedSearches.clear();

@@ -131,7 +131,7 @@ struct OctreeBasedCD::Implementation {
   /// Why octrees are updated. The user's explicit call publishes the statistics at once, which then
   /// count as rebuilt or refitted only the trees that it changed. The statistics of a frame include
   /// updates for queries.
-  enum class UpdateFor : std::uint8_t { Queries, User, Frame, SeparateSearches };
+  enum class UpdateFor : std::uint8_t { Queries, User, Frame, Separate };
   /// Updates the octrees. expectPlans(): asks what boxes have to enclose. traced: of a detection,
   /// or null.
   void update(UpdateFor, const std::function<void()>& expectPlans, Trace* traced = nullptr);

@@ -153,9 +153,8 @@ void PairRecord::commit(std::uint64_t step) noexcept {
 }
 
 void PairRecord::linkData() noexcept {
-  using Contents = CollisionData::Contents;
-  if (!Contents::isIn(last.data)) return;
-  Contents& contents = Contents::of(last.data);
+  if (!CollisionData::Contents::isIn(last.data)) return;
+  CollisionData::Contents& contents = CollisionData::Contents::of(last.data);
   contents.step.record = this;
   contents.step.radii = a->body.mesh.largestRadius + b->body.mesh.largestRadius;
   contents.step.timeTolerance = pair.settings.continuous.timeTolerance;

@@ -13,6 +13,7 @@
 #include <limits>
 #include <string>
 #include <system_error>
+#include <utility>
 
 namespace palpate {
 
@@ -121,10 +122,12 @@ class PairCheck {
         Method::Continuous, m_a.body.mesh.topology.type, m_b.body.mesh.topology.type, &m_a == &m_b);
     const bool hasPassages = (method == Method::Auto || method == Method::Continuous) &&
                              !earliestTimeOnly && overStep && overStep->kind == PairKind::Meshes;
-    constexpr const char* kPassages =
-        " is for Method::Auto and Continuous of meshes, lines and points, without earliestTimeOnly";
-    support(!crossings || hasPassages, std::string("reportCrossings") + kPassages);
-    support(!remembers || hasPassages, std::string("rememberSides") + kPassages);
+    for (const auto& [asked, name] :
+         {std::pair(crossings, "reportCrossings"), {remembers, "rememberSides"}})
+      if (asked && !hasPassages)
+        support(false, std::string(name) +
+                           " is for Method::Auto and Continuous of meshes, lines and "
+                           "points, without earliestTimeOnly");
     const bool hasFaces = m_a.body.mesh.topology.hasFaces() || m_b.body.mesh.topology.hasFaces();
     support(
         !smooths || (hasFaces && method != Method::DistanceField && method != Method::Proxy &&
