@@ -330,92 +330,126 @@ std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
   return file.bytes();
 }
 
-void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
-  const std::string name = "the saved state";
-  ArchiveReader file(state, name, kStateTitle, kStateVersion);
-  // What the calls that add geometries and pairs refuse is refused here, too.
-  const auto checked = [&](auto&& call) -> decltype(auto) {
+namespace {
+
+/// Reads a saved state, and changes nothing before it was found to be whole.
+class StateReader {
+ public:
+  StateReader(std::span<const std::byte> state, GeometryTable& geometries, PairTable& formerPairs,
+              const Threads& threads)
+      : pairs(formerPairs.successor()),
+        m_file(state, m_name, kStateTitle, kStateVersion),
+        m_table(geometries),
+        m_formerPairs(formerPairs),
+        m_threads(threads) {
+    m_file.integer(lastId);
+    m_file.integer(stepNumber);
+    m_file.integer(auditFrame);
+    readGeometries();
+    readPairs();
+    describeKnown(
+        m_file, known, [&](const CollisionPair& pair) { return pairs.find(pair.a, pair.b); },
+        [&](const PairRecord& record) { return m_states[record.index]; });
+    describeUnfinished(m_file, statistics);
+    m_file.expectEnd();
+  }
+
+  std::uint32_t lastId = 0;
+  std::uint64_t stepNumber = 0, auditFrame = 0;
+  std::vector<GeometryTable::Restored> geometries;  ///< ascending ids
+  PairTable pairs;
+  std::vector<std::pair<PairRecord*, PairRecord*>> successors;  ///< a former pair, and its own
+  std::vector<FreeMotionSearch::Known> known;
+  FrameStatistics statistics;
+
+ private:
+  /// What the calls that add geometries and pairs refuse is refused here, too.
+  template <class F>
+  decltype(auto) checked(F&& call) {
     try {
       return call();
     } catch (const Error& error) {
       if (error.code() == ErrorCode::MemoryLimit || error.code() == ErrorCode::NotAvailable ||
           error.code() == ErrorCode::File)
         throw;
-      file.fail(error.what());
+      m_file.fail(error.what());
     }
-  };
-  std::uint32_t lastId = 0;
-  std::uint64_t stepNumber = 0, auditFrame = 0;
-  file.integer(lastId);
-  file.integer(stepNumber);
-  file.integer(auditFrame);
-
-  std::size_t count = 0;
-  file.count(count, kGeometryBytes);
-  std::vector<GeometryTable::Restored> all;
-  for (std::size_t i = 0; i < count; ++i) {
-    SavedGeometry saved;
-    describeGeometry(file, saved);
-    const auto id = static_cast<std::uint32_t>(saved.problem.id);
-    file.need(id < lastId && (all.empty() || all.back().geometry->body.id < saved.problem.id),
-              "the id of a geometry is out of order");
-    all.push_back(checked([&] { return geometries.restored(saved, threads); }));
   }
-  const auto find = [&](std::uint32_t id) -> GeometryTable::Restored& {
+  void readGeometries() {
+    std::size_t count = 0;
+    m_file.count(count, kGeometryBytes);
+    for (std::size_t i = 0; i < count; ++i) {
+      SavedGeometry saved;
+      describeGeometry(m_file, saved);
+      const GeometryId id = saved.problem.id;
+      m_file.need(static_cast<std::uint32_t>(id) < lastId &&
+                      (geometries.empty() || geometries.back().geometry->body.id < id),
+                  "the id of a geometry is out of order");
+      geometries.push_back(checked([&] { return m_table.restored(saved, m_threads); }));
+    }
+  }
+  const GeometryTable::Restored& find(std::uint32_t id) {
     const auto found = std::lower_bound(
-        all.begin(), all.end(), GeometryId{id},
+        geometries.begin(), geometries.end(), GeometryId{id},
         [](const auto& restored, GeometryId i) { return restored.geometry->body.id < i; });
-    file.need(found != all.end() && found->geometry->body.id == GeometryId{id},
-              "a pair names a geometry that does not exist");
+    m_file.need(found != geometries.end() && found->geometry->body.id == GeometryId{id},
+                "a pair names a geometry that does not exist");
     return *found;
-  };
-
-  file.count(count, kSavedPairBytes);
-  PairTable restored = pairs.successor();
-  std::vector<std::pair<PairRecord*, PairRecord*>> successors;
-  std::vector<PairStates> states;
-  for (std::size_t i = 0; i < count; ++i) {
+  }
+  void readPairs() {
+    std::size_t count = 0;
+    m_file.count(count, kSavedPairBytes);
+    for (std::size_t i = 0; i < count; ++i) readPair();
+  }
+  void readPair() {
     CollisionProblem::Pair pair{};
-    pairLine(file, pair, kVersion);
+    pairLine(m_file, pair, kVersion);
     const auto &a = find(pair.a), &b = find(pair.b);
-    PairRecord* const same = pairs.find(GeometryId{pair.a}, GeometryId{pair.b});
+    PairRecord* const same = m_formerPairs.find(GeometryId{pair.a}, GeometryId{pair.b});
     PairRecord* const former = a.made || b.made ? nullptr : same;
     PairRecord& record = checked([&]() -> PairRecord& {
-      return restored.add(*a.geometry, *b.geometry, pair.settings, a.step.now.isPlaced(), former,
-                          threads);
+      return pairs.add(*a.geometry, *b.geometry, pair.settings, a.step.now.isPlaced(), former,
+                       m_threads);
     });
     if (pair.predicate) {
       if (!same || !same->filters.predicate)
         throw Error(ErrorCode::NotAvailable,
-                    name + " has no contact predicates: " + nameOf(*record.a, *record.b) +
+                    m_name + " has no contact predicates: " + nameOf(*record.a, *record.b) +
                         " must have the one that it had",
                     record.pair.a);
       checked([&] {
-        restored.setPredicate(geometries, record.pair.a, record.pair.b, same->filters.predicate);
+        pairs.setPredicate(m_table, record.pair.a, record.pair.b, same->filters.predicate);
       });
     }
-    states.push_back({revisionsOf(a), revisionsOf(b)});
-    describePair(file, record, states.back());
+    m_states.push_back({revisionsOf(a), revisionsOf(b)});
+    describePair(m_file, record, m_states.back());
     if (former) successors.emplace_back(former, &record);
   }
-  std::vector<FreeMotionSearch::Known> known;
-  describeKnown(
-      file, known, [&](const CollisionPair& pair) { return restored.find(pair.a, pair.b); },
-      [&](const PairRecord& record) { return states[record.index]; });
-  FrameStatistics next;
-  describeUnfinished(file, next);
-  file.expectEnd();
-  geometries.prepareToRestore(all.size());
-  shownOctrees.trees.reserve(all.size());
-  const bool anyMade =
-      std::any_of(all.begin(), all.end(), [](const auto& each) { return bool{each.made}; });
+
+  const std::string m_name = "the saved state";
+  ArchiveReader m_file;
+  GeometryTable& m_table;
+  PairTable& m_formerPairs;
+  const Threads& m_threads;
+  std::vector<PairStates> m_states;
+};
+
+}  // namespace
+
+void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
+  StateReader read(state, geometries, pairs, threads);
+  FrameStatistics& next = read.statistics;
+  geometries.prepareToRestore(read.geometries.size());
+  shownOctrees.trees.reserve(read.geometries.size());
+  const bool anyMade = std::any_of(read.geometries.begin(), read.geometries.end(),
+                                   [](const auto& each) { return bool{each.made}; });
   auto pool = anyMade ? latestSnapshot.newPool(budget) : nullptr;
 
   // Nothing below throws.
   selectedPairs.clear();
-  for (const auto& [former, record] : successors) record->takeOver(*former);
-  std::swap(pairs, restored);
-  geometries.restore(all, lastId, stepNumber);
+  for (const auto& [former, record] : read.successors) record->takeOver(*former);
+  std::swap(pairs, read.pairs);
+  geometries.restore(read.geometries, read.lastId, read.stepNumber);
   if (pool) latestSnapshot.setPool(std::move(pool));
   for (const auto& record : pairs.records()) {
     record->ask(planWithoutMotion(*record));
@@ -424,9 +458,9 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
     next.contacts += record->found.statistics.contacts;
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
-  freeMotions.known().swap(known);
+  freeMotions.known().swap(read.known);
   audit.failures.clear();
-  audit.frame = auditFrame;
+  audit.frame = read.auditFrame;
   octreesState = 0;
   hasUpdates = false;
   updateOctreeView();
