@@ -69,8 +69,9 @@ class Snapshot::Contents : public SpatialQueries::Source {
   explicit Contents(std::shared_ptr<Pool> scratch) : Source(std::move(scratch)) {}
 
   std::uint64_t state() const override { return m_state.load(std::memory_order_relaxed); }
-  const Body& at(GeometryId id) const override {
-    if (GeometryCopy* const copy = find(id)) return searchable(copy->geometry);
+  const Body& at(GeometryId id) const override { return searchable(body(id)); }
+  const Body& body(GeometryId id) const {
+    if (GeometryCopy* const copy = find(id)) return copy->geometry;
     throw Error(ErrorCode::UnknownGeometry, nameOf(id) + " is not in this snapshot", id);
   }
   std::size_t geometryCount() const override { return m_geometries.size(); }
@@ -271,27 +272,27 @@ std::span<const Eigen::Vector3d> positionsOf(const Body& geometry, const Positio
 }  // namespace
 
 std::span<const Eigen::Vector3d> Snapshot::positions(GeometryId id) const {
-  const Body& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.body(id);
   return positionsOf(geometry, geometry.mesh.now);
 }
 
 std::span<const Eigen::Vector3d> Snapshot::positionsBefore(GeometryId id) const {
-  const Body& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.body(id);
   return positionsOf(geometry, geometry.mesh.before);
 }
 
 std::span<const std::uint32_t> Snapshot::tags(GeometryId id) const {
-  const Body& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.body(id);
   return geometry.solid ? geometry.solid->tags : geometry.mesh.tags;
 }
 
 RigidMotion Snapshot::motion(GeometryId id) const {
-  const TriangleMesh& mesh = m_contents.at(id).mesh;
+  const TriangleMesh& mesh = m_contents.body(id).mesh;
   return {mesh.before.transform(), mesh.now.transform()};
 }
 
 Eigen::Vector3d Snapshot::position(GeometryId id, std::uint32_t vertex, double time) const {
-  const Body& geometry = m_contents.at(id);
+  const Body& geometry = m_contents.body(id);
   checkVertex(geometry, vertex, positionsOf(geometry, geometry.mesh.now).size());
   if (!std::isfinite(time))
     throw Error(ErrorCode::InvalidSettings,

@@ -4,6 +4,7 @@
 
 #include "Queries/SnapshotPool.h"
 
+#include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 
@@ -347,6 +348,27 @@ TEST(Snapshot, HasTheMotionOfItsStep) {
   EXPECT_LT((pose.now(scene.rest[3]) - snapshot->position(scene.body, 3)).norm(), 1e-15);
   expectRefused(ErrorCode::IndexOutOfRange, "vertex 9999",
                 [&] { (void)snapshot->position(scene.ball, 9999); });
+}
+
+/// As OctreeBasedCD, it has positions, motion and tags of a geometry that no query supports.
+TEST(Snapshot, HasDistanceFields) {
+  const Mesh box = cube(0, 1);
+  OctreeBasedCD collisions;
+  const GeometryId field =
+      collisions.addDistanceField(std::make_shared<const DistanceField>(DistanceField::build(
+          {box.positions, box.triangles}, {.errorBound = 0.05, .band = 0.2, .threads = 1})));
+  collisions.setTransform(field, {.translation = {1, 0, 0}});
+  collisions.setTags(field, std::vector<std::uint32_t>{7});
+  collisions.publish();
+  const auto snapshot = collisions.latestSnapshot();
+  EXPECT_TRUE(snapshot->has(field));
+  EXPECT_TRUE(snapshot->positions(field).empty());
+  EXPECT_TRUE(snapshot->positionsBefore(field).empty());
+  EXPECT_EQ(snapshot->motion(field).now.translation, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(snapshot->tags(field)[0], 7u);
+  expectRefused(ErrorCode::UnsupportedMethod, "is a distance field", [&] {
+    snapshot->queries().closestPoint(field, {0, 0, 0});
+  });
 }
 
 TEST(Snapshot, MayOutliveItsOwner) {
