@@ -160,7 +160,8 @@ void fill(OctreeBasedCD& detection, const CollisionProblem& problem) {
     const GeometryId id = ProblemGeometries::add(detection, mesh);
     const bool isField = mesh.type == GeometryType::Field;
     if (!mesh.analytical && !isField) detection.setPositions(id, mesh.before, mesh.now);
-    if (mesh.analytical || mesh.field || mesh.proxy)
+    const bool isPlaced = mesh.motion.before != Pose{} || mesh.motion.now != Pose{};
+    if (isPlaced && (mesh.analytical || mesh.field || mesh.proxy))
       detection.setTransform(id, mesh.motion.before, mesh.motion.now);
     detection.setName(id, mesh.name);
     detection.setCollisionFilter(id, mesh.filter);

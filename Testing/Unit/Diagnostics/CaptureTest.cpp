@@ -206,6 +206,22 @@ TEST_F(Capture, KeepsEveryBit) {
   expectSame(readCapture(file()), CollisionProblem());
 }
 
+/// A problem places no body that nobody placed: a body that moves has no pair with itself.
+TEST_F(Capture, AProblemKeepsAMeshWithAFieldAndAPairWithItself) {
+  const testing::Mesh box = testing::cube(0, 1);
+  OctreeBasedCD collisions;
+  const GeometryId id = testing::addMesh(collisions, box);
+  collisions.attachDistanceField(
+      id, std::make_shared<const DistanceField>(DistanceField::build(
+              {box.positions, box.triangles}, {.errorBound = 0.05, .band = 0.2, .threads = 1})));
+  collisions.addCollisionPair(id, id, {.thickness = 0.1});
+  collisions.detectCollision();
+  OctreeBasedCD again = setUp(collisions.problem());
+  again.detectCollision();
+  EXPECT_EQ(again.collisionData(GeometryId{0}, GeometryId{0}).hash(),
+            collisions.collisionData(id, id).hash());
+}
+
 TEST_F(Capture, RefusesTruncatedFiles) {
   writeCapture(smallProblem(), file());
   const std::string whole = testing::contentOf(file());
