@@ -26,6 +26,7 @@ bool isSearched(const PairRecord& record) {
 }  // namespace
 
 bool FreeMotionSearch::isKnown(const PairTable& pairs) const {
+  if (!m_holds) return false;
   auto known = m_known.begin();
   for (const auto& record : pairs.records()) {
     if (!takesPart(*record)) continue;
@@ -40,6 +41,7 @@ bool FreeMotionSearch::isKnown(const PairTable& pairs) const {
 bool FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pairs, Engine engine,
                             const Threads& threads, JobRunner& jobs) {
   if (isKnown(pairs)) return true;
+  m_holds = false;
   m_known.clear();
   start(geometries, pairs);
   const bool isComplete = endsInTime([&] { search(pairs, engine, threads, jobs); });
@@ -56,6 +58,7 @@ bool FreeMotionSearch::find(const GeometryTable& geometries, const PairTable& pa
   if (allFinished)
     for (const auto& record : pairs.records())
       if (takesPart(*record)) m_known.push_back({record->pair, record->state()});
+  m_holds = allFinished;
   m_isNew = true;
   return isComplete;
 }

@@ -26,8 +26,20 @@ class FreeMotionSearch {
     CollisionPair pair;
     PairState state;
   };
-  std::vector<Known>& known() { return m_known; }
-  const std::vector<Known>& known() const { return m_known; }
+  /// One that is no pair if the results hold for no state.
+  std::vector<Known> known() const {
+    constexpr GeometryId kNone{kNoElement};
+    return m_holds ? m_known : std::vector<Known>{{{kNone, kNone, {}}, {}}};
+  }
+  void restore(std::vector<Known>& known) noexcept {
+    m_known.swap(known);
+    m_holds = true;
+  }
+  void releaseMemory() {
+    const bool holds = m_holds && m_known.empty();
+    *this = FreeMotionSearch();
+    m_holds = holds;
+  }
 
  private:
   bool isKnown(const PairTable&) const;
@@ -35,6 +47,7 @@ class FreeMotionSearch {
   void search(const PairTable&, Engine, const Threads&, JobRunner&);
 
   std::vector<Known> m_known;
+  bool m_holds = true;             ///< the results are those of all known pairs, or of none
   bool m_isNew = false;            ///< commit() has something to commit
   std::vector<Geometry*> m_boxed;  ///< each once
 };

@@ -49,7 +49,7 @@ void OctreeBasedCD::Implementation::countCandidates() {
 void OctreeBasedCD::Implementation::releaseMemory() {
   countCandidates();
   frame = Frame();
-  freeMotions = FreeMotionSearch();
+  freeMotions.releaseMemory();
   unfollowed.clear();
   for (const auto& geometry : geometries.all()) {
     geometry->body.tree.releaseMemory();

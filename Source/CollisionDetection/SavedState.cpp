@@ -458,7 +458,7 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
     next.contacts += record->found.statistics.contacts;
     next.intersectingTriangles += data.intersectingTriangles().size();
   }
-  freeMotions.known().swap(read.known);
+  freeMotions.restore(read.known);
   audit.failures.clear();
   audit.frame = read.auditFrame;
   octreesState = 0;

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -406,6 +407,26 @@ TEST(FreeMotion, IsBelowTheGapOfTaperedThreads) {
     if (HasFailure()) return;
   }
   EXPECT_GT(near, 100u);
+}
+
+/// Whatever the last detection left unfinished or released.
+TEST(FreeMotion, IsUnlimitedWithoutAPair) {
+  const Mesh low = flat(2, 0.0), high = flat(2, 0.5);
+  for (const bool hasTime : {false, true}) {
+    OctreeBasedCD collisions;
+    const GeometryId a = addMesh(collisions, low), b = addMesh(collisions, high);
+    collisions.addCollisionPair(a, b, {.thickness = 0.1, .freeMotionReach = 1.0});
+    if (hasTime) {
+      collisions.detectCollision();
+      collisions.releaseMemory();
+    } else {
+      EXPECT_FALSE(collisions.detectCollision(std::chrono::microseconds(0)));
+    }
+    EXPECT_LT(collisions.freeMotion(a)[0], 0.5);
+    collisions.removeCollisionPair(a, b);
+    collisions.detectCollision();
+    EXPECT_EQ(collisions.freeMotion(a)[0], kInfinity);
+  }
 }
 
 /// Two parallel sheets share the gap; a filter or a disabled element lifts its limit.
