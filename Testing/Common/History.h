@@ -2,132 +2,166 @@
 
 #include <palpate/Capture.h>
 #include <palpate/OctreeBasedCD.h>
-#include <palpate/PenetrationTracker.h>
 
-#include "Common/PairRun.h"
-#include "Common/Solids.h"
-#include "Common/TestGeometry.h"
+#include "Common/DrawnSettings.h"
+#include "Common/Lockstep.h"
+#include "Common/RandomBodies.h"
 
 #include <cstdint>
 #include <map>
-#include <optional>
+#include <memory>
+#include <ostream>
+#include <set>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace palpate::testing {
 
-/// A random history of an OctreeBasedCD. Geometries of every type and pairs of every method are
-/// added and removed. Geometries move within steps and between steps. Topology, filters, disabled
-/// elements and predicates change, with queries, updates and detections in between.
+/// What is at work in a frame of a history.
+enum class Feature {
+  Triangles,
+  Tetrahedra,
+  Lines,
+  Points,
+  Shapes,
+  Fields,
+  AttachedFields,
+  Proxies,
+  SelfCollision,
+  Placed,
+  Coincident,
+  Large,
+  Tracking,
+  UserData,
+  Crossings,
+  Sides,
+  GivenSides,
+  SmoothNormals,
+  Tags,
+  FreeMotion,
+  RestDistance,
+  EarliestTime,
+  Predicate,
+  Disabled,
+  Groups,
+  Sidedness,
+  Cut,
+  TetrahedraCut,
+  NewTopology,
+  SomePositions,
+  BothEnds,
+  KeptCandidates,
+  OutOfTime,
+  EndedEarly,
+  FailedCall,
+  Restored,
+  Captured,
+  Guard,
+  Threads,
+  Snapshot,
+  PenetrationTracker,
+  Audit,
+  Executor
+};
+
+/// How often two features were at work in the same frame.
+class FeaturePairsTable {
+ public:
+  void add(const std::set<Feature>& frame) {
+    for (const Feature a : frame)
+      for (const Feature b : frame) ++m_counts[{a, b}];
+  }
+  /// Counts of each feature, and the pairs that no frame had.
+  void print(std::ostream&) const;
+
+ private:
+  std::map<std::pair<Feature, Feature>, std::size_t> m_counts;
+};
+
+/// A random history of objects with different settings. Geometries of every type and pairs of every
+/// method are added and removed. Geometries move within steps and between steps. Topology, filters,
+/// disabled elements, tags, predicates, sides and settings change, with queries, updates and
+/// detections in between.
 ///
-/// A model beside it keeps only the last values, by the rules of a step. After each frame the
-/// object must have the same contacts as a new object with the values of the model, and as brute
-/// force. State that lasts from step to step must be as in an object that was given only the last
-/// values of each step. Some frames are made twice, the second time from a saved state, which may
-/// be restored into a new object; all bits must be the same.
+/// Lockstep compares the objects. After each frame they must have the same contacts as a new object
+/// with the last values, and as brute force. Answers over time must be those of an object that was
+/// given only the last values of each step.
 class RandomHistory {
  public:
-  explicit RandomHistory(std::uint64_t seed);
+  explicit RandomHistory(std::uint64_t seed, BodySize = BodySize::Small);
   /// The history that these bytes decide, in a length unit of any size and with coordinates of very
   /// different sizes.
   explicit RandomHistory(std::span<const std::uint8_t> decisions);
+  RandomHistory(const RandomHistory&) = delete;
+  RandomHistory& operator=(const RandomHistory&) = delete;
 
   /// Makes some random calls and a detection, and compares everything. Failures are GoogleTest's.
   void frame();
   std::size_t contacts() const { return m_contacts; }  ///< of all frames
   bool isOver() const { return m_random.isOver(); }    ///< whether nothing is left to decide
-  CollisionProblem problem() const { return m_collisions.problem(); }
+  CollisionProblem problem() const { return m_lockstep.first().problem(); }
+  std::size_t decisions() const { return m_decisions; }  ///< so far
+  /// These decisions, which count from 0, are left out.
+  void leaveOut(std::set<std::size_t> decisions) { m_leftOut = std::move(decisions); }
+  void writeTo(std::ostream* calls) { m_lockstep.writeTo(calls); }
+  const std::set<Feature>& features() const { return m_features; }  ///< of the last frame
+  std::string description() const;
 
  private:
-  RandomHistory(Random, OctreeBounds);
+  RandomHistory(Random, std::uint64_t seed, Space, BodySize, double unit);
 
-  struct Body {
-    TestGeometry geometry;                ///< of the last topology; its positions at rest
-    std::vector<Tetrahedron> tetrahedra;  ///< of a tetrahedral mesh
-    std::optional<AnalyticalGeometry> shape;
-    Positions before, now;  ///< in the body's frame
-    bool isNew = true, bodyGiven = false, placed = false, transformGiven = false;
-    Eigen::Matrix3d rotationBefore = Eigen::Matrix3d::Identity(), rotation = rotationBefore;
-    Vector3d translationBefore = Vector3d::Zero(), translation = translationBefore;
-    CollisionFilter filter{};
-    std::vector<std::uint32_t> disabled{};
-    std::vector<std::uint32_t> tags{};
-    std::vector<std::uint32_t> removed{};  ///< by cuts, ascending; geometry.triangles lacks them
+  /// Whether the next decision is made. It depends on the seed and its number alone.
+  bool decide();
 
-    bool isMesh() const { return !shape && geometry.type == GeometryType::Triangles; }
-    std::size_t elements() const;  ///< with removed ones
-    /// The ids of the elements that are there.
-    std::vector<std::uint32_t> ids() const;
-    /// Of elements by their ids: those that are there, by their place.
-    std::vector<std::uint32_t> placesOf(const std::vector<std::uint32_t>& elements) const;
-  };
-  struct Pair {
-    GeometryId a, b;
-    PairSettings settings;
-    int predicate = 0;  ///< 0: none
-  };
-
-  // Random calls. Each changes the object and the model, or neither if the library refuses the
-  // call.
   void act();
-  void actAndDetect();
-  /// actAndDetect(), and again from a saved state.
-  void replay();
+  void change(GeometryId);
   void add();
-  void remove(GeometryId);
   void setPositions(GeometryId);
+  void setSomePositions(GeometryId);
   void setTransform(GeometryId);
   void setTopology(GeometryId);
   void cut(GeometryId);
+  void cutTriangles(GeometryId);
+  void cutTetrahedra(GeometryId);
   void setFilter(GeometryId);
   void setDisabled(GeometryId);
   void setTags(GeometryId);
   void addOrChangePair();
+  void changePair(const ModelPair&);
+  void setSides();
+  void setUserData();
+  void hold();
+  void expectNothingTouches();
+  void watch();
+  void publish();
   void query();
 
   GeometryId anyBody();
-  TestGeometry randomGeometry(int type);  ///< in units
-  TestGeometry stretched(TestGeometry);
-  Solid randomSolid();
+  const ModelPair* anyPair();
   PairSettings randomSettings();
-  Positions randomMotion(const Positions&);
-  Eigen::Matrix3d randomTurn();
-  /// ofA, ofB: the ids of elements that are there.
-  static ContactPredicate predicateOf(int number, std::vector<std::uint32_t> ofA = {},
-                                      std::vector<std::uint32_t> ofB = {});
-  /// call() throws if it is refused. Returns whether it was accepted.
-  template <class F>
-  static bool accepts(F&& call);
 
-  static GeometryId addTo(OctreeBasedCD&, const Body&);
-  static void setEnds(OctreeBasedCD&, GeometryId, const Body&);
-  /// A new object with the last values, whose elements are numbered anew. ids: the history's
-  /// geometries in it.
-  OctreeBasedCD fresh(Engine, std::map<GeometryId, GeometryId>& ids) const;
-  void compareContacts(const OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&,
-                       bool isBruteForce);
-  bool startsApart(const Pair&) const;
-  void compareCandidates(OctreeBasedCD& bruteForce, const std::map<GeometryId, GeometryId>&);
-  void compareQueries(OctreeBasedCD& other, const std::map<GeometryId, GeometryId>&);
-  void expectSameEnds(const OctreeBasedCD& other) const;
-  void compareWhatLasts();
-  void endStep();
+  void compareWithNewObjects();
+  void compareContacts(const NewObject&, bool isBruteForce);
+  void compareInWorld();
+  void compareCapture();
+  void compareCrossings();
+  bool startsApart(const ModelPair&) const;
+  void giveSides(NewObject&) const;
+  void compareCandidates(NewObject& bruteForce);
+  void compareQueries(NewObject& other);
+  void compareSnapshot();
+  void noteFeatures();
 
   Random m_random;
-  OctreeBasedCD m_collisions;
-  double m_unit = 1.0;  ///< of all lengths, a power of two
-  /// An object that is given only the last values of each step.
-  OctreeBasedCD m_committed;
-  std::map<GeometryId, Body> m_bodies;
-  std::vector<Pair> m_pairs;
-  /// Vertices and body of the trackers, one for each of the two objects.
-  struct Tracked {
-    Tracked(GeometryId a, GeometryId b) : vertices(a), body(b), running(a, b), committed(a, b) {}
-    GeometryId vertices, body;
-    PenetrationTracker running, committed;
-  };
-  std::optional<Tracked> m_tracked;
-  std::size_t m_contacts = 0;
+  std::uint64_t m_seed;
+  RandomBodies m_draw;
+  Lockstep m_lockstep;
+  std::shared_ptr<const Snapshot> m_snapshot;
+  std::vector<std::uint64_t> m_snapshotWords;
+  std::size_t m_contacts = 0, m_decisions = 0, m_frames = 0, m_vertexPaths = 0;
+  std::set<std::size_t> m_leftOut;
+  std::set<Feature> m_features;
 };
 
 }  // namespace palpate::testing
