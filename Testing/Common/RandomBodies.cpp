@@ -10,7 +10,7 @@ namespace {
 
 /// Of lengths in histories that a fuzzer decides: the exponents of sizes and coordinates in units.
 constexpr int kMostSpread = 0;
-constexpr double kGrid = 0.25, kFar = 0x1p20;  ///< in units
+constexpr double kFar = 0x1p20;  ///< in units
 
 }  // namespace
 
@@ -18,7 +18,7 @@ Vector3d RandomBodies::inSpace(Vector3d p) const {
   switch (m_space) {
     case Space::Grid:
     case Space::FlatGrid:
-      for (double& x : p) x = m_unit * kGrid * std::round(x / (m_unit * kGrid));
+      for (double& x : p) x = m_unit * grid() * std::round(x / (m_unit * grid()));
       if (m_space == Space::FlatGrid) p[2] = 0.0;
       break;
     case Space::Flat:
@@ -44,7 +44,7 @@ Positions RandomBodies::inSpace(Positions positions) const {
 }
 
 double RandomBodies::length(double units) const {
-  return m_unit * (isGrid() ? kGrid / 2 * std::round(units / (kGrid / 2)) : units);
+  return m_unit * (isGrid() ? grid() / 2 * std::round(units / (grid() / 2)) : units);
 }
 
 std::array<double, 4> RandomBodies::lengths() const {

@@ -50,6 +50,7 @@ class RandomBodies {
   Pose pose(const Pose& from);
 
  private:
+  double grid() const { return areLarge() ? 0x1p-6 : 0.25; }  ///< in units
   bool isGrid() const { return m_space == Space::Grid || m_space == Space::FlatGrid; }
   Vector3d motionStep();
   TestGeometry box();                    ///< in units
