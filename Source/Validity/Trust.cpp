@@ -120,12 +120,17 @@ bool meetsConditions(const PairSettings& settings, const GeometryInStep& a, cons
 
 /// Writes the lists of features. reportsImpacts: vertices that touched have impacts, and are
 /// trusted.
-void listFeatures(const StepFacts& facts, bool reportsImpacts, Validity& validity) {
+void listFeatures(const PairSettings& settings, const StepFacts& facts, bool reportsImpacts,
+                  Validity& validity) {
   const auto take = [](std::vector<std::uint32_t>& out, const Buffer<std::uint32_t>& ids) {
     out.assign(ids.begin(), ids.end());
   };
-  take(validity.degenerateTrianglesA, facts.degenerateA);
-  take(validity.degenerateTrianglesB, facts.degenerateB);
+  validity.degenerateTrianglesA.clear();
+  validity.degenerateTrianglesB.clear();
+  if (!settings.continuous.earliestTimeOnly) {  // else there are no contacts
+    take(validity.degenerateTrianglesA, facts.degenerateA);
+    take(validity.degenerateTrianglesB, facts.degenerateB);
+  }
   validity.untrustedVerticesA.clear();
   validity.untrustedVerticesB.clear();
   if (reportsImpacts) return;
@@ -233,7 +238,7 @@ void Trust::finish(const PairSettings& settings, const GeometryInStep& a, const 
                                 : plan.method == Method::Intersection
                                     ? 0.0
                                     : settings.thickness + plan.step.extraThickness;
-  listFeatures(facts, plan.step.reportsImpacts, validity);
+  listFeatures(settings, facts, plan.step.reportsImpacts, validity);
   if (plan.step.checksStart) {
     m_checkCredit = std::max(m_checkCredit - kFramesPerCheck, 0);
     m_atStart = {};

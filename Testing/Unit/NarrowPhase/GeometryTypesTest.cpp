@@ -333,6 +333,9 @@ TEST(GeometryTypes, OnlyTrianglesWithoutAreaAreDegenerate) {
       answer(flat, points, {Method::Proximity, 0.3, Contacts::All}).validity();
   EXPECT_EQ(validity.degenerateTrianglesA, (std::vector<std::uint32_t>{0}));
   EXPECT_TRUE(validity.degenerateTrianglesB.empty());
+  PairSettings earliest{Method::Continuous, 0.3};
+  earliest.continuous.earliestTimeOnly = true;  // has no contacts
+  EXPECT_TRUE(answer(flat, points, earliest).validity().degenerateTrianglesA.empty());
 }
 
 // ---- Refused calls ----
