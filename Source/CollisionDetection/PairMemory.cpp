@@ -61,12 +61,14 @@ void SidesMemory::startStep(const PairMoment& moment) {
 void SidesMemory::follow(const Question& question, Answer& found) {
   Contents& contents = found.contents();
   contents.rememberedSides.clear();
+  found.bySides = false;
   if (!sides) return;
   const MeshPair meshes = question.meshes();
   sides->follow(meshes, contents.crossings);
   const bool anyAtEnd = contents.validity.atEnd > 0;
   sides->apply(meshes, contents);
-  if (sides->changesContacts()) contents.step.endRows.clear();
+  found.bySides = sides->changesContacts();
+  if (found.bySides) contents.step.endRows.clear();
   std::size_t atImpact = 0;
   forEachContactList(contents, [&](ContactKind, const auto& contacts) {
     for (const auto& contact : contacts) atImpact += !anyAtEnd || contact.timeOfImpact < 1.0;

@@ -78,7 +78,6 @@ struct SidesMemory : MemoryPart {
   std::unique_ptr<SideMemory> sides;  ///< null without the setting
 
   std::uint64_t version() const { return sides ? sides->version() : 0; }
-  bool changesContacts() const { return sides && sides->changesContacts(); }
   /// Finds the sides at the step's end, and changes the contacts of Answer::data by those at its
   /// start.
   void follow(const Question&, Answer&);

@@ -59,7 +59,7 @@ namespace {
 using namespace description;
 
 constexpr std::string_view kStateTitle = "palpate-state";
-constexpr std::uint32_t kStateVersion = 4;
+constexpr std::uint32_t kStateVersion = 5;
 
 using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;
@@ -196,7 +196,8 @@ void describeState(File& file, PairState& state, const PairRecord& record,
 template <class File>
 void describePair(File& file, PairRecord& record, const PairStates& states) {
   LastAnswer& last = record.last;
-  for (bool* flag : {&last.isThere, &record.found.sidesAreKnown, &record.found.byBodies})
+  for (bool* flag :
+       {&last.isThere, &record.found.sidesAreKnown, &record.found.byBodies, &record.found.bySides})
     fieldOf(file, *flag);
   derivedOf(file, last.version,
             [&](PairState& state) { describeState(file, state, record, states); });

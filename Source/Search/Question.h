@@ -71,6 +71,7 @@ struct Answer {
   CollisionData data;
   bool sidesAreKnown = false;  ///< KnownSides changed the contacts
   bool byBodies = false;       ///< BodyContacts changed the contacts
+  bool bySides = false;        ///< SideMemory changed the contacts
   /// ContinuousSettings::earliestTimeOnly: the least time found so far.
   std::atomic<double> earliest = std::numeric_limits<double>::infinity();
   std::size_t candidateCount = 0;

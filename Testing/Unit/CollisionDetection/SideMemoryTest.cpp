@@ -699,7 +699,7 @@ struct CubeAndMembrane {
   Mesh cube = dividedBox({0.42, 0.41, 0.1}, {0.61, 0.6, 0.2}, 3);
   GeometryId body, tissue;
 
-  CubeAndMembrane() {
+  explicit CubeAndMembrane(const Settings& settings = {}) : collisions(settings) {
     Mesh membrane = sheet(16, 0.0, 0.0);
     for (Vector3d& p : membrane.positions) p[2] = 0.0;
     body = addMesh(collisions, cube);
@@ -750,6 +750,23 @@ TEST(SideMemory, OfABodyThatJumpedIsThatOfItsOwnVertices) {
   EXPECT_EQ(sides.size(), scene.cube.positions.size());
   for (const Crossing& side : sides) EXPECT_EQ(side.kind, ContactKind::VertexTriangle);
   EXPECT_TRUE(sidesAfter(0.35).empty());
+}
+
+/// An audit does not expect contacts that sides replaced, however the pair came to its answer.
+TEST(SideMemory, AnAuditKnowsOfAnswersThatAreKept) {
+  CubeAndMembrane scene({.audit = {.features = 1 << 20}});
+  scene.move(-0.15);
+  scene.collisions.advance();
+  const auto expectNoFault = [&] {
+    scene.collisions.detectCollision();
+    EXPECT_TRUE(scene.collisions.auditFailures().empty());
+  };
+  expectNoFault();
+  EXPECT_FALSE(scene.data().rememberedSides().empty());
+  scene.collisions.releaseMemory();
+  expectNoFault();
+  scene.collisions.restore(scene.collisions.save());
+  expectNoFault();
 }
 
 /// An end of a thread passes a membrane, the thread then passes the membrane's fold, and the end
