@@ -336,11 +336,11 @@ namespace {
 /// Reads a saved state, and changes nothing before it was found to be whole.
 class StateReader {
  public:
-  StateReader(std::span<const std::byte> state, GeometryTable& geometries, PairTable& formerPairs,
+  StateReader(std::span<const std::byte> state, GeometryTable& table, PairTable& formerPairs,
               const Threads& threads)
       : pairs(formerPairs.successor()),
         m_file(state, m_name, kStateTitle, kStateVersion),
-        m_table(geometries),
+        m_table(table),
         m_formerPairs(formerPairs),
         m_threads(threads) {
     m_file.integer(lastId);
