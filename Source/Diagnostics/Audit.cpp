@@ -339,8 +339,7 @@ void auditFrame(const Settings& settings, const GeometryTable& geometries, const
     // what bodies tell about contacts.
     // The answer of an unfinished pair is of an earlier state.
     if (!pair->collides() || pair->memory.urgency.isUnfinished || pair->found.byBodies ||
-        kind == PairKind::Proxy || kind == PairKind::AttachedProxy ||
-        pair->found.bySides)
+        kind == PairKind::Proxy || kind == PairKind::AttachedProxy || pair->found.bySides)
       continue;
     const std::size_t first = failures.size();
     audit(*pair->question, pair->found.sidesAreKnown, pair->last.data, settings.audit, record.frame,
