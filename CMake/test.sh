@@ -94,7 +94,7 @@ build release -UPALPATE_WITH_{VTK,FCL,PYTHON,SIMPLIFY} -UPALPATE_BUILD_TESTING "
 if ((all)); then
   # The core as a static library, without SIMD, VTK and FCL, with oneTBB's threads.
   configuration scalar -DBUILD_SHARED_LIBS=OFF
-  # Compiled by clang, with the fuzz targets.
+  # Compiled by clang, with the fuzz targets, and of the SIMD paths the one of this machine.
   configuration asan-ubsan
   # Without SIMD: the scalar code of the modules with threads.
   configuration tsan
