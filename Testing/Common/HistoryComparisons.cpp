@@ -1,5 +1,6 @@
 #include "Common/History.h"
 #include "Common/QueryCalls.h"
+#include "Common/Replayed.h"
 #include "Common/TemporaryFolder.h"
 
 #include <gtest/gtest.h>
@@ -241,11 +242,10 @@ void RandomHistory::compareInWorld() {
 
 namespace {
 
-/// By a file, unless the problem has what no file holds.
+/// By a file, if it fits one.
 CollisionProblem capturedProblem(const OctreeBasedCD& collisions) {
   const CollisionProblem problem = collisions.problem();
-  for (const CollisionProblem::Geometry& geometry : problem.geometries)
-    if (geometry.field || geometry.proxy) return problem;
+  if (!fitsFile(problem)) return problem;
   const TemporaryFolder folder;
   const std::filesystem::path path = folder.path / "frame.capture";
   capture(collisions, path);

@@ -4,11 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <unistd.h>
 
 namespace palpate::testing {
+
+/// Whether a capture file can hold the problem: it has no distance fields and no leaves of proxies.
+inline bool fitsFile(const CollisionProblem& problem) {
+  return std::none_of(problem.geometries.begin(), problem.geometries.end(),
+                      [](const auto& geometry) { return geometry.field || geometry.proxy; });
+}
 
 /// Writes the last frame's problem to a file, reads it back and computes it again. Every pair has
 /// the same contacts.

@@ -10,7 +10,8 @@
 
 namespace palpate::testing {
 
-/// A folder for the files of the running test, which goes with the object.
+/// A folder for the files of the running test, or of a program without tests. It goes with the
+/// object.
 class TemporaryFolder {
  public:
   TemporaryFolder() { std::filesystem::create_directories(path); }
@@ -23,10 +24,13 @@ class TemporaryFolder {
     return static_cast<std::size_t>(std::distance(Iterator(path), Iterator()));
   }
 
-  const std::filesystem::path path =
-      std::filesystem::path(::testing::TempDir()) /
-      ("palpate-" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
-       std::to_string(::getpid()));
+  static std::string testName() {
+    const ::testing::TestInfo* const test = ::testing::UnitTest::GetInstance()->current_test_info();
+    return test ? test->name() : "";
+  }
+
+  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) /
+                                     ("palpate-" + testName() + std::to_string(::getpid()));
 };
 
 inline std::string contentOf(const std::filesystem::path& path) {
