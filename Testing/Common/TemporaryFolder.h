@@ -26,7 +26,7 @@ class TemporaryFolder {
 
   static std::string testName() {
     const ::testing::TestInfo* const test = ::testing::UnitTest::GetInstance()->current_test_info();
-    return test ? test->name() : "";
+    return test ? test->name() : "program";
   }
 
   const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) /
