@@ -48,14 +48,18 @@ struct MemoryPart {
 struct TrustMemory : MemoryPart {
   Trust trust;
 
-  void startStep(const PairMoment&) { m_before = trust; }
-  void skip(const PairMoment&) noexcept { trust = m_before; }
-  void forget() noexcept { trust.forget(); }
+  void startStep(const PairMoment&) { trust = m_committed; }
+  void commit(const PairMoment&) noexcept { m_committed = trust; }
+  void skip(const PairMoment&) noexcept { trust = m_committed; }
+  void forget() noexcept {
+    trust.forget();
+    m_committed = trust;
+  }
   template <class File>
   void describe(File&, PairRecord&, const auto& revisions);
 
  private:
-  Trust m_before;
+  Trust m_committed;  ///< a detection that throws leaves `trust` in a state between two answers
 };
 
 /// PairSettings::trackContacts.

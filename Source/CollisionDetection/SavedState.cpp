@@ -27,7 +27,8 @@ void Urgency::describe(File& file, PairRecord&, const auto&) {
 
 template <class File>
 void TrustMemory::describe(File& file, PairRecord&, const auto& revisions) {
-  trust.describe(file, revisions);
+  m_committed.describe(file, revisions);
+  trust = m_committed;
 }
 
 template <class File>

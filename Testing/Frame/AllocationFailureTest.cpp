@@ -583,6 +583,32 @@ TEST(AllocationFailureOfDetections, LeavesEveryAnswer) {
     }
 }
 
+/// A body at rest starts its step where it ends it. What a detection that throws found out about
+/// the end is not known at the start.
+TEST(AllocationFailureOfDetections, LeavesWhatIsKnownOfTheStart) {
+  Random random(1);
+  const TestGeometry body = testGeometry(soup(random, 12, 0.3));
+  const auto run = [&](std::size_t n) {
+    OctreeBasedCD collisions(settingsOf(Engine::Octree, 1));
+    const GeometryId id = body.addTo(collisions);
+    collisions.detectCollision();
+    collisions.addCollisionPair(id, id, {.freeMotionReach = 0.1});
+    const auto detect = [&] { collisions.detectCollision(); };
+    const bool threw = FailingAllocation::throwsAt(n, detect);
+    if (threw) detect();
+    return std::pair(threw, collisions.collisionData(id, id).validity());
+  };
+  const Validity truth = run(1'000'000).second;
+  std::size_t failures = 0;
+  for (std::size_t n = 1;; ++n) {
+    const auto [threw, validity] = run(n);
+    if (!threw) break;
+    ++failures;
+    EXPECT_EQ(validity, truth) << n;
+  }
+  EXPECT_GT(failures, 10u);
+}
+
 /// Vectors that appendRows() and appendMotions() extend keep their content.
 TEST(AllocationFailureWhileAppendingOrCapturing, AppendedRowsAndMotionsStayUnchanged) {
   const Mesh low = sheet(3, 0.0, 0.0), high = sheet(3, 0.0, 0.2);
