@@ -721,9 +721,13 @@ std::vector<Crossing> SideMemory::list(const MeshPair& pair, std::uint64_t step)
   std::vector<Crossing> all;
   for (Side side : step == m_step ? m_start : m_end) {
     const VertexSide of(pair, side.passage.kind);
-    if (isEdges(side.passage) ||
-        findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]))
-      all.push_back(side.passage);
+    const bool areThere =
+        isEdges(side.passage)
+            ? pair.a.topology.edgeOf(edgeA(side.passage)) != kNoEdge &&
+                  pair.b.topology.edgeOf(edgeB(side.passage)) != kNoEdge
+            : of.vertexOf(side.passage) < of.vertices.topology.vertexCount &&
+                  findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]);
+    if (areThere) all.push_back(side.passage);
   }
   return all;
 }

@@ -38,7 +38,7 @@ class SideMemory : public CountedObject {
   void startStep(std::uint64_t step) noexcept;
   /// Other sides at the step's start have another number.
   std::uint64_t version() const { return m_version; }
-  /// The sides at the start of this step, without those of triangles that are no longer there.
+  /// The sides at the start of this step, without those of features that are no longer there.
   std::vector<Crossing> list(const MeshPair&, std::uint64_t step) const;
   /// Replaces the sides at the start of this step.
   void set(std::uint64_t step, std::span<const Side>);

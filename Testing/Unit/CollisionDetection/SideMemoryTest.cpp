@@ -752,6 +752,33 @@ TEST(SideMemory, OfABodyThatJumpedIsThatOfItsOwnVertices) {
   EXPECT_TRUE(sidesAfter(0.35).empty());
 }
 
+/// Ridges that crossed are a side of the next step, until their triangles are replaced.
+TEST(SideMemory, AProblemNamesOnlyFeaturesThatAreThere) {
+  OctreeBasedCD collisions;
+  const Positions upper{{-1, 0, 0.1}, {1, 0, 0.1}, {0, -1, 1}, {0, 1, 1}},
+      lower{{0, -1, 0}, {0, 1, 0}, {-1, 0, -1}, {1, 0, -1}};
+  const std::vector<Triangle> tent{{0, 1, 2}, {1, 0, 3}};
+  const GeometryId above = collisions.addTriangleMesh(upper, tent),
+                   below = collisions.addTriangleMesh(lower, tent);
+  collisions.addCollisionPair(above, below, remembering(0.03));
+  collisions.detectCollision();
+  collisions.advance();
+  Positions lowered = upper;
+  for (Vector3d& p : lowered) p[2] -= 0.2;
+  collisions.setPositions(above, lowered);
+  collisions.detectCollision();
+  collisions.advance();
+  collisions.detectCollision();
+  const auto sides = collisions.collisionData(above, below).rememberedSides();
+  ASSERT_EQ(sides.size(), 1u);
+  EXPECT_EQ(sides[0].kind, ContactKind::EdgeEdge);
+  EXPECT_EQ(collisions.problem().pairs.at(0).sides.size(), 1u);
+  collisions.setTriangles(below, lower, std::vector<Triangle>{{0, 2, 3}});
+  collisions.detectCollision();
+  EXPECT_TRUE(collisions.problem().pairs.at(0).sides.empty());
+  EXPECT_NO_THROW(setUp(collisions.problem()));
+}
+
 /// An audit does not expect contacts that sides replaced, however the pair came to its answer.
 TEST(SideMemory, AnAuditKnowsOfAnswersThatAreKept) {
   CubeAndMembrane scene({.audit = {.features = 1 << 20}});
