@@ -108,7 +108,7 @@ void expectSays(const Error& error, const Refusal& refusal) {
   }
 }
 
-void expectRefused(const std::function<void(Scene&)>& badCall, const Refusal& refusal) {
+void expectSceneRefuses(const std::function<void(Scene&)>& badCall, const Refusal& refusal) {
   for (Stage stage : kStages) {
     Scene scene, twin;
     bring(scene, stage);
@@ -146,7 +146,7 @@ std::string text(GeometryId id) { return std::to_string(static_cast<std::uint32_
 template <class Call>
 void expectPossible(Call call) {
   const auto refuse = [&](const PairSettings& settings, const Refusal& refusal) {
-    expectRefused([&](Scene& scene) { call(scene, settings); }, refusal);
+    expectSceneRefuses([&](Scene& scene) { call(scene, settings); }, refusal);
   };
   for (Method method :
        {Method::Auto, Method::Proximity, Method::Intersection, Method::Continuous}) {
@@ -272,7 +272,7 @@ TEST(BadInput, PositionsThatAreNotFinite) {
           Refusal refusal{
               ErrorCode::NonFinitePosition, {std::to_string(vertex), word}, row.geometry, vertex};
           if (row.geometry) refusal.named.push_back(text(*row.geometry));
-          expectRefused([&](Scene& scene) { row.call(scene, bad); }, refusal);
+          expectSceneRefuses([&](Scene& scene) { row.call(scene, bad); }, refusal);
           if (HasFailure()) FAIL() << &row - rows << ", vertex " << vertex << ", " << word;
         }
 }
@@ -294,11 +294,11 @@ TEST(BadInput, IndicesOutOfRange) {
                           {},
                           triangle};
           if (!isNew) refusal.geometry = Scene().other;
-          expectRefused([&](Scene& s) { isNew ? add(s, bad) : set(s, bad); }, refusal);
+          expectSceneRefuses([&](Scene& s) { isNew ? add(s, bad) : set(s, bad); }, refusal);
           if (HasFailure()) FAIL() << "triangle " << triangle << ", index " << index;
         }
-  expectRefused([](Scene& scene) { scene.collisions.addTriangleMesh({}, kToolTriangles); },
-                {ErrorCode::IndexOutOfRange, {}});
+  expectSceneRefuses([](Scene& scene) { scene.collisions.addTriangleMesh({}, kToolTriangles); },
+                     {ErrorCode::IndexOutOfRange, {}});
 }
 
 /// Never added, and removed.
@@ -324,8 +324,8 @@ TEST(BadInput, UnknownGeometries) {
   for (const auto& call : calls)
     for (const GeometryId id : {kNeverAdded, Scene().removed, GeometryId{0xffffffffu}}) {
       SCOPED_TRACE(&call - calls);
-      expectRefused([&](Scene& scene) { call(scene, id); },
-                    {ErrorCode::UnknownGeometry, {text(id)}, id});
+      expectSceneRefuses([&](Scene& scene) { call(scene, id); },
+                         {ErrorCode::UnknownGeometry, {text(id)}, id});
     }
 }
 
@@ -356,7 +356,7 @@ TEST(BadInput, UnknownAndDuplicatePairs) {
       {kUnknown, {tool, organ}, [](Scene& s) { s.collisions.collisionData(s.tool, s.organ); }}};
   for (const Row& row : rows) {
     SCOPED_TRACE(&row - rows);
-    expectRefused(row.call, {row.code, row.named});
+    expectSceneRefuses(row.call, {row.code, row.named});
   }
 }
 
@@ -369,7 +369,7 @@ TEST(BadInput, WrongPositionCounts) {
                           {text(organ), std::to_string(count), std::to_string(kOrgan.size())},
                           organ};
     for (const int which : {0, 1, 2})
-      expectRefused(
+      expectSceneRefuses(
           [&](Scene& s) {
             if (which == 0) s.collisions.setPositions(s.organ, wrong);
             if (which == 1) s.collisions.setPositions(s.organ, wrong, kOrgan);
