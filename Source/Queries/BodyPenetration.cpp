@@ -73,6 +73,9 @@ class Search {
                     pair.geometry(false).mesh.topology.count()) {}
 
   Penetration run() {
+    // translate() reads both, also before they are found.
+    m_scratch.insideA.clear();
+    m_scratch.insideB.clear();
     const bool hasHulls = m_hulls.direction != Vector3d::Zero();
     if (hasHulls && areConvex()) {
       // No shorter translation separates them.

@@ -228,6 +228,21 @@ TEST(Penetration, OfConcaveBodiesTheShortestWayOutIsFound) {
   EXPECT_NEAR(up.depth, 0.4, 1e-9);
 }
 
+TEST(Penetration, DependsOnNoQueryBeforeIt) {
+  // The query before finds a corner of the second part inside, which here is in no triangle.
+  const Mesh both = joined(cube(0, 1), cube(0.01, 1.01)), box = cube(0.5, 1.5);
+  Mesh first = both;
+  first.triangles.resize(box.triangles.size());
+  Bodies bodies(first, moved(cube(0, 1), {0.4, 0.39, 0.38}));
+  const Penetration alone = bodies.penetration();
+  EXPECT_NEAR(alone.depth, 0.6, 1e-9);
+  EXPECT_TRUE(alone.minimal);
+  const GeometryId a = bodies.collisions.addTriangleMesh(both.positions, both.triangles),
+                   b = bodies.collisions.addTriangleMesh(box.positions, box.triangles);
+  EXPECT_TRUE(bodies.collisions.queries().penetration(a, b).intersecting);
+  expectSame(bodies.penetration(), alone);
+}
+
 TEST(Penetration, BodiesThatOnlyTouchDoNotIntersect) {
   const Mesh unit = cube(0, 1);
   expectApart(unit, moved(unit, {1, 0, 0}));            // a face on a face
