@@ -20,6 +20,7 @@ namespace palpate {
 struct ThreadWatch {
   VertexPath thread, loop;  ///< or two parts of threads
   bool isOfParts = false;
+  std::uint64_t added = 0;                      ///< the step of add()
   std::vector<Segment> threadEdges, loopEdges;  ///< whose loss is that of the paths
   int count = 0, countBefore = 0;  ///< after the last update(); at the start of its step
   bool isLost = false, wasLost = false;
@@ -120,7 +121,7 @@ void copyVertices(const Geometry& geometry, const VertexPath& path,
 }
 
 constexpr std::string_view kTopologyTitle = "palpate-threads";
-constexpr std::uint32_t kTopologyVersion = 1;
+constexpr std::uint32_t kTopologyVersion = 2;
 
 /// Whether the edges are some of those between consecutive vertices, in their order.
 bool areEdgesOf(const VertexPath& path, const std::vector<Segment>& edges) {
@@ -136,6 +137,7 @@ bool areEdgesOf(const VertexPath& path, const std::vector<Segment>& edges) {
 template <class File>
 void describeWatch(File& file, ThreadWatch& watch) {
   description::fieldOf(file, watch.isOfParts);
+  file.integer(watch.added);
   for (VertexPath* path : {&watch.thread, &watch.loop}) {
     file.integer(path->geometry);
     description::itemsOf(file, path->vertices, sizeof(std::uint32_t),
@@ -244,7 +246,12 @@ std::size_t ThreadTopology::Implementation::add(const VertexPath& ofThread,
   const auto edges = [&](const VertexPath& path, bool isClosed) {
     return edgesOf(geometries.at(path.geometry).body.mesh.topology, path, isClosed);
   };
-  ThreadWatch watch{ofThread, ofLoop, isOfParts, edges(ofThread, false), edges(ofLoop, !isOfParts)};
+  ThreadWatch watch{ofThread,
+                    ofLoop,
+                    isOfParts,
+                    geometries.stepNumber(),
+                    edges(ofThread, false),
+                    edges(ofLoop, !isOfParts)};
   copy(watch);
   if (isOfParts) {
     forEachVertex([&](const PathVertex& vertex) { watch.end.push_back(vertex.at[0]); });
@@ -273,16 +280,19 @@ int ThreadTopology::Implementation::follow(std::size_t index, int count,
   }
   copy(watch);
   passages.clear();
+  // The step of add() may get another start after the call.
+  const bool knowsStart = watch.added != now;
   int end = count;
   if (watch.isOfParts) {
-    if (!startsAt(start)) nextEvents.push_back({index, now, Cause::Set, 0, kNone, kNone, 0.0});
+    if (knowsStart && !startsAt(start))
+      nextEvents.push_back({index, now, Cause::Set, 0, kNone, kNone, 0.0});
     appendEdgePassages(thread, loop, passages);
     for (const LoopPassage& passage : passages) end += passage.change;
   } else {
-    if (const int atStart = countPassages(thread, loop, 0); atStart != count) {
+    const int atStart = countPassages(thread, loop, 0);
+    if (knowsStart && atStart != count)
       nextEvents.push_back({index, now, Cause::Set, atStart - count, kNone, kNone, 0.0});
-      count = atStart;
-    }
+    count = atStart;
     end = countPassages(thread, loop, 1);
     appendPassages(thread, loop, passages);
     int sum = 0;

@@ -26,7 +26,7 @@ struct ThreadEvent {
   enum class Cause {
     Passed,     ///< an edge through a side of the loop or an edge of the other part
     EndPassed,  ///< an end of the thread through the loop's surface
-    Set,        ///< positions were set at both ends of a step, or no update() saw a step. The
+    Set,        ///< no update() saw a step, or a step after that of add() had both ends set. The
                 ///< change of two parts is then 0, as positions alone do not show it
     Cut,        ///< the thread or the loop lost an edge, a vertex or its geometry
     Disabled    ///< no enabled element has one of its edges or vertices any more
@@ -86,7 +86,7 @@ class PALPATE_EXPORT ThreadTopology {
   int count(std::size_t index) const;    ///< after the last update(), at first of add()
   bool isLost(std::size_t index) const;  ///< there was an event by Cut or Disabled: the count is 0
   /// All events since the last clear(), by step, index and time. The changes of an index sum to
-  /// those of its count. Valid until the next update() or clear().
+  /// those of its count since the step of add() began. Valid until the next update() or clear().
   std::span<const ThreadEvent> events() const;
   void clear();  ///< forgets events() of earlier updates
 

@@ -348,6 +348,27 @@ TEST(ThreadTopology, StepsThatNobodyLookedAtAreNamed) {
   EXPECT_EQ(all.count(), 0);
 }
 
+TEST(ThreadTopology, TheFirstStepStartsWhereItsPositionsWereSetLast) {
+  for (const bool areParts : {false, true}) {
+    OctreeBasedCD collisions;
+    const Positions late = threadAt(0, -2);
+    const GeometryId thread = collisions.addLineMesh(threadAt(0, -4), segmentsOf(4, false), 0.0),
+                     loop = collisions.addLineMesh(kHole, segmentsOf(4, true), 0.0);
+    ThreadTopology topology(collisions);
+    const std::size_t index =
+        areParts ? topology.addParts({thread, placesOf(0, 4)}, {loop, placesOf(0, 4)})
+                 : topology.add({thread, placesOf(0, 4)}, {loop, placesOf(0, 4)});
+    collisions.setPositions(thread, late);  // both ends of the step: the thread is new
+    topology.update();
+    EXPECT_TRUE(topology.events().empty()) << areParts;
+    EXPECT_EQ(topology.count(index), areParts ? 0 : 1);
+    collisions.advance();
+    collisions.setPositions(thread, late, late);
+    topology.update();
+    EXPECT_TRUE(topology.events().empty()) << areParts;
+  }
+}
+
 TEST(ThreadTopology, CutAndDisabledThreadsAndLoopsAreLost) {
   const auto sewn = [] {
     auto all = std::make_unique<Watched>(threadAt(0, -2), kHole, WatchKind::Open);
