@@ -71,6 +71,10 @@ void Lockstep::add(std::string name, Life life, const Settings& settings) {
 std::optional<GeometryId> Lockstep::add(const ModelBody& body) {
   std::string text;
   const TestGeometry& g = body.geometry;
+  const auto withRadii = [&](const char* name, const auto&... arguments) {
+    return g.radii.size() == 1 ? call(name, arguments..., g.radii[0])
+                               : call(name, arguments..., g.radii);
+  };
   if (body.shape)
     text = call("addAnalyticalGeometry", *body.shape);
   else if (body.isField())
@@ -80,9 +84,9 @@ std::optional<GeometryId> Lockstep::add(const ModelBody& body) {
   else if (g.type == GeometryType::Triangles)
     text = call("addTriangleMesh", g.positions, g.triangles);
   else if (g.type == GeometryType::Lines)
-    text = call("addLineMesh", g.positions, g.segments, g.radii);
+    text = withRadii("addLineMesh", g.positions, g.segments);
   else
-    text = call("addPointSet", g.positions, g.radii);
+    text = withRadii("addPointSet", g.positions);
   Results<GeometryId> ids(m_members);
   if (!each(Who::All, text, [&](Member& m) { ids.take(m, addBody(m.object, body)); })) return {};
   const GeometryId id = ids.same("ids of a new geometry");

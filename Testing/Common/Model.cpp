@@ -54,6 +54,21 @@ ContactPredicate predicateOf(int number, Ids ofA, Ids ofB) {
   };
 }
 
+namespace {
+
+Positions placedBy(const Pose& pose, const Positions& positions) {
+  Positions placed;
+  for (const Vector3d& p : positions) placed.push_back(pose(p));
+  return placed;
+}
+
+}  // namespace
+
+Positions ModelBody::beforeInWorld() const {
+  return placed ? placedBy(poseBefore, before) : before;
+}
+Positions ModelBody::nowInWorld() const { return placed ? placedBy(pose, now) : now; }
+
 ModelPair* Model::find(GeometryId a, GeometryId b) {
   const auto pair = std::ranges::find_if(
       pairs, [&](const ModelPair& p) { return (p.a == a && p.b == b) || (p.a == b && p.b == a); });
@@ -91,10 +106,7 @@ NewObject newObject(const Model& model, const Settings& settings, bool inWorld) 
     if (body.leaves) collisions.attachSurfaceProxy(own, body.leaves);
     const bool toWorld = inWorld && body.hasVertices() && !body.isRigid();
     if (toWorld && body.placed) {
-      Positions before, now;
-      for (const Vector3d& p : body.before) before.push_back(body.poseBefore(p));
-      for (const Vector3d& p : body.now) now.push_back(body.pose(p));
-      collisions.setPositions(own, before, now);
+      collisions.setPositions(own, body.beforeInWorld(), body.nowInWorld());
     } else {
       if (body.hasVertices() && !body.isRigid())
         collisions.setPositions(own, body.before, body.now);

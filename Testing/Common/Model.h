@@ -40,6 +40,8 @@ struct ModelBody {
   /// Elements by their ids: those that are there, by their place.
   Ids placesOf(const Ids& elements) const;
   std::size_t tagCount() const;
+  Positions beforeInWorld() const;
+  Positions nowInWorld() const;
 };
 
 struct ModelPair {
