@@ -6,6 +6,7 @@
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <type_traits>
 
@@ -85,6 +86,9 @@ class ExactQuery {
   std::vector<PointAndSegment> border() const;
   template <class Moment>
   std::optional<int> borderAt(const Moment&) const;
+  template <class Moment>
+  std::optional<int> placeOnSegment(const Moment&, const ImpactQuery::Step&,
+                                    const ImpactQuery::Step&) const;
   template <class Moment>
   std::array<int, 2> endsAt(const Moment&) const;
   template <class Moment>
@@ -174,6 +178,19 @@ std::optional<int> ExactQuery::borderAt(const Moment& moment) const {
   return {};
 }
 
+/// Where the vertex is on a segment (PlaceOnSegment).
+template <class Moment>
+std::optional<int> ExactQuery::placeOnSegment(const Moment& moment, const ImpactQuery::Step& p,
+                                              const ImpactQuery::Step& q) const {
+  std::array<Linear, 3> at;
+  toIntegers(std::array{m_query.vertices[0], p, q}, at);
+  const Linear fromP = difference(at[0], at[1]);
+  if (vanishesAt(moment, fromP)) return 0;
+  if (vanishesAt(moment, difference(at[0], at[2]))) return 1;
+  if (PointAndSegment{fromP, difference(at[2], at[1])}.touchAt(moment)) return 2;
+  return {};
+}
+
 /// The ends of the edges at which they touch, at a moment at which they do (Surroundings).
 template <class Moment>
 std::array<int, 2> ExactQuery::endsAt(const Moment& moment) const {
@@ -198,12 +215,15 @@ std::optional<bool> ExactQuery::passageAt(const Moment& moment, const Form<3>& v
     TouchSurroundings near;
     if (m_query.kind == ImpactQuery::Kind::VertexTriangle) {
       if (const std::optional<int> border = borderAt(moment)) {
-        around->find({0, *border}, near);
+        const auto place = [&](const ImpactQuery::Step& p, const ImpactQuery::Step& q) {
+          return placeOnSegment(moment, p, q);
+        };
+        around->find({0, *border}, std::ref(place), near);
         return StarTouch(near, around->swapped).passageAt(moment);
       }
     } else {
       const std::array<int, 2> ends = endsAt(moment);
-      around->find(ends, near);
+      around->find(ends, {}, near);
       if (!near.isAlone) return EdgeTouch(m_query, ends, near, around->swapped).passageAt(moment);
     }
   }

@@ -34,16 +34,22 @@ struct TouchSurroundings {
 
   // Of a triangle's corner or edge:
   /// Of a closed surface all triangles there, in any order. At a border, those from one border to
-  /// the next, in the order of the winding; the surface is then continued in its plane.
+  /// the next, in the order of the winding; the surface is then continued in its plane. A triangle
+  /// at a corner has two sectors if the corner is within its edge.
   std::vector<Sector> sectors;
   bool isEdge = false, isClosed = false;
   std::uint32_t own = 0;  ///< the query's triangle
 };
 
+/// Where the vertex that touches a triangle lies on another segment then: 0 and 1 are its ends, 2
+/// is between them.
+using PlaceOnSegment =
+    std::function<std::optional<int>(const ImpactQuery::Step&, const ImpactQuery::Step&)>;
+
 /// Finds what is next to a touch. Corner i of a triangle is i, its edge from corner i to the next
 /// one is 3 + i; the vertex that touches it is 0. End i of an edge is i, its interior is 2.
 struct Surroundings {
-  std::function<void(std::array<int, 2> features, TouchSurroundings&)> find;
+  std::function<void(std::array<int, 2> features, const PlaceOnSegment&, TouchSurroundings&)> find;
   bool swapped = false;  ///< the query's first feature is of the second mesh
 };
 

@@ -70,8 +70,9 @@ void PassageFinder::find() {
     Passages passages;
     if (!(known.isKnown >> lane & 1)) {
       const Features<kind> both = featuresOf<kind>(m_pair, features.swapped);
-      const auto findAround = [&](std::array<int, 2> touch, TouchSurroundings& around) {
-        findSurroundings(both, features.firstId, features.secondId, touch, around);
+      const auto findAround = [&](std::array<int, 2> touch, const PlaceOnSegment& place,
+                                  TouchSurroundings& around) {
+        findSurroundings(both, features.firstId, features.secondId, touch, place, around);
       };
       const Surroundings around{std::ref(findAround), features.swapped};
       passages =

@@ -1,9 +1,13 @@
 #include "NarrowPhase/Surroundings.h"
 
+#include "Math/ClosestPoint.h"
+#include "Math/ExactMotion.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace palpate {
@@ -139,16 +143,150 @@ void findVertexSectors(const TriangleMesh& mesh, std::uint32_t vertex, TouchSurr
   }
 }
 
+/// The features at a touched edge or corner that triangles without area join. Such a triangle is on
+/// a line: the touching vertex is on several of its edges and corners.
+class FlatJoints {
+ public:
+  FlatJoints(const TriangleMesh& mesh, std::uint32_t own, std::size_t border,
+             const PlaceOnSegment& place)
+      : m_mesh(mesh), m_topology(mesh.topology), m_own(own), m_border(border), m_place(place) {}
+
+  /// Sets what surrounds the place. Returns false if nothing is joined there, at a border, and
+  /// where corners meet only for a moment.
+  bool find(TouchSurroundings& around) {
+    add(featureOf(m_topology, m_own, static_cast<TriangleFeature>(m_border)));
+    for (std::size_t i = 0; i < m_features.size(); ++i)
+      for (const std::uint32_t t : holdersOf(m_topology, m_features[i])) visit(t, m_features[i]);
+    if (m_features.size() < 2 ||
+        !std::all_of(m_features.begin(), m_features.end(),
+                     [&](const MeshFeature& feature) { return isClosed(feature); }))
+      return false;
+    const auto corner = std::find_if(m_features.begin(), m_features.end(), isCorner);
+    return corner == m_features.end() ? findAtEdges(around) : findAtCorner(corner->id, around);
+  }
+
+ private:
+  struct Face {
+    std::uint32_t triangle;
+    MeshFeature touched;
+  };
+  static bool isCorner(const MeshFeature& feature) {
+    return feature.kind == MeshFeature::Kind::Vertex;
+  }
+  void add(const MeshFeature& feature) {
+    if (feature.kind == MeshFeature::Kind::Edge && feature.id == kNoEdge) return;
+    if (std::find(m_features.begin(), m_features.end(), feature) == m_features.end())
+      m_features.push_back(feature);
+  }
+  void visit(std::uint32_t triangle, const MeshFeature& touched) {
+    if (std::find(m_visited.begin(), m_visited.end(), triangle) != m_visited.end()) return;
+    m_visited.push_back(triangle);
+    const Triangle& t = m_topology.elements[triangle];
+    if (!isFlat(t)) {
+      m_faces.push_back({triangle, touched});
+      return;
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::array ends{t[i], t[(i + 1) % 3]};
+      const auto place = m_place(stepOf(m_mesh, ends[0]), stepOf(m_mesh, ends[1]));
+      if (place == 2)
+        add({MeshFeature::Kind::Edge, m_topology.triangleEdges[triangle][i]});
+      else if (place)
+        add({MeshFeature::Kind::Vertex, ends[static_cast<std::size_t>(*place)]});
+    }
+  }
+  /// Whether a triangle has no area during the whole step.
+  bool isFlat(const Triangle& t) const {
+    for (const Positions* p : {&m_mesh.before, &m_mesh.now})
+      if (hasArea((*p)[t[0]], (*p)[t[1]], (*p)[t[2]])) return false;
+    std::array<Linear, 3> at;
+    toIntegers(std::array{stepOf(m_mesh, t[0]), stepOf(m_mesh, t[1]), stepOf(m_mesh, t[2])}, at);
+    const Quadratic normal = cross(difference(at[1], at[0]), difference(at[2], at[0]));
+    return std::all_of(normal.begin(), normal.end(), [](const auto& x) { return isZero(x); });
+  }
+  bool isClosed(const MeshFeature& feature) const {
+    if (isCorner(feature)) return Fan(m_mesh, feature.id).isClosed();
+    std::ptrdiff_t balance = 0;
+    for (const std::uint32_t triangle : m_topology.edgeTriangles[feature.id])
+      balance += edgeOf({triangle, feature})[0] == m_topology.edges[feature.id][0] ? 1 : -1;
+    return balance == 0;
+  }
+  /// The touched edge's vertices and the other one, in the winding of the triangle.
+  Triangle edgeOf(const Face& face) const {
+    const Triangle& t = m_topology.elements[face.triangle];
+    std::size_t i = 0;
+    while (i < 2 && m_topology.triangleEdges[face.triangle][i] != face.touched.id) ++i;
+    return {t[i], t[(i + 1) % 3], t[(i + 2) % 3]};
+  }
+  void addTriangle(const Face& face, TouchSurroundings& around) const {
+    const auto [a, b, c] = m_topology.elements[face.triangle];
+    around.triangles[1].push_back({stepOf(m_mesh, a), stepOf(m_mesh, b), stepOf(m_mesh, c)});
+  }
+
+  bool findAtCorner(std::uint32_t corner, TouchSurroundings& around) const {
+    const auto isThere = [&](const MeshFeature& feature) {
+      return !isCorner(feature) || (m_mesh.before[feature.id] == m_mesh.before[corner] &&
+                                    m_mesh.now[feature.id] == m_mesh.now[corner]);
+    };
+    if (!std::all_of(m_features.begin(), m_features.end(), isThere)) return false;
+    around.at[1] = stepOf(m_mesh, corner);
+    for (const Face& face : m_faces) {
+      addTriangle(face, around);
+      if (isCorner(face.touched)) {
+        around.sectors.push_back(Fan(m_mesh, face.touched.id).sectorOf(face.triangle));
+        continue;
+      }
+      const auto [p, q, opposite] = edgeOf(face);
+      const ImpactQuery::Step middle = stepOf(m_mesh, opposite);
+      around.sectors.push_back({stepOf(m_mesh, q), middle, face.triangle});
+      around.sectors.push_back({middle, stepOf(m_mesh, p), face.triangle});
+    }
+    for (const Sector& sector : around.sectors)
+      around.neighbours[1].insert(around.neighbours[1].end(), {sector.a, sector.b});
+    around.isClosed = true;
+    return true;
+  }
+
+  bool findAtEdges(TouchSurroundings& around) const {
+    const Triangle& own = m_topology.elements[m_own];
+    const ImpactQuery::Step end = stepOf(m_mesh, own[(m_border - 2) % 3]);
+    around.isEdge = around.isClosed = true;
+    around.at[1] = stepOf(m_mesh, own[m_border - 3]);
+    for (const Face& face : m_faces) {
+      addTriangle(face, around);
+      const auto [p, q, opposite] = edgeOf(face);
+      const ImpactQuery::Step aside = stepOf(m_mesh, opposite);
+      around.neighbours[1].push_back(aside);
+      if (m_place(stepOf(m_mesh, q), end))  // between both: the edge has the other direction
+        around.sectors.push_back({aside, end, face.triangle, true});
+      else
+        around.sectors.push_back({end, aside, face.triangle, false});
+    }
+    return true;
+  }
+
+  const TriangleMesh& m_mesh;
+  const MeshTopology& m_topology;
+  const std::uint32_t m_own;
+  const std::size_t m_border;
+  const PlaceOnSegment& m_place;
+  std::vector<MeshFeature> m_features;
+  std::vector<std::uint32_t> m_visited;
+  std::vector<Face> m_faces;
+};
+
 }  // namespace
 
 template <Kind kind>
 void findSurroundings(const Features<kind>& features, std::uint32_t firstId, std::uint32_t secondId,
-                      std::array<int, 2> touch, TouchSurroundings& around) {
+                      std::array<int, 2> touch, const PlaceOnSegment& place,
+                      TouchSurroundings& around) {
   const TriangleMesh &first = features.first, &second = features.second;
   if constexpr (kind == Kind::VertexTriangle) {
     around.own = secondId;
     findNeighbours(first, firstId, 0, around);
     const auto border = static_cast<std::size_t>(touch[1]);
+    if (FlatJoints(second, secondId, border, place).find(around)) return;
     if (border < 3) {
       const std::uint32_t corner = second.topology.elements[secondId][border];
       findNeighbours(second, corner, 1, around);
@@ -171,8 +309,8 @@ void findSurroundings(const Features<kind>& features, std::uint32_t firstId, std
   }
 }
 template void findSurroundings(const Features<Kind::VertexTriangle>&, std::uint32_t, std::uint32_t,
-                               std::array<int, 2>, TouchSurroundings&);
+                               std::array<int, 2>, const PlaceOnSegment&, TouchSurroundings&);
 template void findSurroundings(const Features<Kind::EdgeEdge>&, std::uint32_t, std::uint32_t,
-                               std::array<int, 2>, TouchSurroundings&);
+                               std::array<int, 2>, const PlaceOnSegment&, TouchSurroundings&);
 
 }  // namespace palpate

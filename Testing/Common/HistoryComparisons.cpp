@@ -2,6 +2,7 @@
 #include "Common/QueryCalls.h"
 #include "Common/Replayed.h"
 #include "Common/TemporaryFolder.h"
+#include "Math/ClosestPoint.h"
 
 #include <gtest/gtest.h>
 
@@ -295,11 +296,13 @@ void RandomHistory::compareWithNewObjects() {
 
 namespace {
 
+using BoxSides = std::vector<std::array<bool, 6>>;
+
 /// On which sides of its box each vertex lies.
-std::vector<std::array<bool, 6>> boxSides(const Positions& positions) {
+BoxSides boxSides(const Positions& positions) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : positions) box.extend(p);
-  std::vector<std::array<bool, 6>> all;
+  BoxSides all;
   for (const Vector3d& p : positions) {
     std::array<bool, 6> sides{};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -311,25 +314,49 @@ std::vector<std::array<bool, 6>> boxSides(const Positions& positions) {
   return all;
 }
 
-/// Whether all triangles have an area. Others may report a passage where a point slides over them.
-bool haveAreas(const std::vector<Triangle>& triangles, const Positions& p) {
-  return std::ranges::none_of(triangles, [&](const Triangle& t) {
-    return (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).isZero(0.0);
+/// Whether each triangle has an area at both ends of the step, or during none of it. A point that
+/// slides over others may have a passage.
+bool keepAreas(const std::vector<Triangle>& triangles, const Positions& before,
+               const Positions& now) {
+  return std::ranges::all_of(triangles, [&](const Triangle& t) {
+    const bool atStart = hasArea(before[t[0]], before[t[1]], before[t[2]]),
+               atEnd = hasArea(now[t[0]], now[t[1]], now[t[2]]);
+    if (atStart || atEnd) return atStart && atEnd;
+    const auto side = [&](const Positions& p, std::size_t i) -> Vector3d {
+      return p[t[i]] - p[t[0]];
+    };
+    return (side(before, 1).cross(side(now, 2)) + side(now, 1).cross(side(before, 2))).isZero(0.0);
+  });
+}
+
+/// Whether each triangle is on a side of its box and faces away from it.
+bool faceOutward(const std::vector<Triangle>& triangles, const Positions& p,
+                 const BoxSides& sides) {
+  return std::ranges::all_of(triangles, [&](const Triangle& t) {
+    const Vector3d normal = (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]);
+    for (std::size_t side = 0; side < 6; ++side)
+      if (sides[t[0]][side] && sides[t[1]][side] && sides[t[2]][side] &&
+          (side < 3 ? -1.0 : 1.0) * normal[static_cast<Eigen::Index>(side % 3)] >= 0.0)
+        return true;
+    return false;
   });
 }
 
 /// Whether a body is the surface of a box at both ends of the step, so that a point is in it once
 /// or not at all.
 bool isBoxInStep(const ModelBody& body) {
+  const std::vector<Triangle>& triangles = body.geometry.triangles;
   if (!body.isMesh() || !body.removed.empty() || !body.tetrahedra.empty() ||
-      !body.disabled.empty() || body.geometry.triangles.empty() ||
-      !findMeshDefects(body.geometry.triangles).closed())
+      !body.disabled.empty() || triangles.empty() || !findMeshDefects(triangles).closed())
     return false;
-  const auto sides = boxSides(body.geometry.positions);
-  const auto isOnOne = [](const std::array<bool, 6>& s) { return std::ranges::count(s, true) > 0; };
-  return std::ranges::all_of(sides, isOnOne) && haveAreas(body.geometry.triangles, body.before) &&
-         haveAreas(body.geometry.triangles, body.now) && boxSides(body.before) == sides &&
-         boxSides(body.now) == sides;
+  const BoxSides sides = boxSides(body.geometry.positions);
+  const auto isOnOpposite = [](const std::array<bool, 6>& s) {
+    return (s[0] && s[3]) || (s[1] && s[4]) || (s[2] && s[5]);
+  };
+  return std::ranges::none_of(sides, isOnOpposite) && boxSides(body.before) == sides &&
+         boxSides(body.now) == sides && faceOutward(triangles, body.before, sides) &&
+         faceOutward(triangles, body.now, sides) &&
+         keepAreas(triangles, body.beforeInWorld(), body.nowInWorld());
 }
 
 }  // namespace

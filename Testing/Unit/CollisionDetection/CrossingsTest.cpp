@@ -244,6 +244,25 @@ CubeSolid cubeSolid(Random& random) {
   return solid;
 }
 
+/// Splits an edge on the side of one of its two triangles. A triangle without area closes the
+/// surface: at the middle of the edge, or at its start, where one more vertex then is.
+void addFlatTriangles(Random& random, Mesh& mesh) {
+  std::vector<Triangle>& triangles = mesh.triangles;
+  const auto added = static_cast<std::uint32_t>(mesh.positions.size());
+  const std::size_t at = random() % triangles.size(), first = random() % 3;
+  const Triangle t = triangles[at];
+  const std::uint32_t p = t[first], q = t[(first + 1) % 3], r = t[(first + 2) % 3];
+  if (random() % 2 != 0) {
+    mesh.positions.push_back(0.5 * (mesh.positions[p] + mesh.positions[q]));
+    triangles[at] = {p, added, r};
+    triangles.insert(triangles.end(), {{added, q, r}, {q, added, p}});
+  } else {
+    mesh.positions.push_back(mesh.positions[p]);
+    triangles[at] = {added, q, r};
+    triangles.insert(triangles.end(), {{q, added, p}, {added, r, p}});
+  }
+}
+
 /// When the straight way from p to q enters and leaves the solid. Sliding along it is outside.
 std::vector<std::pair<double, bool>> changesOf(const CubeSolid& solid, const Vector3d& p,
                                                const Vector3d& q) {
@@ -267,7 +286,8 @@ std::vector<std::pair<double, bool>> changesOf(const CubeSolid& solid, const Vec
   return changes;
 }
 
-/// Points and a closed surface on a grid. The solid is sheared, moved and deformed.
+/// Points and a closed surface on a grid, of which some triangles have no area. The solid is
+/// sheared, moved and deformed.
 TEST(Crossings, OfAPointAreTheChangesOfInsideAndOutside) {
   Random random(4);
   const auto whole = [&](int most) {
@@ -276,8 +296,11 @@ TEST(Crossings, OfAPointAreTheChangesOfInsideAndOutside) {
   };
   std::size_t changeCount = 0, touchCount = 0;
   for (int run = 0; run < casesOf(100, 30);) {
-    const CubeSolid solid = cubeSolid(random);
+    CubeSolid solid = cubeSolid(random);
     if (!solid.isClosed()) continue;
+    for (int flat = run % 2 == 0 ? 0 : 40; flat > 0; --flat)
+      addFlatTriangles(random, solid.surface);
+    std::shuffle(solid.surface.triangles.begin(), solid.surface.triangles.end(), random);
     const bool deforms = run++ % 4 == 3;
     Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();
     if (run % 3 == 1) shape << 2, 1, 0, -1, 2, 1, 0, 1, 3;
