@@ -29,16 +29,21 @@ bool mayBeBodies(const Question& question) {
          hasClosedSurface(question.a) && hasClosedSurface(question.b);
 }
 
-/// In the world; none if the body may be larger than its box.
-std::optional<Eigen::AlignedBox3d> boxOf(const Body& geometry) {
-  const OctreeFrame frame(geometry);
-  auto box = frame.lengthsOf(frame.toWorld()(geometry.tree.octree().box(0)));
-  if (box) box->translate(frame.origin());
+/// Of the vertices that elements have now, in the world.
+Eigen::AlignedBox3d boxOf(const Body& body) {
+  Eigen::AlignedBox3d box;
+  TimeCheck check(512);
+  body.mesh.topology.forEachElement([&](std::uint32_t element) {
+    check();
+    for (const std::uint32_t v : body.mesh.topology.elements[element]) box.extend(body.mesh.now[v]);
+  });
   return box;
 }
-bool mayContain(const Body& outer, const Body& inner) {
-  const auto box = boxOf(outer), within = boxOf(inner);
-  return !box || !within || box->contains(*within);
+
+/// Whether the octree's box, which may be larger than the body, has a point.
+bool mayContain(const Body& body, const Vector3d& p) {
+  const OctreeFrame frame(body);
+  return frame.toWorld()(body.tree.octree().box(0)).overlaps(frame.boxInWorld(p));
 }
 
 std::uint32_t vertexOf(const Body& body) {
@@ -63,10 +68,9 @@ bool wasInside(const Body& inner, const Body& outer, PointQueryStack& stack) {
 /// Whether a vertex of a body whose box is in that of another one is inside it, at both ends of the
 /// step.
 bool isInside(const Body& inner, const Body& outer, Engine engine, PointQueryStack& stack) {
-  const std::uint32_t vertex = vertexOf(inner);
-  return mayContain(outer, inner) &&
-         windingNumber(outer, inner.mesh.now[vertex], engine, stack) != 0 &&
-         wasInside(inner, outer, stack);
+  const Vector3d& p = inner.mesh.now[vertexOf(inner)];
+  return mayContain(outer, p) && windingNumber(outer, p, engine, stack) != 0 &&
+         boxOf(outer).contains(boxOf(inner)) && wasInside(inner, outer, stack);
 }
 
 /// Calls f(normal along which the contact pushes a, whether it is of edges).

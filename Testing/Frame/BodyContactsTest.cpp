@@ -164,6 +164,29 @@ TEST(BodyContacts, HaveOneDirectionOrAgreeAndSatisfyTheLawOfContacts) {
 
 /// The feature that leaves last has a contact, wherever rounding puts its exit: turned bodies
 /// and turned positions, which differ by rounding, have contacts of the same depth.
+/// The box of a placed body is that of its turned octree.
+TEST(BodyContacts, ABodyInsideAnotherIsFoundAsItIsPlaced) {
+  const Mesh ball = sphere(8, 10, {0, 0, 0}, 0.45), unit = cube(0, 1);
+  const Pose pose{Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+                  {0.5, 0.5, 0.5}};
+  std::vector<std::uint64_t> hashes;
+  for (const bool isPlaced : {false, true}) {
+    OctreeBasedCD collisions;
+    const GeometryId a = addMesh(collisions, ball), b = addMesh(collisions, unit);
+    collisions.addCollisionPair(a, b, {});
+    std::vector<Vector3d> placed;
+    for (const Vector3d& p : ball.positions) placed.push_back(pose(p));
+    if (isPlaced)
+      collisions.setTransform(a, pose);
+    else
+      collisions.setPositions(a, placed);
+    collisions.detectCollision();
+    EXPECT_FALSE(collisions.collisionData(a, b).vertexTriangle().empty());
+    hashes.push_back(collisions.collisionData(a, b).hash());
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+}
+
 TEST(BodyContacts, TheDeepestFeatureHasAContact) {
   Random random(41);
   const Mesh unit = boxMesh({-1, -1, -1}, {1, 1, 1});
