@@ -60,7 +60,7 @@ namespace {
 using namespace description;
 
 constexpr std::string_view kStateTitle = "palpate-state";
-constexpr std::uint32_t kStateVersion = 5;
+constexpr std::uint32_t kStateVersion = 6;
 
 using Contents = CollisionData::Contents;
 using PairStates = std::array<SavedRevisions, 2>;

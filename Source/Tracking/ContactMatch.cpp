@@ -272,15 +272,16 @@ void ContactMatch::takePredecessors(std::uint32_t steps) {
   }
 }
 
-void ContactMatch::takeUserData(const Contents& earlier) {
+void ContactMatch::takeUserData(std::span<const Given> given, bool ofSecond) {
+  if (given.empty()) return;
   for (const Begun& begun : m_begun) {
     const ContactKey& key = begun.contact->key;
-    const auto& tracked = earlier.columnsOf(key.kind).tracked;
-    const TrackedContact* const found = findTracked(tracked, key);
-    if (!found) continue;
-    const auto place = static_cast<std::size_t>(found - tracked.data());
-    if (verticesOf(key, cornersAt(earlier, key.kind, place)) == begun.vertices)
-      begun.contact->userData = found->userData;
+    auto found = std::lower_bound(given.begin(), given.end(), key,
+                                  [](const Given& l, const ContactKey& r) { return l.key < r; });
+    for (; found != given.end() && found->key == key; ++found)
+      if (verticesOf(key, found->corners) == begun.vertices &&
+          found->ofSecond == (ofSecond && key.kind == ContactKind::Shape))
+        begun.contact->userData = found->userData;
   }
 }
 

@@ -52,8 +52,18 @@ class ContactMatch {
   /// geometry now, so that equal keys are other contacts.
   void track(const Contents& before, std::uint32_t steps, bool self, bool otherElements,
              Contents& next);
-  /// Contacts that began keep what an earlier answer of the same step was given for them.
-  void takeUserData(const Contents& earlier);
+  /// User data given to a contact that began in the step.
+  struct Given {
+    ContactKey key;
+    Triangle corners;  ///< cornersOf() the contact
+    bool ofSecond;     ///< Contents::trackedOfSecond, of a contact with a shape; else false
+    std::uint64_t userData;
+    bool isOf(const Given& other) const {
+      return key == other.key && corners == other.corners && ofSecond == other.ofSecond;
+    }
+  };
+  /// Contacts that began get their user data. given: sorted by key.
+  void takeUserData(std::span<const Given> given, bool ofSecond);
   /// Those of track(), ascending.
   std::span<const Ended> ended() const { return m_ended; }
 

@@ -40,7 +40,7 @@ ContactEnd firstOf(ContactEnd a, ContactEnd b) {
 bool ContactTracker::startStep(std::uint64_t step, const Contents& last) noexcept {
   if (m_step == step) return false;
   m_step = step;
-  m_repeats = false;
+  m_given.clear();
   if (std::exchange(m_isDropped, false)) return true;
   m_isHeld = m_hasGrown = false;
   m_beforeOfSecond = last.trackedOfSecond;
@@ -122,7 +122,7 @@ void ContactTracker::track(const MeshPair& pair, bool collides,
   const std::uint32_t grown = m_hasGrown ? 1 : 0;
   scratch.track(before(last), 1 - grown, pair.self(), hasOtherElements(next), next);
   if (!m_isHeld) reserveAs(next);
-  if (std::exchange(m_repeats, true)) scratch.takeUserData(last);
+  scratch.takeUserData(m_given, next.trackedOfSecond);
   const bool hasReasons =
       !collides || pair.predicate || pair.nearAtRest || m_elementsBefore != elements;
   next.ended.resize(scratch.ended().size());
@@ -176,6 +176,7 @@ void ContactTracker::skip(std::uint64_t step, bool drops, Contents& kept) noexce
 void ContactTracker::releaseMemory() {
   if (!m_isHeld) m_held = {};
   m_held.releaseSpare();
+  releaseSpare(m_given);
 }
 
 bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std::uint64_t data) {
@@ -184,15 +185,33 @@ bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std:
        &trackedBefore = m_held.columnsOf(key.kind).tracked;
   TrackedContact* const found = findTracked(tracked, key);
   if (!found) return false;
+  if (m_isHeld) {
+    // Detections of this step that are repeated read it here.
+    const bool isOfShape = key.kind == ContactKind::Shape;
+    const ContactMatch::Given given{
+        key, cornersAt(contents, key.kind, static_cast<std::size_t>(found - tracked.data())),
+        isOfShape && contents.trackedOfSecond, data};
+    TrackedContact* const before = findTracked(trackedBefore, key);
+    if (before && given.ofSecond == (isOfShape && m_beforeOfSecond) &&
+        cornersAt(m_held, key.kind, static_cast<std::size_t>(before - trackedBefore.data())) ==
+            given.corners)
+      before->userData = data;
+    else
+      give(given);
+  }
   found->userData = data;
-  if (!m_isHeld) return true;
-  // Detections of this step that are repeated read it here.
-  TrackedContact* const before = findTracked(trackedBefore, key);
-  if (before &&
-      cornersAt(m_held, key.kind, static_cast<std::size_t>(before - trackedBefore.data())) ==
-          cornersAt(contents, key.kind, static_cast<std::size_t>(found - tracked.data())))
-    before->userData = data;
   return true;
+}
+
+void ContactTracker::give(const ContactMatch::Given& given) {
+  auto place = std::lower_bound(m_given.begin(), m_given.end(), given.key,
+                                [](const auto& l, const ContactKey& r) { return l.key < r; });
+  for (; place != m_given.end() && place->key == given.key; ++place)
+    if (place->isOf(given)) {
+      place->userData = given.userData;
+      return;
+    }
+  m_given.insert(place, given);
 }
 
 }  // namespace palpate

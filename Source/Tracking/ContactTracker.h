@@ -61,6 +61,7 @@ class ContactTracker : public CountedObject {
   /// The contacts at the last advance().
   const Contents& before(const Contents& last) const { return m_isHeld ? m_held : last; }
   void reserveAs(const Contents& next);
+  void give(const ContactMatch::Given&);
   ContactEnd endOf(const MeshPair&, bool collides, const ContactMatch::Ended&) const;
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
@@ -71,8 +72,9 @@ class ContactTracker : public CountedObject {
   bool m_isHeld = false, m_hasGrown = false;
   bool m_beforeOfSecond = false;  ///< Contents::trackedOfSecond of these contacts
   std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< theirs; of the last answer
-  bool m_keeps = false, m_repeats = false;  ///< keep(); track() was called in this step
-  bool m_isDropped = false;                 ///< m_held is all that is left of the last answer
+  Buffer<ContactMatch::Given> m_given;                        ///< in this step, sorted by key
+  bool m_keeps = false;                                       ///< keep()
+  bool m_isDropped = false;  ///< m_held is all that is left of the last answer
 };
 
 }  // namespace palpate

@@ -49,8 +49,18 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
     revisions[i].elementsOf(file, m_elementsBefore[i]);
     revisions[i].elementsOf(file, m_elements[i]);
   }
-  for (bool* flag : {&m_keeps, &m_repeats, &m_isDropped}) fieldOf(file, *flag);
+  itemsOf(file, m_given, 2 + sizeof(ContactKey::ids) + sizeof(Triangle) + 8,
+          [&](ContactMatch::Given& given) {
+            description::contactKeyOf(file, given.key);
+            fieldOf(file, given.corners);
+            fieldOf(file, given.ofSecond);
+            file.integer(given.userData);
+          });
+  for (bool* flag : {&m_keeps, &m_isDropped}) fieldOf(file, *flag);
   if constexpr (File::kReads) {
+    file.need(std::is_sorted(m_given.begin(), m_given.end(),
+                             [](const auto& l, const auto& r) { return l.key < r.key; }),
+              "user data of contacts are not in order");
     file.need(std::is_sorted(entries.begin(), entries.end(),
                              [](const Entry& l, const Entry& r) { return l.key < r.key; }),
               "tracked contacts are not in order");

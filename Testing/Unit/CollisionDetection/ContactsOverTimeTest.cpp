@@ -118,19 +118,21 @@ class TrackingOracle {
       ++slides;
     }
     for (const ContactKey& key : begun)
-      if (const auto now = m_now.find(key); m_detected && now != m_now.end())
-        next[key].data = now->second.data;
+      if (const auto given = m_given.find(key); given != m_given.end())
+        next[key].data = given->second;
     ends += m_ended.size();
     m_now = next;
-    m_detected = true;
   }
   void advance() {
     m_before = m_now;
-    m_detected = false;
+    m_given.clear();
   }
   void setUserData(const ContactKey& key, std::uint64_t data) {
     m_now.at(key).data = data;
-    if (m_before.contains(key)) m_before[key].data = data;
+    if (m_before.contains(key))
+      m_before[key].data = data;
+    else
+      m_given[key] = data;
   }
   void expect(const CollisionData& data) const {
     const std::vector<TrackedContact> found = allTracked(data);
@@ -156,7 +158,8 @@ class TrackingOracle {
   }
 
  private:
-  bool m_self, m_detected = false;
+  bool m_self;
+  std::map<ContactKey, std::uint64_t> m_given;
   KeyedContacts m_before, m_now, m_ended;
 };
 
@@ -466,6 +469,43 @@ TEST_F(ContactEnds, SlidingLastsAsOneContact) {
     keys.insert(last = contact.key);
   }
   EXPECT_GE(keys.size(), 3u);
+}
+
+/// A detection of the same step found the second contact as the successor of the first one.
+TEST(ContactsOverTime, UserDataFollowTheLastDetectionOfAStep) {
+  const Mesh square{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  OctreeBasedCD collisions;
+  const GeometryId a = addMesh(collisions, square),
+                   b = collisions.addPointSet(Positions{{0.75, 0.25, 0.05}});
+  collisions.addCollisionPair(a, b,
+                              {.method = Method::Proximity,
+                               .thickness = 0.1,
+                               .contacts = Contacts::All,
+                               .trackContacts = true});
+  const auto dataAt = [&](double x) {
+    collisions.setPositions(b, Positions{{x, 1 - x, 0.05}});
+    collisions.detectCollision();
+    std::map<std::uint32_t, std::uint64_t> ofTriangles;
+    for (const TrackedContact& contact : collisions.collisionData(a, b).trackedTriangleVertex())
+      ofTriangles[contact.key.ids[0]] = contact.userData;
+    return ofTriangles;
+  };
+  using Data = std::map<std::uint32_t, std::uint64_t>;
+  const auto keyOf = [](std::uint32_t triangle) {
+    return ContactKey{ContactKind::TriangleVertex, {triangle, 0, kNoElement, kNoElement}};
+  };
+  EXPECT_EQ(dataAt(0.75), (Data{{0, 0}}));
+  collisions.setUserData(a, b, keyOf(0), 17);
+  collisions.advance();
+  EXPECT_EQ(dataAt(0.25), (Data{{1, 17}}));
+  EXPECT_EQ(dataAt(0.5), (Data{{0, 17}, {1, 0}}));
+  EXPECT_EQ(dataAt(0.25), (Data{{1, 17}}));
+  collisions.setUserData(a, b, keyOf(1), 5);
+  EXPECT_EQ(dataAt(0.5), (Data{{0, 17}, {1, 5}}));
+  EXPECT_EQ(dataAt(0.75), (Data{{0, 17}}));
+  EXPECT_EQ(dataAt(0.25), (Data{{1, 5}}));
+  collisions.advance();
+  EXPECT_EQ(dataAt(0.75), (Data{{0, 5}}));
 }
 
 TEST_F(ContactEnds, NoPairWithoutTheSetting) {
