@@ -414,12 +414,13 @@ void OctreeBasedCD::setUserData(GeometryId a, GeometryId b, const ContactKey& ke
   const Implementation::ChangeGuard all(m_implementation);
   PairRecord& record = all->pairs.inOrder(all->geometries, a, b);
   const auto& tracker = record.memory.tracker.tracker;
-  if (!tracker || !tracker->setUserData(CollisionData::Contents::of(record.last.data), key, data))
+  const bool isTracked = tracker && tracker->isTracked();
+  if (!isTracked || !tracker->setUserData(CollisionData::Contents::of(record.last.data), key, data))
     throw Error(ErrorCode::NotAvailable,
                 nameOf(*record.a, *record.b) +
-                    (tracker ? ": the last detection has no contact with this key"
-                             : ": no detection has tracked contacts: "
-                               "PairSettings::trackContacts is not set"),
+                    (isTracked ? ": the last detection has no contact with this key"
+                               : ": no detection has tracked contacts: "
+                                 "PairSettings::trackContacts is not set"),
                 a);
 }
 

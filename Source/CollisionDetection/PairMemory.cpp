@@ -14,8 +14,9 @@ void TrackerMemory::follow(const PairMoment& moment, bool isCurrent, ContactMatc
   const auto& [step, question, collides, last, found, isOutdated] = moment;
   const bool changes = !isCurrent;
   if (changes && !collides) found.contents() = {};
+  if (tracker && tracker->hasEnded(step)) tracker.reset();
   if (!question.settings().trackContacts) {
-    tracker.reset();
+    if (tracker) tracker->startStep(step, Contents::of(last));
     if (!changes || !collides) return;
     found.contents().drop(&Contents::Columns::tracked);
     CountedVector<TrackedContact>().swap(found.contents().ended);
@@ -40,7 +41,9 @@ void TrackerMemory::keep(CollisionData& last) noexcept {
 }
 
 void TrackerMemory::commit(const PairMoment& moment) noexcept {
-  if (tracker) tracker->hold(moment.found.contents());
+  if (!tracker) return;
+  tracker->hold(moment.found.contents());
+  tracker->setTracked(moment.question.settings().trackContacts);
 }
 
 void TrackerMemory::skip(const PairMoment& moment) noexcept {

@@ -38,6 +38,11 @@ class ContactTracker : public CountedObject {
   /// Another answer has replaced the last one. Takes the contacts of that one, which `before` has,
   /// if they are those at the last advance().
   void hold(Contents& before) noexcept;
+  /// Whether the last answer is tracked. If not, and it is that at the end of its step, contacts
+  /// begin anew in the next one.
+  void setTracked(bool isTracked) noexcept { m_isTracked = isTracked; }
+  bool isTracked() const { return m_isTracked; }
+  bool hasEnded(std::uint64_t step) const { return !m_isTracked && m_step != step; }
   /// There is no answer in this step: `kept` is that of an earlier detection, whose contacts
   /// neither grow older nor end. drops: it will be cleared, as its elements are no more. The next
   /// answer is compared with it even so.
@@ -74,6 +79,7 @@ class ContactTracker : public CountedObject {
   std::array<ElementsState, 2> m_elementsBefore, m_elements;  ///< theirs; of the last answer
   Buffer<ContactMatch::Given> m_given;                        ///< in this step, sorted by key
   bool m_keeps = false;                                       ///< keep()
+  bool m_isTracked = true;                                    ///< the last answer
   bool m_isDropped = false;  ///< m_held is all that is left of the last answer
 };
 

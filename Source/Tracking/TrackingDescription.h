@@ -56,7 +56,7 @@ void ContactTracker::describe(File& file, const auto& revisions, const Contents&
             fieldOf(file, given.ofSecond);
             file.integer(given.userData);
           });
-  for (bool* flag : {&m_keeps, &m_isDropped}) fieldOf(file, *flag);
+  for (bool* flag : {&m_keeps, &m_isTracked, &m_isDropped}) fieldOf(file, *flag);
   if constexpr (File::kReads) {
     file.need(std::is_sorted(m_given.begin(), m_given.end(),
                              [](const auto& l, const auto& r) { return l.key < r.key; }),

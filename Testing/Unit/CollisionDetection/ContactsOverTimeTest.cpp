@@ -517,6 +517,25 @@ TEST_F(ContactEnds, NoPairWithoutTheSetting) {
                          [&] { collisions.setUserData(a, b, key, 1); });
 }
 
+/// What counts is the setting of the last detection of a step.
+TEST_F(ContactEnds, ADetectionWithoutTheSettingForgetsNothingInItsStep) {
+  const PairSettings tracked = collisions.pairs()[0].settings;
+  PairSettings without = tracked;
+  without.trackContacts = false;
+  collisions.setPairSettings(a, b, without);
+  collisions.detectCollision();
+  EXPECT_TRUE(data().trackedTriangleVertex().empty());
+  collisions.setPairSettings(a, b, tracked);
+  collisions.detectCollision();
+  EXPECT_EQ(data().trackedTriangleVertex()[0].age, 1u);
+  collisions.setPairSettings(a, b, without);
+  collisions.detectCollision();
+  collisions.advance();
+  collisions.setPairSettings(a, b, tracked);
+  collisions.detectCollision();
+  EXPECT_EQ(data().trackedTriangleVertex()[0].age, 0u);
+}
+
 TEST_F(ContactEnds, ErrorsNameThePair) {
   const ContactKey key{ContactKind::TriangleVertex, {0, 1, kNoElement, kNoElement}};
   testing::expectRefused(ErrorCode::NotAvailable, "no contact with this key",
