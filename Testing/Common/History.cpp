@@ -428,6 +428,9 @@ void RandomHistory::expectNothingTouches() {
     };
     return !isCertain(pair.a) || !isCertain(pair.b);
   });
+  // Continuous takes one radius for all vertices.
+  for (const ModelPair& pair : guarded.pairs)
+    for (const GeometryId id : {pair.a, pair.b}) guarded.bodies.at(id).geometry.radii = {0.0};
   for (ModelPair& pair : guarded.pairs)
     pair.settings = {.method = Method::Continuous,
                      .contacts = Contacts::All,
