@@ -10,14 +10,9 @@ faults=0
 fault() { echo "$*"; faults=1; }
 sourceFiles() { find Source -name '*.h' -o -name '*.cpp' | sort; }
 
-# include lines of a file, one a line: <name> or "name
-includesOf() { sed -nE 's/^[[:space:]]*#[[:space:]]*include[[:space:]]+([<"][^>"]+).*/\1/p' "$1"; }
-
-# The module of a file: its folder in Source, or in Source/Adapters.
-moduleOf() {
-  local path=${1#Source/}
-  path=${path#Adapters/}
-  echo "${path%%/*}"
+# The include lines of files, one a line: the file, and <name or "name
+includesOf() {
+  grep -HoE '^[[:space:]]*#[[:space:]]*include[[:space:]]+[<"][^>"]+' "$@" | sed -E 's/:[^<"]*/ /'
 }
 
 # What a module may include: folders, or files of them.
@@ -50,48 +45,45 @@ allowedIn() {
 
 # Includes go down the table only; Core sees no more of Public than its plain types.
 checkIncludes() {
-  local file module include allowed prefix
-  while read -r file; do
-    module=$(moduleOf "$file") allowed=$(allowedIn "$module")
-    while read -r include; do
-      case $include in
-        \"*)
-          for prefix in $allowed; do [[ ${include#\"} == "$prefix"* ]] && continue 2; done
-          fault "$file: $module may not include ${include#\"}"
-          ;;
-        "<palpate/"*)
-          [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|FrameStatistics)\.h$ ]] ||
-            fault "$file: Core may include Public's plain types only, not ${include#<}"
-          ;;
-      esac
-    done < <(includesOf "$file")
-  done < <(sourceFiles)
+  local file include prefix module="" of allowed
+  while read -r file include; do
+    of=${file#Source/} of=${of#Adapters/} of=${of%%/*}  # the folder in Source, or in Source/Adapters
+    [[ $of == "$module" ]] || module=$of allowed=$(allowedIn "$of")
+    case $include in
+      \"*)
+        for prefix in $allowed; do [[ ${include#\"} == "$prefix"* ]] && continue 2; done
+        fault "$file: $module may not include ${include#\"}"
+        ;;
+      "<palpate/"*)
+        [[ $module != Core || $include =~ ^.palpate/(Types|Error|Export|Executor|Settings|FrameStatistics)\.h$ ]] ||
+          fault "$file: Core may include Public's plain types only, not ${include#<}"
+        ;;
+    esac
+  done < <(includesOf $(sourceFiles))
 }
 
 # Each library in its one place; besides them the standard library and Eigen's Core and Geometry only.
 checkPlaces() {
   local file include place
-  while read -r file; do
-    while read -r include; do
-      case $include in
-        "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
-        "<tbb/"* | "<oneapi/"* | "<thread" | "<future" | "<execution" | "<pthread.h")
-          place=Source/Core/Threads.cpp ;;
-        "<stddef.h" | "<stdint.h") place=Source/Public/palpate/palpate_c.h ;;
-        "<condition_variable") place=Source/Core/ ;;
-        "<hwy/"*) place=Source/Core/Simd.h ;;
-        "<meshoptimizer.h") place=Source/Simplify/Meshoptimizer/Simplify.cpp ;;
-        "<gmp"*) place=Source/Exact/Exact.h ;;
-        "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
-        "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
-        "<imstk"*) place=Source/Adapters/iMSTK/ ;;
-        "<pybind11/"*) place=Source/Adapters/Python/Arrays.h ;;
-        *[./]*) place=nowhere ;;
-        *) continue ;;
-      esac
-      [[ $file == "$place"* ]] || fault "$file: ${include#<} may be included in $place only"
-    done < <(includesOf "$file" | grep '^<')
-  done < <(sourceFiles)
+  while read -r file include; do
+    case $include in
+      \"* | "<palpate/"* | "<Eigen/Core" | "<Eigen/Geometry") continue ;;
+      "<tbb/"* | "<oneapi/"* | "<thread" | "<future" | "<execution" | "<pthread.h")
+        place=Source/Core/Threads.cpp ;;
+      "<stddef.h" | "<stdint.h") place=Source/Public/palpate/palpate_c.h ;;
+      "<condition_variable") place=Source/Core/ ;;
+      "<hwy/"*) place=Source/Core/Simd.h ;;
+      "<meshoptimizer.h") place=Source/Simplify/Meshoptimizer/Simplify.cpp ;;
+      "<gmp"*) place=Source/Exact/Exact.h ;;
+      "<vtk"* | "<X11/"*) place=Source/Adapters/Vtk/ ;;
+      "<fcl/"* | "<ccd/"*) place=Source/Adapters/Fcl/ ;;
+      "<imstk"*) place=Source/Adapters/iMSTK/ ;;
+      "<pybind11/"*) place=Source/Adapters/Python/Arrays.h ;;
+      *[./]*) place=nowhere ;;
+      *) continue ;;
+    esac
+    [[ $file == "$place"* ]] || fault "$file: ${include#<} may be included in $place only"
+  done < <(includesOf $(sourceFiles))
 }
 
 # Each public header compiles alone, palpate_c.h as C99, too. It includes nothing of Eigen but Core and Geometry, and
@@ -145,7 +137,7 @@ checkPublicHeaders() {
         grep -qx "$include" "$files" || fault "$header does not include $include"
       done
     fi
-    while read -r include; do
+    while read -r _ include; do
       [[ $include =~ ^.palpate/(vtk/|fcl/)?[A-Za-z]+\.h$|^\<Eigen/(Core|Geometry)$|^\<[a-z_]+$ ]] ||
         fault "$header includes ${include:1}"
     done < <(includesOf "$header")
@@ -289,10 +281,11 @@ checkFigures() {
 
 # Each source file has a header of its name, beside it or public, or its first line says of which header it is a part.
 checkParts() {
-  local file name header
+  local file name header public
+  public=$(find Source -path '*Public/*/*.h')$'\n'
   while read -r file; do
-    name=$(basename "$file" .cpp).h
-    [[ -e ${file%.cpp}.h || -n $(find Source -path "*Public/*/$name") ]] && continue
+    name=${file##*/} name=${name%.cpp}.h
+    [[ -e ${file%.cpp}.h || $public == *"/$name"$'\n'* ]] && continue
     header=$(sed -nE '1s|^// Part of <?([A-Za-z/_]+\.h)>?: .*|\1|p' "$file")
     [[ -n $header && -n $(find Source -path "*/$header") ]] || fault "$file: the first line names no header"
   done < <(sourceFiles | grep '\.cpp$')
@@ -359,7 +352,8 @@ checkLinks() {
   local page link
   while read -r page; do
     while read -r link; do
-      [[ -e $(dirname "$page")/$link ]] || fault "$page: $link leads nowhere"
+      [[ $page/ != */*/ ]] || link=${page%/*}/$link
+      [[ -e $link ]] || fault "$page: $link leads nowhere"
     done < <(sed '/^ *```/,/^ *```/d; /^ *<!--/,/-->/d' "$page" | grep -oE '\]\([^)#:]+\)' | tr -d '()]')
   done < <(find README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md .github Docs Data Examples Testing -name '*.md' 2>/dev/null)
   while read -r page; do
