@@ -40,7 +40,7 @@ inline constexpr bool kSanitized = kAddressSanitizer || kThreadSanitizer;
 #ifdef PALPATE_SHARE_OF_CASES
 inline constexpr int kShareOfCases = PALPATE_SHARE_OF_CASES;
 #else
-inline constexpr int kShareOfCases = kSanitized ? 7 : 1;
+inline constexpr int kShareOfCases = kSanitized ? 13 : 1;
 #endif
 
 /// Whether a test leaves out a case. Cases are counted from 0.

@@ -278,7 +278,8 @@ TEST(ContactsOverTime, AreThoseOfMapsOverKeys) {
     reference.addCollisionPair(ids[0], ids[1], scene.settings);
     TrackingOracle oracle(ids[0] == ids[1]);
     Random random(3);
-    for (int step = 0; step < 12; ++step) {
+    const int steps = kShareOfCases > 1 ? 7 : 12;  // with one that detects nothing
+    for (int step = 0; step < steps; ++step) {
       const int rounds = step == 5 ? 0 : 1 + step % 3;
       for (int round = 0; round < rounds; ++round) {
         const bool rests = step % 4 == 3;
