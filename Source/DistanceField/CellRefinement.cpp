@@ -24,7 +24,7 @@ namespace {
 /// that hang.
 constexpr double kShareOfCells = 0.96;
 constexpr std::size_t kSlice = 1 << 14;  ///< points or cells between two reports
-constexpr std::size_t kGrain = 64;
+constexpr std::size_t kItemsPerPart = 64;
 /// Cells on lower levels are split where only some of their points may have a reliable sign.
 constexpr int kSignLevel = 2;
 /// The need for memory is estimated when there are so many cells, and they use this part of the
@@ -44,9 +44,9 @@ void inSlices(std::size_t first, std::size_t end, double done, const BuildProgre
         done + 0.5 * static_cast<double>(at - first) / static_cast<double>(end - first);
     build.report(1.0 - std::ldexp(1.0 - 0.5 * inRound, 1 - build.rounds));
     const std::size_t size = std::min(kSlice, end - at);
-    build.threads.forChunks(size, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-      f(at + from, at + to);
-    });
+    build.threads.forChunks(
+        size, kItemsPerPart,
+        [&](std::size_t, std::size_t from, std::size_t to) { f(at + from, at + to); });
   }
 }
 
@@ -104,12 +104,13 @@ void evaluateCorners(CellTree& tree, std::size_t firstCell, const FieldSurface& 
       tree.hasSign[corner] = 1;
     }
   }
-  build.threads.forChunks(known.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    PointQueryStack stack;
-    for (std::size_t i = from; i < to; ++i)
-      if (surface.sign.isInside(tree.positionOf(known[i]), stack))
-        tree.distances[known[i]] = -tree.distances[known[i]];
-  });
+  build.threads.forChunks(known.size(), kItemsPerPart,
+                          [&](std::size_t, std::size_t from, std::size_t to) {
+                            PointQueryStack stack;
+                            for (std::size_t i = from; i < to; ++i)
+                              if (surface.sign.isInside(tree.positionOf(known[i]), stack))
+                                tree.distances[known[i]] = -tree.distances[known[i]];
+                          });
   inSlices(first, size, 0.0, build, [&](std::size_t from, std::size_t to) {
     PointQueryStack stack;
     for (std::size_t i = from; i < to; ++i) evaluate(tree, i, surface, stack);
@@ -133,7 +134,7 @@ std::vector<std::uint32_t> testCells(CellTree& tree, std::size_t first, const Fi
   const std::size_t end = tree.cells.size();
   if (!surface.sign.isClosed())
     build.threads.forChunks(
-        end - first, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
+        end - first, kItemsPerPart, [&](std::size_t, std::size_t from, std::size_t to) {
           for (TreeCell& cell : std::span(tree.cells).subspan(first + from, to - from))
             findSign(domain, tree.positionOf(cell.corners[0]), surface.sign, cell);
         });

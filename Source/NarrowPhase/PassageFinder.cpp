@@ -10,9 +10,9 @@
 
 namespace palpate {
 
-namespace {
-
 using Kind = ImpactQuery::Kind;
+
+namespace {
 
 template <Kind kind>
 Features<kind> featuresOf(const MeshPair& pair, bool swapped) {

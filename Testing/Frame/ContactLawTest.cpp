@@ -345,24 +345,24 @@ TEST(ContactLaw, HoldsForEveryMethodAndGeometry) {
                     std::to_string(static_cast<int>(answered))]
         .counts[what];
   };
-  EXPECT_GT(count(Method::Intersection, Method::Intersection, "behind"), leastOf(100));
+  EXPECT_GE(count(Method::Intersection, Method::Intersection, "behind"), leastOf(100));
   // Where no end of a crossing edge is behind. A vertex is in front only where no edge has crossed.
   EXPECT_GE(count(Method::Intersection, Method::Intersection, "edges"), leastOf(10));
   EXPECT_GE(count(Method::Intersection, Method::Intersection, "in front"), leastOf(1));
   for (const Method method : {Method::Proximity, Method::Continuous}) {
-    EXPECT_GT(count(method, method, "edges"), leastOf(1000));
-    EXPECT_GT(count(method, method, "shape"), leastOf(1000));
-    EXPECT_GT(count(method, method, "two shapes"), leastOf(50));
+    EXPECT_GE(count(method, method, "edges"), leastOf(1000));
+    EXPECT_GE(count(method, method, "shape"), leastOf(1000));
+    EXPECT_GE(count(method, method, "two shapes"), leastOf(50));
     for (const char* what : {"at a corner", "at an edge", "at a face", "of a segment"})
-      EXPECT_GT(count(method, method, what), leastOf(100)) << what;
+      EXPECT_GE(count(method, method, what), leastOf(100)) << what;
     for (const char* what : {"within an edge", "at an edge's end"})
-      EXPECT_GT(count(method, method, what), leastOf(100)) << what;
+      EXPECT_GE(count(method, method, what), leastOf(100)) << what;
   }
   for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
-    EXPECT_GT(count(Method::Auto, method, "edges"), leastOf(100)) << static_cast<int>(method);
-  EXPECT_GT(count(Method::Auto, Method::Intersection, "behind"), leastOf(30));
-  EXPECT_GT(count(Method::Auto, Method::Continuous, "behind"), leastOf(10));
-  EXPECT_GT(count(Method::Auto, Method::Auto, "behind"), leastOf(10));
+    EXPECT_GE(count(Method::Auto, method, "edges"), leastOf(100)) << static_cast<int>(method);
+  EXPECT_GE(count(Method::Auto, Method::Intersection, "behind"), leastOf(30));
+  EXPECT_GE(count(Method::Auto, Method::Continuous, "behind"), leastOf(10));
+  EXPECT_GE(count(Method::Auto, Method::Auto, "behind"), leastOf(10));
 }
 
 /// Degenerate meshes, coordinates near the ends of the range of double, and self-collision.
@@ -384,8 +384,8 @@ TEST(ContactLaw, HoldsForDegenerateMeshes) {
       if (HasFatalFailure() || HasNonfatalFailure()) return;
     }
   }
-  EXPECT_GT(seen.counts["touching"], leastOf(1000));
-  EXPECT_GT(seen.counts["edges"], leastOf(1000));
+  EXPECT_GE(seen.counts["touching"], leastOf(1000));
+  EXPECT_GE(seen.counts["edges"], leastOf(1000));
 }
 
 /// The tip of a spike below a face: a solver that corrects it to a gap of 0.05 brings it above.

@@ -220,9 +220,9 @@ TEST(SideMemory, OfVerticesIsThatOfTheHistoryOfCrossings) {
         scene.advance();
       }
     }
-  EXPECT_GT(checked, 700u / kShareOfCases);
-  EXPECT_GT(wrong, 100u / kShareOfCases);
-  EXPECT_GT(returned, 35u / kShareOfCases);
+  EXPECT_GE(checked, leastOf(700));
+  EXPECT_GE(wrong, leastOf(100));
+  EXPECT_GE(returned, leastOf(35));
 }
 
 /// Whether an edge of a crosses a triangle of b when the step begins.
@@ -284,8 +284,8 @@ TEST(SideMemory, OfAThreadAndAMembraneIsThatOfTheHistoryOfCrossings) {
       scene.advance();
     }
   }
-  EXPECT_GE(above, 10u / kShareOfCases);
-  EXPECT_GE(below, 10u / kShareOfCases);
+  EXPECT_GE(above, leastOf(10));
+  EXPECT_GE(below, leastOf(10));
 }
 
 /// Two threads that cross once, as seen from above, with their vertices in any order. self: they

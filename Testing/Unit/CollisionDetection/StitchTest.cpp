@@ -190,7 +190,7 @@ TEST(Stitch, EachPassageIsReportedInItsStepWithItsElements) {
   for (const auto& [kind, count] : found) std::printf("%s: %zu\n", kind.c_str(), count);
   for (const char* kind : {"disabled", "tied", "hole by its end", "hole by its side",
                            "knot by its end", "knot by its side", "parts by its side"})
-    EXPECT_GT(found[kind], leastOf(5)) << kind;
+    EXPECT_GE(found[kind], leastOf(5)) << kind;
 }
 
 }  // namespace

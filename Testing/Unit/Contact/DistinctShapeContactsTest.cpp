@@ -140,9 +140,9 @@ TEST(DistinctShapeContacts, OfAFlatFloorHaveItsNormal) {
           tilted += std::count_if(all.begin(), all.end(), isTilted);
         }
     }
-  EXPECT_GT(contacts, leastOf(1000, 200));
-  EXPECT_GT(impacts, leastOf(50, 10));
-  EXPECT_GT(tilted, 10 * leastOf(1000, 200));
+  EXPECT_GE(contacts, leastOf(1000, 200));
+  EXPECT_GE(impacts, leastOf(50, 10));
+  EXPECT_GE(tilted, 10 * leastOf(1000, 200));
 }
 
 std::set<std::uint32_t> sorted(const Triangle& vertices) {
@@ -224,8 +224,8 @@ TEST(DistinctShapeContacts, MatchTheDefinition) {
             << " of " << candidates.size() << ", expected " << expected.size();
         EXPECT_EQ(distinct.shape().empty(), all.shape().empty());
       }
-  EXPECT_GT(kept, leastOf(1000));
-  EXPECT_GT(dropped, leastOf(1000));
+  EXPECT_GE(kept, leastOf(1000));
+  EXPECT_GE(dropped, leastOf(1000));
 }
 
 /// An upright prism over a regular polygon, with its lower rim first, at z = 0.
@@ -404,7 +404,7 @@ TEST(DistinctShapeContacts, OfABodyThatStandsInAFloorLeadOut) {
         }
     }
   }
-  EXPECT_GT(contacts, leastOf(20000));
+  EXPECT_GE(contacts, leastOf(20000));
 }
 
 }  // namespace

@@ -126,7 +126,7 @@ TEST(FeatureStar, SaysWhatRaysSayOfConesOfAnyShape) {
     for (std::uint32_t e = 0; e < answers.topology().edges.size(); ++e)
       check({MeshFeature::Kind::Edge, e});
   }
-  EXPECT_GT(closed, static_cast<int>(testing::leastOf(1000, 300)));
+  EXPECT_GE(closed, static_cast<int>(testing::leastOf(1000, 300)));
 }
 
 }  // namespace

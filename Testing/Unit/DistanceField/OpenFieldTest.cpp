@@ -197,7 +197,7 @@ TEST(OpenField, HasTheSignOfEveryPatchThatIsNotTooWide) {
       ++compared;
     }
   }
-  EXPECT_GT(compared, leastOf(1000));
+  EXPECT_GE(compared, leastOf(1000));
 }
 
 TEST(OpenField, IsReliableFarAway) {
@@ -222,7 +222,7 @@ TEST(OpenField, IsReliableFarAway) {
       EXPECT_LT(std::abs(windingNumber(mesh, p)), 0.375) << p.transpose();
       EXPECT_GT(field.value(p), 0.0);
     }
-    EXPECT_GT(reliable, leastOf(100));
+    EXPECT_GE(reliable, leastOf(100));
   }
 }
 
@@ -277,8 +277,8 @@ TEST(OpenField, ListsContactsWithoutAReliableSign) {
       unreliable.push_back(i);
     }
     EXPECT_EQ(data.validity().unreliableSign, unreliable);
-    EXPECT_GT(unreliable.size(), 5u);
-    EXPECT_GT(inside, 5u);
+    EXPECT_GE(unreliable.size(), leastOf(6));
+    EXPECT_GE(inside, leastOf(6));
     if (isMesh) continue;
     std::size_t expected = 0;
     for (const Vector3d& p : points) expected += field->value(p) <= kThickness;
@@ -317,7 +317,7 @@ TEST(OpenField, MissesNoTriangleInside) {
     ++found;
     missing += !isContact[t];
   }
-  EXPECT_GT(found, leastOf(30));
+  EXPECT_GE(found, leastOf(30));
   EXPECT_EQ(missing, 0u);
 }
 

@@ -58,7 +58,7 @@ TEST(RayTriangle, AgreesWithRationalArithmeticOnSmallGrids) {
     SCOPED_TRACE(i);
     expectShared(ray, t, hits);
   }
-  EXPECT_GT(hits, static_cast<int>(testing::leastOf(2000)));
+  EXPECT_GE(hits, static_cast<int>(testing::leastOf(2000)));
 }
 
 /// Rays through edges and corners, and rays that begin or end on the triangle, up to rounding.
@@ -127,7 +127,7 @@ TEST(RayTriangle, FirstPointsAreWithinTheStatedError) {
         w[0] * t[0] + w[1] * t[1] + w[2] * t[2] - (ray.origin + point.t * ray.direction);
     ASSERT_LE(away.cwiseAbs().maxCoeff(), 0x1p-44 * extent) << i;
   }
-  EXPECT_GT(hits, static_cast<int>(testing::leastOf(4000)));
+  EXPECT_GE(hits, static_cast<int>(testing::leastOf(4000)));
 }
 
 }  // namespace

@@ -165,7 +165,7 @@ TEST_P(ContinuousScenes, ReportExactlyThePassages) {
       return isIn(atBorders, crossing) && !isIn(passages, crossing);
     });
     EXPECT_EQ(passages, expected);
-    EXPECT_GT(expected.size(), testing::leastOf((vertexTriangle + edgeEdge) / 10));
+    EXPECT_GE(expected.size(), testing::leastOf((vertexTriangle + edgeEdge) / 10));
   }
 }
 

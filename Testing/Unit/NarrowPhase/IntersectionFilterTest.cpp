@@ -198,8 +198,8 @@ TEST(IntersectionFilter, IgnoresCommonCornersOfOneMeshAsTheDefinitionDoes) {
     found += out.intersectingTriangles.size();
     left += static_cast<std::size_t>(std::count(isKept.begin(), isKept.end(), false));
   }
-  EXPECT_GT(found, testing::leastOf(10000));
-  EXPECT_GT(left, testing::leastOf(10000));
+  EXPECT_GE(found, testing::leastOf(10000));
+  EXPECT_GE(left, testing::leastOf(10000));
 }
 
 }  // namespace

@@ -204,7 +204,7 @@ TEST(Sidedness, OuterReportsContactsOutsideOnly) {
       expectOutward(body, moving, {Method::Continuous, 0.02, Contacts::All}, false, told);
     }
   }
-  EXPECT_GT(told, leastOf(3000));
+  EXPECT_GE(told, leastOf(3000));
 }
 
 /// Ids of every contact.
@@ -294,7 +294,7 @@ TEST(Sidedness, TrianglesWithoutAreaHaveNoSides) {
       }
     }
   }
-  EXPECT_GT(contacts, leastOf(500));
+  EXPECT_GE(contacts, leastOf(500));
 }
 
 /// One edge with any number of triangles, and a segment across a direction from it.

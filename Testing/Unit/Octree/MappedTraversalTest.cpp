@@ -136,7 +136,7 @@ TEST(MappedTraversal, FindsThePairsWhoseMappedBoxesOverlap) {
     EXPECT_EQ(pairsOf(trees), expected) << run;
     pairs += expected.size();
   }
-  EXPECT_GT(pairs, testing::leastOf(2000));
+  EXPECT_GE(pairs, testing::leastOf(2000));
 }
 
 /// Boxes that were clamped to the range of float may reach anywhere beyond it.
@@ -250,7 +250,7 @@ TEST(MappedTraversal, FindsThePairsWhoseDopsOverlap) {
                  return overlap(i, j, 3);
                }).size();
   }
-  EXPECT_GT(pairs, testing::leastOf(2000));
+  EXPECT_GE(pairs, testing::leastOf(2000));
   EXPECT_GT(ofBoxes, pairs + pairs / 20);
 }
 

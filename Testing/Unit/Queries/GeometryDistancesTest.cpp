@@ -162,7 +162,7 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
   const TestGeometry a = bumpy(22, 0.15), b = bumpy(18, 0.2);
   std::size_t apart = 0, touching = 0;
   for (int placed = 0; placed < 4; ++placed) {
-    if (isLeftOut(static_cast<std::size_t>(placed) + 4)) continue;  // all but the last
+    if (kShareOfCases > 1 && placed < 3) continue;
     TwoBodies both(a, b);
     for (const double most : {3.0, 2.6, 2.3, 2.2, 2.1, 2.0, 1.9, 1.8, 0.2}) {
       const Vector3d aside = most * randomPoint(random, -1, 1).normalized();
@@ -179,8 +179,8 @@ TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
       ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
     }
   }
-  EXPECT_GT(apart, leastOf(15));
-  EXPECT_GT(touching, leastOf(4));
+  EXPECT_GE(apart, leastOf(16));
+  EXPECT_GE(touching, leastOf(5));
 }
 
 TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
@@ -285,8 +285,8 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticOnGrids) {
     (square == 0 ? meet : apart) += 1;
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
   }
-  EXPECT_GT(meet, leastOf(80));
-  EXPECT_GT(apart, leastOf(80));
+  EXPECT_GE(meet, leastOf(80));
+  EXPECT_GE(apart, leastOf(80));
 }
 
 /// A corner of b lies on a face or edge of a up to rounding. Only exact arithmetic knows whether it

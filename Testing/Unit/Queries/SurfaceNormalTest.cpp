@@ -61,9 +61,9 @@ TEST(SurfaceNormals, AreAngleWeighted) {
     compare(vertex);
     EXPECT_EQ(queries.closestPoint(id, vertex)->distance, 0.0);
   }
-  EXPECT_GT(features[1], leastOf(100));
-  EXPECT_GT(features[2], leastOf(50));
-  EXPECT_GT(features[3], leastOf(50));
+  EXPECT_GE(features[1], leastOf(100));
+  EXPECT_GE(features[2], leastOf(50));
+  EXPECT_GE(features[3], leastOf(50));
 }
 
 /// Baerentzen and Aanaes: the angle-weighted normal tells inside from outside.

@@ -124,8 +124,8 @@ TEST(ShapePairs, MatchTheDefinition) {
         EXPECT_NEAR(there->distance, c.distance, isRound(a, b) && c.distance < 0 ? 1e-8 : 1e-13);
       }
   }
-  EXPECT_GT(apart, leastOf(300));
-  EXPECT_GT(overlapping, leastOf(300));
+  EXPECT_GE(apart, leastOf(300));
+  EXPECT_GE(overlapping, leastOf(300));
 }
 
 /// Shapes that are parallel, touching or in one plane.

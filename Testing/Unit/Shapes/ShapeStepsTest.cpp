@@ -341,8 +341,8 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
         EXPECT_EQ(only.earliestTimeOfImpact(), all.earliestTimeOfImpact());
       }
     }
-  EXPECT_GT(contacts, leastOf(50, 10));
-  EXPECT_GT(within, leastOf(25, 5));
+  EXPECT_GE(contacts, leastOf(50, 10));
+  EXPECT_GE(within, leastOf(25, 5));
 }
 
 // ---- Hand-computed contacts ----

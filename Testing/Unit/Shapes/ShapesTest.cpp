@@ -181,8 +181,8 @@ TEST(Shapes, MatchTheDefinition) {
     }
   }
   for (int kind = 0; kind < 3; ++kind) {
-    EXPECT_GT(distinct[kind], leastOf(50, 15)) << kind;
-    EXPECT_GT(inside[kind], leastOf(30, 8)) << kind;
+    EXPECT_GE(distinct[kind], leastOf(50, 15)) << kind;
+    EXPECT_GE(inside[kind], leastOf(30, 8)) << kind;
   }
 }
 

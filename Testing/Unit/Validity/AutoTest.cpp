@@ -94,7 +94,8 @@ TEST(Auto, MatchesBruteForce) {
       if (HasFailure()) return;
     }
   }
-  EXPECT_EQ(reasons.size(), 5u);
+  EXPECT_LE(reasons.size(), 5u);
+  EXPECT_GE(reasons.size(), leastOf(5));
 }
 
 /// Feature ids of all contacts, by list.
