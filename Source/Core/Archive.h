@@ -123,7 +123,8 @@ void fieldOf(File& file, auto& value) {
   if constexpr (std::is_same_v<Value, double>) {
     file.real(value);
   } else if constexpr (std::is_same_v<Value, bool>) {
-    int number = value;
+    int number = 0;
+    if constexpr (!File::kReads) number = value;  // a value to be read has none yet
     file.integer(number);
     if constexpr (File::kReads) value = number != 0;
   } else if constexpr (std::is_integral_v<Value>) {
