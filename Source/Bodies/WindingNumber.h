@@ -55,8 +55,8 @@ class WindingNumbers {
   void computeOwnCluster(const Body& body, OctreeNode);
   SolidAngleShare clusterShare(const Cluster&, const Eigen::Vector3d& p, double distance) const;
   /// Most clusters that are weighed against each other. Where more would be needed, all triangles
-  /// are summed. Points near a body of 100,352 triangles need up to 1,000, and 488 places are for
-  /// the children of a cluster that is divided.
+  /// are summed. Points in and around a body of 100,352 triangles need up to 1,000. 488 places are
+  /// for the children of a cluster that is divided.
   static constexpr std::size_t kMostClusters = 4096;
   struct Front;
   /// The sum of clusters and triangles for which isEnough(sum) is true, if there is one.

@@ -276,8 +276,7 @@ void ContactMatch::takeUserData(std::span<const Given> given, bool ofSecond) {
   if (given.empty()) return;
   for (const Begun& begun : m_begun) {
     const ContactKey& key = begun.contact->key;
-    auto found = std::lower_bound(given.begin(), given.end(), key,
-                                  [](const Given& l, const ContactKey& r) { return l.key < r; });
+    auto found = placeOf(given, key);
     for (; found != given.end() && found->key == key; ++found)
       if (verticesOf(key, found->corners) == begun.vertices &&
           found->ofSecond == (ofSecond && key.kind == ContactKind::Shape))

@@ -62,6 +62,11 @@ class ContactMatch {
       return key == other.key && corners == other.corners && ofSecond == other.ofSecond;
     }
   };
+  /// The first with this key, or where it belongs. given: sorted by key.
+  static auto placeOf(auto& given, const ContactKey& key) {
+    return std::lower_bound(given.begin(), given.end(), key,
+                            [](const Given& l, const ContactKey& r) { return l.key < r; });
+  }
   /// Contacts that began get their user data. given: sorted by key.
   void takeUserData(std::span<const Given> given, bool ofSecond);
   /// Those of track(), ascending.

@@ -204,8 +204,7 @@ bool ContactTracker::setUserData(Contents& contents, const ContactKey& key, std:
 }
 
 void ContactTracker::give(const ContactMatch::Given& given) {
-  auto place = std::lower_bound(m_given.begin(), m_given.end(), given.key,
-                                [](const auto& l, const ContactKey& r) { return l.key < r; });
+  auto place = ContactMatch::placeOf(m_given, given.key);
   for (; place != m_given.end() && place->key == given.key; ++place)
     if (place->isOf(given)) {
       place->userData = given.userData;

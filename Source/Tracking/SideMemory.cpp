@@ -252,14 +252,23 @@ bool findTriangle(const MeshTopology& topology, const Triangle& corners, std::ui
   return false;
 }
 
+/// Finds the features of a side. Returns whether both are there.
+bool findFeatures(const MeshPair& pair, Side& side) {
+  if (isEdges(side.passage))
+    return pair.a.topology.edgeOf(edgeA(side.passage)) != kNoEdge &&
+           pair.b.topology.edgeOf(edgeB(side.passage)) != kNoEdge;
+  const VertexSide of(pair, side.passage.kind);
+  const std::uint32_t vertex = of.vertexOf(side.passage);
+  return vertex < of.vertices.topology.vertexCount &&
+         !of.vertices.topology.vertexTriangles[vertex].empty() &&
+         findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]);
+}
+
 /// Brings a side to the positions at the step's start. Returns whether it lasts.
 bool locateVertex(const MeshPair& pair, Side& side) {
   const VertexSide of(pair, side.passage.kind);
   const std::uint32_t vertex = of.vertexOf(side.passage);
-  if (vertex >= of.vertices.topology.vertexCount ||
-      of.vertices.topology.vertexTriangles[vertex].empty() ||
-      !findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]) ||
-      !mayTouch(pair, of, vertex, of.triangleOf(side.passage)))
+  if (!findFeatures(pair, side) || !mayTouch(pair, of, vertex, of.triangleOf(side.passage)))
     return false;
   const VertexTriangleDistance measured = distanceOf(of, vertex, side.corners, false);
   const MeshFeature feature =
@@ -719,16 +728,8 @@ void SideMemory::apply(const MeshPair& pair, Contents& contents) const {
 
 std::vector<Crossing> SideMemory::list(const MeshPair& pair, std::uint64_t step) const {
   std::vector<Crossing> all;
-  for (Side side : step == m_step ? m_start : m_end) {
-    const VertexSide of(pair, side.passage.kind);
-    const bool areThere =
-        isEdges(side.passage)
-            ? pair.a.topology.edgeOf(edgeA(side.passage)) != kNoEdge &&
-                  pair.b.topology.edgeOf(edgeB(side.passage)) != kNoEdge
-            : of.vertexOf(side.passage) < of.vertices.topology.vertexCount &&
-                  findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]);
-    if (areThere) all.push_back(side.passage);
-  }
+  for (Side side : step == m_step ? m_start : m_end)
+    if (findFeatures(pair, side)) all.push_back(side.passage);
   return all;
 }
 

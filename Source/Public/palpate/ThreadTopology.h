@@ -26,8 +26,8 @@ struct ThreadEvent {
   enum class Cause {
     Passed,     ///< an edge through a side of the loop or an edge of the other part
     EndPassed,  ///< an end of the thread through the loop's surface
-    Set,        ///< no update() saw a step, or a step after that of add() had both ends set. The
-                ///< change of two parts is then 0, as positions alone do not show it
+    Set,        ///< No update() saw a step, or both ends of a step after that of add() were set.
+                ///< The change of two parts is 0: positions do not show it.
     Cut,        ///< the thread or the loop lost an edge, a vertex or its geometry
     Disabled    ///< no enabled element has one of its edges or vertices any more
   };
