@@ -80,20 +80,22 @@ int stepsWithSweeps(TestScene& test, const std::function<void()>& lead) {
 }
 
 TEST(Tool, OnlyAToolThatAForceLeadsMakesFurtherSweeps) {
-  const auto count = [](bool isGuarded, double force, double height) {
+  const auto count = [](bool isGuarded, bool isWanted, double force, double height) {
     TestScene test;
     const auto organ = test.tissue(block(4, 2, 4, {-1, -1, -1}, {2, 1, 2}), 5000, 0.02);
     const auto tool = test.rigid("tool", cube({0, 0, 0}, 0.2), {0.03, height, 0.02});
     palpate::PalpateSettings settings;
     settings.thickness = 0.02;
     settings.guarded = isGuarded;
+    settings.furtherSweeps = isWanted;
     test.collide(organ, tool, settings);
     return stepsWithSweeps(test, [&] { tool->getPbdBody()->externalForce = Vec3d(0, -force, 0); });
   };
-  EXPECT_EQ(count(true, 10, 0.21), 20);
-  EXPECT_EQ(count(false, 10, 0.21), 20);
-  EXPECT_EQ(count(true, 0, 0.21), 0);
-  EXPECT_EQ(count(true, 10, 0.8), 0);  // it does not touch
+  EXPECT_EQ(count(true, true, 10, 0.21), 20);
+  EXPECT_EQ(count(false, true, 10, 0.21), 20);
+  EXPECT_EQ(count(true, true, 0, 0.21), 0);
+  EXPECT_EQ(count(true, true, 10, 0.8), 0);  // it does not touch
+  EXPECT_EQ(count(true, false, 10, 0.21), 0);
 }
 
 }  // namespace

@@ -180,7 +180,7 @@ void PalpateCH::handle(const std::vector<imstk::CollisionElement>&,
   warnOfChanges(*step);
   appendRows();
   model->getSolver()->addConstraints(&m_collisionConstraints);
-  if (!m_collisionConstraints.empty() && step->isPressed(m_detection->pair()))
+  if (!m_collisionConstraints.empty() && step->sweepsFurther(m_detection->pair()))
     m_sweeps->begin(*model, m_collisionConstraints);
   step->addHandler(this);
 }

@@ -758,8 +758,9 @@ bool SceneStep::hasRigidBody(int pair) const {
          m_bodies[static_cast<std::size_t>(found.bodyB)].role == BodyRole::Rigid;
 }
 
-bool SceneStep::isPressed(int pair) const {
+bool SceneStep::sweepsFurther(int pair) const {
   const Pair& found = m_pairs[static_cast<std::size_t>(pair)];
+  if (!found.settings.furtherSweeps) return false;
   const Body *tool = &m_bodies[static_cast<std::size_t>(found.bodyA)],
              *tissue = &m_bodies[static_cast<std::size_t>(found.bodyB)];
   if (tool->role != BodyRole::Rigid) std::swap(tool, tissue);

@@ -79,9 +79,9 @@ class SceneStep {
   bool isEnabled(int pair) const;
   std::string nameOf(int pair) const;
   bool hasRigidBody(int pair) const;
-  /// Whether a haptic tool may press particles: a rigid body on which a force from outside the
-  /// solver acts in this step, as that of a PbdObjectController.
-  bool isPressed(int pair) const;
+  /// Whether a pair wants further sweeps, and a haptic tool may press particles: a rigid body on
+  /// which a force from outside the solver acts in this step, as that of a PbdObjectController.
+  bool sweepsFurther(int pair) const;
   imstk::PbdModel* modelOf(int pair) const;  ///< null: no PbdObject
   /// A handler with rows in this step.
   void addHandler(PalpateCH* handler) { m_handlers.push_back(handler); }

@@ -28,7 +28,8 @@ class TissueSweeps;
 ///          rigid PbdObject within the thickness of a deformable one, each iteration of xPBD sweeps
 ///          further over the contacts and the internal constraints around them. The tool then feels
 ///          nearly the force of many iterations. The sweeps of an iteration end once one changes
-///          the contact forces by at most 1 %, and after ten. No other pair is swept further.
+///          the contact forces by at most 1 %, and after ten. No other pair is swept further,
+///          and none with PalpateSettings::furtherSweeps = false.
 /// Unused   stiffness, 1 by default: a warning names it if it was set.
 ///          With setUseCorrectVelocity(false) there is no friction and no restitution.
 class PALPATE_EXPORT PalpateCH : public imstk::PbdCollisionHandling {

@@ -45,6 +45,9 @@ struct PalpateSettings {
   /// Whether the end of the step holds back what would pass through. False for a needle, which is
   /// meant to pass.
   bool guarded = true;
+  /// Whether PalpateCH sweeps further around a haptic tool. False saves at most the time of the
+  /// solver's iterations in one thread, and the tool feels softer tissue.
+  bool furtherSweeps = true;
 };
 
 /// One OctreeBasedCD for all interactions of an iMSTK scene. Each geometry is added once. One task
