@@ -315,8 +315,13 @@ void OctreeBasedCD::Implementation::followSides() {
   std::size_t count = 0;
   for (const auto& record : pairs.records()) {
     SidesMemory& memory = record->memory.sides;
-    memory.startStep(record->momentIn(geometries.stepNumber()));
-    if (!memory.sides || !record->collides() || record->isCurrent()) continue;
+    const PairMoment moment = record->momentIn(geometries.stepNumber());
+    memory.startStep(moment);
+    if (!memory.sides || record->isCurrent()) continue;
+    if (!SidesMemory::isWanted(moment)) {
+      memory.commit(moment);
+      continue;
+    }
     if (count == unfollowed.size()) unfollowed.push_back(std::make_unique<SeparateSearch>());
     SeparateSearch& own = *unfollowed[count++];
     own.set(*record, passagesOf(record->pair.settings), false);

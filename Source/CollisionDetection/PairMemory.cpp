@@ -55,17 +55,22 @@ void TrackerMemory::release(bool) {
 }
 
 void SidesMemory::startStep(const PairMoment& moment) {
-  if (!moment.question.settings().rememberSides) return sides.reset();
-  if (!sides) sides = std::make_unique<SideMemory>();
+  const bool isSet = moment.question.settings().rememberSides;
+  if (!sides && isSet) sides = std::make_unique<SideMemory>();
+  if (!sides) return;
   sides->startStep(moment.step);
-  if (!moment.collides) sides->forget();
+  if (!isSet && sides->isEmpty()) sides.reset();
+}
+
+bool SidesMemory::isWanted(const PairMoment& moment) {
+  return moment.question.settings().rememberSides && moment.collides;
 }
 
 void SidesMemory::follow(const Question& question, Answer& found) {
   Contents& contents = found.contents();
   contents.rememberedSides.clear();
   found.bySides = false;
-  if (!sides) return;
+  if (!question.settings().rememberSides) return;
   const MeshPair meshes = question.meshes();
   sides->follow(meshes, contents.crossings);
   const bool anyAtEnd = contents.validity.atEnd > 0;
@@ -80,12 +85,10 @@ void SidesMemory::follow(const Question& question, Answer& found) {
   if (!question.settings().reportCrossings) contents.crossings.clear();
 }
 
-void SidesMemory::commit(const PairMoment&) noexcept {
-  if (sides) sides->commit();
-}
-
-void SidesMemory::forget() noexcept {
-  if (sides) sides->forget();
+void SidesMemory::commit(const PairMoment& moment) noexcept {
+  if (!sides) return;
+  if (!isWanted(moment)) sides->followNone();
+  sides->commit();
 }
 
 void SidesMemory::release(bool) {

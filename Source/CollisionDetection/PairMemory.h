@@ -77,17 +77,18 @@ struct TrackerMemory : MemoryPart {
   void describe(File&, PairRecord&, const auto& revisions);
 };
 
-/// PairSettings::rememberSides.
+/// PairSettings::rememberSides. A step that ends without the setting, or whose pair groups exclude,
+/// ends all sides.
 struct SidesMemory : MemoryPart {
-  std::unique_ptr<SideMemory> sides;  ///< null without the setting
+  std::unique_ptr<SideMemory> sides;  ///< null if no step had the setting, or no side is left
 
   std::uint64_t version() const { return sides ? sides->version() : 0; }
   /// Finds the sides at the step's end, and changes the contacts of Answer::data by those at its
   /// start.
   void follow(const Question&, Answer&);
   void startStep(const PairMoment&);
+  static bool isWanted(const PairMoment&);  ///< the setting, and groups do not exclude the pair
   void commit(const PairMoment&) noexcept;
-  void forget() noexcept;
   void release(bool all);
   template <class File>
   void describe(File&, PairRecord&, const auto& revisions);

@@ -359,9 +359,9 @@ void SideMemory::set(std::uint64_t step, std::span<const Side> sides) {
   ++m_version;
 }
 
-void SideMemory::forget() noexcept {
-  if (!m_start.empty()) ++m_version;
-  for (auto* sides : {&m_start, &m_end, &m_next, &m_here}) sides->clear();
+void SideMemory::followNone() noexcept {
+  m_next.clear();
+  m_here.clear();
   m_courses.clear();
 }
 

@@ -50,7 +50,9 @@ class SideMemory : public CountedObject {
   bool changesContacts() const { return !m_courses.empty(); }  ///< apply()
   /// What follow() found holds for the step.
   void commit() noexcept { m_end.swap(m_next); }
-  void forget() noexcept;
+  /// Instead of follow(): no side is left at the step's end.
+  void followNone() noexcept;
+  bool isEmpty() const { return m_start.empty() && m_end.empty(); }  ///< at both ends of the step
 
   void releaseMemory();
 

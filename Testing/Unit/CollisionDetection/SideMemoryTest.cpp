@@ -562,11 +562,13 @@ TEST_F(OnePoint, MemoryEnds) {
   expectEnd([&] {
     m_collisions.setCollisionFilter(m_tip, {.groups = 0});
     m_collisions.detectCollision();
+    m_collisions.advance();
     m_collisions.setCollisionFilter(m_tip, {});
   });
   expectEnd([&] {
     m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
     m_collisions.detectCollision();
+    m_collisions.advance();
     m_collisions.setPairSettings(m_tip, m_sheet, remembering(0.02));
   });
   expectEnd([&] {
@@ -581,6 +583,27 @@ TEST_F(OnePoint, MemoryEnds) {
     rest.erase(rest.begin() + m_collisions.problem().pairs[0].sides[0].ids[1]);
     m_collisions.setTriangles(m_sheet, sheetPositions, rest);
   });
+}
+
+TEST_F(OnePoint, ADetectionWithoutTheSettingOrThePairEndsNothingWithinItsStep) {
+  pass();
+  m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+  m_collisions.detectCollision();
+  EXPECT_TRUE(data().rememberedSides().empty());
+  EXPECT_EQ(remembered(), 0u);
+  m_collisions.setPairSettings(m_tip, m_sheet, remembering(0.02));
+  m_collisions.setCollisionFilter(m_tip, {.groups = 0});
+  m_collisions.detectCollision();
+  m_collisions.setCollisionFilter(m_tip, {});
+  m_collisions.detectCollision();
+  EXPECT_EQ(data().rememberedSides().size(), 1u);
+  m_collisions.advance();
+  EXPECT_EQ(remembered(), 1u);
+  // The end of the step counts, whether a detection saw the setting there or not.
+  m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+  m_collisions.advance();
+  m_collisions.setPairSettings(m_tip, m_sheet, remembering(0.02));
+  EXPECT_EQ(remembered(), 0u);
 }
 
 TEST_F(OnePoint, MemoryLastsThroughATopologyThatKeepsTheVertices) {
