@@ -1,67 +1,157 @@
 #include "Contact/FeatureStar.h"
 
 #include "Mesh/Corners.h"
+#include "Math/ClosestPoint.h"
 #include "Core/Assert.h"
 
-#include <algorithm>
+#include <optional>
 
 namespace palpate {
 
 using Eigen::Vector3d;
 
+namespace {
+
+bool isVertex(const MeshFeature& feature) { return feature.kind == MeshFeature::Kind::Vertex; }
+
+/// Where pq crosses uv, which does not lie along it: 0 at u, 1 at v, 2 between; or not at all.
+std::optional<int> placeOfCrossing(const Vector3d& u, const Vector3d& v, const Vector3d& p,
+                                   const Vector3d& q, SignCounts& counts) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const int ofU = orient2d(axis, p, q, u, counts), ofV = orient2d(axis, p, q, v, counts);
+    if (ofU == 0 && ofV == 0) continue;  // the common plane is seen as a line, or u is v
+    if (ofU == 0) return 0;
+    if (ofV == 0) return 1;
+    return ofU == ofV ? std::optional<int>() : 2;
+  }
+  return 0;
+}
+
+/// Whether ab and de, on one line, have opposite directions.
+bool areOpposite(const Corners& abc, const Corners& def) {
+  const Vector3d &a = abc[0], &b = abc[1], &d = def[0], &e = def[1];
+  for (int axis = 0; axis < 3; ++axis)
+    if (a[axis] != b[axis]) return (a[axis] < b[axis]) != (d[axis] < e[axis]);
+  return false;
+}
+
+}  // namespace
+
 FeatureStar::FeatureStar(const TriangleMesh& mesh, bool atStart, const MeshFeature& feature,
-                         SignCounts& counts)
+                         const Vector3d& p, const Vector3d& q, SignCounts& counts)
     : m_mesh(mesh),
       m_topology(mesh.topology),
       m_atStart(atStart),
       m_feature(feature),
       m_counts(counts) {
   PALPATE_ASSERT(feature.kind != MeshFeature::Kind::Face);
+  const auto around = holdersOf(m_topology, feature);
+  if (!std::all_of(around.begin(), around.end(), [&](std::uint32_t t) { return hasArea(t); }))
+    join(p, q);
 }
 
-Corners FeatureStar::from(std::uint32_t triangle) const {
+bool FeatureStar::hasArea(std::uint32_t triangle) const {
+  const auto& [a, b, c] = m_topology.elements[triangle];
+  return palpate::hasArea(at(a), at(b), at(c));
+}
+
+void FeatureStar::join(const Vector3d& p, const Vector3d& q) {
+  std::vector<std::uint32_t> visited;
+  const auto visit = [&](std::uint32_t triangle) {
+    if (std::find(visited.begin(), visited.end(), triangle) != visited.end()) return false;
+    visited.push_back(triangle);
+    return true;
+  };
+  m_joined.push_back(m_feature);
+  for (std::size_t i = 0; i < m_joined.size(); ++i)
+    for (const std::uint32_t t : holdersOf(m_topology, m_joined[i]))
+      if (!hasArea(t) && visit(t)) joinCrossed(t, p, q);
+  const auto corner = std::find_if(m_joined.begin(), m_joined.end(), isVertex);
+  if (corner != m_joined.end()) m_feature = *corner;
+  for (const MeshFeature& feature : m_joined)
+    for (const std::uint32_t t : holdersOf(m_topology, feature))
+      if (visit(t)) addSectors(feature, t);
+}
+
+/// All corners are on a line, so that the segment may cross several edges at one place.
+void FeatureStar::joinCrossed(std::uint32_t triangle, const Vector3d& p, const Vector3d& q) {
+  const Triangle& t = m_topology.elements[triangle];
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::array ends{t[i], t[(i + 1) % 3]};
+    const auto place = placeOfCrossing(at(ends[0]), at(ends[1]), p, q, m_counts);
+    if (!place) continue;
+    const MeshFeature crossed =
+        *place == 2
+            ? MeshFeature{MeshFeature::Kind::Edge, m_topology.triangleEdges[triangle][i]}
+            : MeshFeature{MeshFeature::Kind::Vertex, ends[static_cast<std::size_t>(*place)]};
+    if (crossed.id != kNoEdge && !joins(crossed)) m_joined.push_back(crossed);
+  }
+}
+
+void FeatureStar::addSectors(const MeshFeature& feature, std::uint32_t triangle) {
+  const Corners corners = from(feature, triangle);
+  if (isVertex(feature) || !isVertex(m_feature)) {
+    m_sectors.push_back(corners);
+    return;
+  }
+  // A half-plane around a vertex is two sectors.
+  const Vector3d apex = at(m_feature.id);
+  m_sectors.push_back({apex, corners[1], corners[2]});
+  m_sectors.push_back({apex, corners[2], corners[0]});
+}
+
+Corners FeatureStar::from(const MeshFeature& feature, std::uint32_t triangle) const {
   const Triangle& ids = m_topology.elements[triangle];
   int first = 0;
   for (int i = 0; i < 3; ++i)
-    if (m_feature.kind == MeshFeature::Kind::Edge
-            ? m_topology.triangleEdges[triangle][i] == m_feature.id
-            : ids[i] == m_feature.id)
+    if (isVertex(feature) ? ids[i] == feature.id
+                          : m_topology.triangleEdges[triangle][i] == feature.id)
       first = i;
   return {at(ids[first]), at(ids[(first + 1) % 3]), at(ids[(first + 2) % 3])};
 }
 
+bool FeatureStar::isClosed(const MeshFeature& feature) const {
+  if (isVertex(feature)) return m_topology.hasClosedStar[feature.id];
+  const auto around = holdersOf(m_topology, feature);
+  if (around.size() != 2) return false;
+  const Corners first = from(feature, around[0]), second = from(feature, around[1]);
+  return first[0] == second[1] && first[1] == second[0];
+}
+
 bool FeatureStar::isClosed() const {
-  if (m_feature.kind == MeshFeature::Kind::Vertex) return m_topology.hasClosedStar[m_feature.id];
-  const auto around = holdersOf(m_topology, m_feature);
-  return around.size() == 2 && from(around[0])[0] == from(around[1])[1] &&
-         from(around[0])[1] == from(around[1])[0];
+  if (m_joined.empty()) return isClosed(m_feature);
+  return std::all_of(m_joined.begin(), m_joined.end(),
+                     [&](const MeshFeature& feature) { return isClosed(feature); }) &&
+         (isVertex(m_feature) ||
+          (m_sectors.size() == 2 && areOpposite(m_sectors[0], m_sectors[1])));
 }
 
 bool FeatureStar::holds(const Vector3d& p) const {
-  const bool isVertex = m_feature.kind == MeshFeature::Kind::Vertex;
-  return std::any_of(holdersOf(m_topology, m_feature).begin(),
-                     holdersOf(m_topology, m_feature).end(), [&](std::uint32_t triangle) {
-                       const auto [a, b, c] = from(triangle);
-                       if (orient3d(a, b, c, p, m_counts) != 0) return false;
-                       for (int axis = 0; axis < 3; ++axis) {
-                         const int turn = orient2d(axis, a, b, c, m_counts);
-                         if (turn == 0) continue;
-                         return turn * orient2d(axis, a, b, p, m_counts) >= 0 &&
-                                (!isVertex || turn * orient2d(axis, a, p, c, m_counts) >= 0);
-                       }
-                       return false;
-                     });
+  const auto isHeld = [&](const Corners& corners) {
+    const auto& [a, b, c] = corners;
+    if (orient3d(a, b, c, p, m_counts) != 0) return false;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int turn = orient2d(axis, a, b, c, m_counts);
+      if (turn == 0) continue;
+      return turn * orient2d(axis, a, b, p, m_counts) >= 0 &&
+             (!isVertex(m_feature) || turn * orient2d(axis, a, p, c, m_counts) >= 0);
+    }
+    return false;
+  };
+  for (std::size_t i = 0; i < size(); ++i)
+    if (isHeld(sector(i))) return true;
+  return false;
 }
 
 bool FeatureStar::hasInside(const Vector3d& p) const {
   PALPATE_ASSERT(isClosed());
   if (holds(p)) return false;
-  return m_feature.kind == MeshFeature::Kind::Edge ? isInWedge(p) : isInCone(p);
+  return isVertex(m_feature) ? isInCone(p) : isInWedge(p);
 }
 
 bool FeatureStar::isInWedge(const Vector3d& p) const {
-  const auto [a, b, c] = from(holdersOf(m_topology, m_feature)[0]);
-  const auto [d, e, f] = from(holdersOf(m_topology, m_feature)[1]);
+  const auto [a, b, c] = sector(0);
+  const auto [d, e, f] = sector(1);
   const bool isBehindFirst = orient3d(a, b, c, p, m_counts) < 0;
   const bool isBehindSecond = orient3d(d, e, f, p, m_counts) < 0;
   const bool isConvex = orient3d(a, b, c, f, m_counts) < 0;
@@ -76,21 +166,19 @@ bool FeatureStar::isInCone(const Vector3d& p) const {
   const auto side = [&](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
     return orient3d(apex, a, b, c, m_counts);
   };
-  const auto around = holdersOf(m_topology, m_feature);
-  const auto last = std::find_if(around.begin(), around.end(), [&](std::uint32_t t) {
-    const Corners corners = from(t);
-    return side(corners[1], corners[2], p) != 0;
-  });
-  if (last == around.end()) return false;  // all in planes through the line
-  const Corners end = from(*last);
+  std::size_t last = 0;
+  for (; last < size(); ++last)
+    if (const Corners corners = sector(last); side(corners[1], corners[2], p) != 0) break;
+  if (last == size()) return false;  // all in planes through the line
+  const Corners end = sector(last);
   const auto sideOfArc = [&](const Vector3d& q) {
     const int sign = side(p, end[1], q);
     return (sign != 0 ? sign : side(p, end[2], q)) >= 0 ? 1 : -1;
   };
   int depth = side(end[1], end[2], p) < 0 ? 1 : 0;
-  for (const std::uint32_t t : around) {
-    const auto [vertex, a, b] = from(t);
-    if (t == *last || sideOfArc(a) == sideOfArc(b)) continue;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const auto [vertex, a, b] = sector(i);
+    if (i == last || sideOfArc(a) == sideOfArc(b)) continue;
     const int ofP = side(a, b, p);
     int ofEnd = side(a, b, end[1]);
     if (ofEnd == 0) ofEnd = side(a, b, end[2]);

@@ -180,13 +180,18 @@ class CrossingEdges {
 };
 
 /// Whether an edge leaves the surface in one of its features, on the way from p to q: 1. If it
-/// enters: -1. crossings: of the edge, all in this feature.
-int leavesIn(const TriangleMesh& surface, bool atStart, std::span<const EdgeCrossing> crossings,
-             const Eigen::Vector3d& p, const Eigen::Vector3d& q, SignCounts& counts) {
+/// enters: -1. earlier: crossings of the edge that were counted already; crossings: all in this
+/// feature.
+int leavesIn(const TriangleMesh& surface, bool atStart, std::span<const EdgeCrossing> earlier,
+             std::span<const EdgeCrossing> crossings, const Eigen::Vector3d& p,
+             const Eigen::Vector3d& q, SignCounts& counts) {
   const EdgeCrossing& first = crossings.front();
   const int sense = first.lowerIsBehind ? 1 : -1;
   if (first.through.kind == MeshFeature::Kind::Face) return sense;
-  const FeatureStar star(surface, atStart, first.through, counts);
+  const FeatureStar star(surface, atStart, first.through, p, q, counts);
+  if (std::any_of(earlier.begin(), earlier.end(),
+                  [&](const EdgeCrossing& c) { return star.joins(c.through); }))
+    return 0;
   if (star.isClosed()) return star.hasInside(p) - star.hasInside(q);
   const bool agree = std::all_of(crossings.begin(), crossings.end(), [&](const EdgeCrossing& c) {
     return c.lowerIsBehind == first.lowerIsBehind;
@@ -203,7 +208,7 @@ int timesOfLeaving(const TriangleMesh& surface, bool atStart,
   for (auto first = crossings.begin(); first != crossings.end();) {
     const auto end = std::find_if(
         first, crossings.end(), [&](const EdgeCrossing& c) { return c.through != first->through; });
-    sum += leavesIn(surface, atStart, {first, end}, p, q, counts);
+    sum += leavesIn(surface, atStart, {crossings.begin(), first}, {first, end}, p, q, counts);
     first = end;
   }
   return sum;

@@ -1,3 +1,4 @@
+#include "Common/DegenerateCases.h"
 #include "Common/ExpectRefused.h"
 #include "Common/PairRun.h"
 #include "Common/Sanitized.h"
@@ -242,25 +243,6 @@ CubeSolid cubeSolid(Random& random) {
     }
   std::shuffle(triangles.begin(), triangles.end(), random);
   return solid;
-}
-
-/// Splits an edge on the side of one of its two triangles. A triangle without area closes the
-/// surface: at the middle of the edge, or at its start, where one more vertex then is.
-void addFlatTriangles(Random& random, Mesh& mesh) {
-  std::vector<Triangle>& triangles = mesh.triangles;
-  const auto added = static_cast<std::uint32_t>(mesh.positions.size());
-  const std::size_t at = random() % triangles.size(), first = random() % 3;
-  const Triangle t = triangles[at];
-  const std::uint32_t p = t[first], q = t[(first + 1) % 3], r = t[(first + 2) % 3];
-  if (random() % 2 != 0) {
-    mesh.positions.push_back(0.5 * (mesh.positions[p] + mesh.positions[q]));
-    triangles[at] = {p, added, r};
-    triangles.insert(triangles.end(), {{added, q, r}, {q, added, p}});
-  } else {
-    mesh.positions.push_back(mesh.positions[p]);
-    triangles[at] = {added, q, r};
-    triangles.insert(triangles.end(), {{q, added, p}, {added, r, p}});
-  }
 }
 
 /// When the straight way from p to q enters and leaves the solid. Sliding along it is outside.

@@ -39,7 +39,7 @@ class StarAnswers {
     const StarTruth truth(m_mesh.triangles, ids,
                           [&](std::uint32_t v) { return m_mesh.positions[v]; });
     SignCounts counts;
-    const FeatureStar star(m_placed, false, feature, counts);
+    const FeatureStar star(m_placed, false, feature, points.front(), points.back(), counts);
     EXPECT_EQ(star.isClosed(), truth.isClosed());
     for (const Vector3d& p : points) {
       EXPECT_EQ(star.holds(p), truth.holds(p));
