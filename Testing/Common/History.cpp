@@ -77,11 +77,14 @@ RandomHistory::RandomHistory(Random random, std::uint64_t seed, Space space, Bod
   other.octree.update =
       plain.octree.update == OctreeUpdate::Auto ? OctreeUpdate::Rebuild : OctreeUpdate::Auto;
   other.threads = m_random() % 4 ? 1 : 2;
+  // The draws do not depend on the processor.
+  const std::vector<std::string> paths = simdPaths();
+  const auto path = [&](std::uint64_t number) { return paths[mixed(seed, number) % paths.size()]; };
   m_lockstep.add("plain", Life::Plain, plain);
-  m_lockstep.add("other settings", Life::Plain, other);
+  m_lockstep.add("other settings", Life::Plain, other, path(1));
   if (size == BodySize::Small)
     m_lockstep.add("brute force", Life::Plain, settingsOf(Engine::BruteForce));
-  m_lockstep.add("restored", Life::Restored, settingsOf(Engine::Octree));
+  m_lockstep.add("restored", Life::Restored, settingsOf(Engine::Octree), path(2));
   m_lockstep.add("troubled", Life::Troubled, settingsOf(Engine::Octree));
   m_lockstep.add("committed", Life::Committed, settingsOf(Engine::Octree));
 }
@@ -674,6 +677,7 @@ void RandomHistory::frame() {
   m_lockstep.updateTopologies();
   m_lockstep.updateTrackers(Who::All);
   compareSnapshot();
+  if (m_frames % 16 == 0) m_lockstep.writeTraces();
   noteFeatures();
   if (m_random() % 4 == 0) m_lockstep.forgetTracker();
   if (m_lockstep.troubles() > troubles) m_features.insert(Feature::FailedCall);

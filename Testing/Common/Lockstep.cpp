@@ -5,6 +5,7 @@
 
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 #include "Common/Answers.h"
+#include "Common/TemporaryFolder.h"
 
 #include <algorithm>
 #include <atomic>
@@ -25,12 +26,15 @@ struct LockstepReach {
 auto& insideOf(OctreeBasedCD&);
 template struct LockstepReach<&OctreeBasedCD::m_implementation>;
 
-/// A clock on which each look takes a microsecond: a budget of n allows n looks.
+/// A clock on which each look takes a microsecond: a budget of n allows n looks. The detection is
+/// cancelled in the look with the number cancelAt; 0: it is not.
 class LooksOfTroubled {
  public:
-  explicit LooksOfTroubled(OctreeBasedCD& collisions) : m_collisions(collisions) {
-    insideOf(collisions).clock = [this] {
-      return Deadline::Time(std::chrono::microseconds(m_looks.fetch_add(1) + 1));
+  LooksOfTroubled(OctreeBasedCD& collisions, std::int64_t cancelAt) : m_collisions(collisions) {
+    insideOf(collisions).clock = [this, cancelAt] {
+      const std::int64_t look = m_looks.fetch_add(1) + 1;
+      if (look == cancelAt) m_collisions.cancelDetection();
+      return Deadline::Time(std::chrono::microseconds(look));
     };
   }
   ~LooksOfTroubled() { insideOf(m_collisions).clock = {}; }
@@ -64,8 +68,8 @@ class Results {
 
 }  // namespace
 
-void Lockstep::add(std::string name, Life life, const Settings& settings) {
-  m_members.push_back({std::move(name), life, OctreeBasedCD(settings)});
+void Lockstep::add(std::string name, Life life, const Settings& settings, std::string path) {
+  m_members.push_back({std::move(name), life, OctreeBasedCD(settings), std::move(path)});
 }
 
 std::optional<GeometryId> Lockstep::add(const ModelBody& body) {
@@ -413,9 +417,11 @@ void Lockstep::detect(Member& member, bool withoutTime, bool atEnd) {
   }
   if (member.life == Life::Troubled && m_trouble() % 2) {
     const std::uint64_t most = m_trouble() % 2 ? 10 : 1000, budget = m_trouble() % most;
-    const LooksOfTroubled clock(object);
-    const bool isComplete =
-        object.detectCollision(std::chrono::microseconds(static_cast<std::int64_t>(budget)));
+    const bool isCancelled = m_trouble() % 3 == 0;
+    const auto looks = static_cast<std::int64_t>(budget);
+    const LooksOfTroubled clock(object, isCancelled ? looks : 0);
+    const bool isComplete = object.detectCollision(isCancelled ? std::chrono::hours(1)
+                                                               : std::chrono::microseconds(looks));
     m_endedEarly += !isComplete;
     member.endedEarly = member.endedEarly || !isComplete;
     if (!atEnd) return;
@@ -585,6 +591,18 @@ void Lockstep::restore() {
       m.object.restore(state);
     }
     EXPECT_TRUE(m.object.save() == state) << "state after restore()";
+  }
+}
+
+void Lockstep::writeTraces() const {
+  const TemporaryFolder folder;
+  for (const Member& m : m_members) {
+    if (m.object.settings().traceFrames == 0) continue;
+    m.object.writeTrace(folder.path / "trace.json");
+    const std::string text = contentOf(folder.path / "trace.json");
+    EXPECT_TRUE(text.starts_with('{') && text.find('}', text.size() - 2) != text.npos &&
+                text.find("detectCollision") != text.npos)
+        << "the trace of " << m.name << " is: " << text.substr(0, 200);
   }
 }
 

@@ -4,6 +4,7 @@
 #include <palpate/PenetrationTracker.h>
 #include <palpate/ThreadTopology.h>
 
+#include "Core/SimdPath.h"
 #include "Common/CallText.h"
 #include "Common/FailingAllocation.h"
 #include "Common/Model.h"
@@ -22,7 +23,8 @@ namespace palpate::testing {
 enum class Life {
   Plain,
   Restored,  ///< is led astray between calls, and restored
-  /// Allocations fail, predicates throw, and detections end early. Each such call is made again.
+  /// Allocations fail, predicates throw, and detections end early or are cancelled. Each such call
+  /// is made again.
   Troubled,
   Committed  ///< gets the positions of a step once, at its end, and detects once
 };
@@ -37,6 +39,7 @@ class Lockstep {
     std::string name;
     Life life;
     OctreeBasedCD object;
+    std::string path{};  ///< of simdPaths(); empty: the best one
     std::shared_ptr<bool> predicateThrows = std::make_shared<bool>(false);
     std::optional<ThreadTopology> topology{};
     std::optional<PenetrationTracker> tracker{};
@@ -49,7 +52,8 @@ class Lockstep {
   };
 
   explicit Lockstep(std::uint64_t seed) : m_trouble(seed) {}
-  void add(std::string name, Life, const Settings&);
+  /// path: Member::path
+  void add(std::string name, Life, const Settings&, std::string path = {});
   Lockstep(const Lockstep&) = delete;
   Lockstep& operator=(const Lockstep&) = delete;
 
@@ -113,6 +117,8 @@ class Lockstep {
   void advance();
   /// Leads the objects that live so through other steps and restores them.
   void restore();
+  /// Writes the traces of the objects that have one.
+  void writeTraces() const;
   bool watches() const { return m_members.front().topology.has_value(); }
   bool tracks() const { return m_members.front().tracker.has_value(); }
   std::size_t troubles() const { return m_troubles; }
@@ -180,7 +186,9 @@ bool Lockstep::each(Who who, const std::string& text, F&& f) {
   std::optional<Outcome> first;
   for (Member& member : m_members) {
     if (!isAmong(member, who)) continue;
+    if (!member.path.empty()) useSimdPath(member.path);
     const Outcome outcome = outcomeOf(member, f);
+    if (!member.path.empty()) useSimdPath("");
     if (!first) first = outcome;
     EXPECT_EQ(outcome.error.value_or("accepted"), first->error.value_or("accepted"))
         << text.substr(0, 200) << " of " << member.name;
