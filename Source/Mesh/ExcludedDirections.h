@@ -11,10 +11,11 @@
 namespace palpate {
 
 /// Whether an element around a mesh's vertex {v, v}, or edge, excludes a unit direction from there
-/// at a time of the step: the direction leads into the element.
+/// at a time of the step: the direction leads into the element. The order of an edge's vertices
+/// changes nothing, rounding included.
 inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
                               const Eigen::Vector3d& direction, double time) {
-  const std::uint32_t p = feature[0], q = feature[1];
+  const auto& [p, q] = std::minmax(feature[0], feature[1]);
   const MeshTopology& topology = mesh.topology;
   const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
     return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
