@@ -7,7 +7,6 @@
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
 #include "Common/StepBodies.h"
-#include "Common/SupportedMethods.h"
 #include "Common/TestGeometry.h"
 
 #include <gtest/gtest.h>
@@ -51,31 +50,13 @@ Mesh flatFloor(Random& random, bool irregular, const Matrix3d& turn) {
   return mesh;
 }
 
-/// A mesh and a shape that moves from one position to another.
-struct FloorScene {
-  OctreeBasedCD collisions;
-  GeometryId mesh, tool;
-
-  FloorScene(const Mesh& body, const AnalyticalGeometry& shape, const PairSettings& settings,
-             Engine engine = Engine::Octree)
-      : collisions(settingsOf(engine)),
-        mesh(collisions.addTriangleMesh(body.positions, body.triangles)),
-        tool(collisions.addAnalyticalGeometry(shape)) {
-    collisions.addCollisionPair(mesh, tool, settings);
-  }
-  std::vector<ShapeContact> contacts(const Matrix3d& turn, const Vector3d& from,
-                                     const Vector3d& to) {
-    collisions.setTransform(tool, {turn, from}, {turn, to});
-    collisions.detectCollision();
-    const auto found = collisions.collisionData(mesh, tool).shape();
-    return {found.begin(), found.end()};
-  }
-};
-
 std::vector<ShapeContact> contactsOf(const Mesh& body, const AnalyticalGeometry& shape,
-                                     const PairSettings& settings, const Matrix3d& turn,
-                                     const Vector3d& from, const Vector3d& to) {
-  return FloorScene(body, shape, settings).contacts(turn, from, to);
+                                     const PairSettings& settings, const Pose& from,
+                                     const Pose& to) {
+  const CollisionData data =
+      stepOf(settingsOf(Engine::Octree), bodyOf("mesh", testGeometry(body), body.positions),
+             shapeOf("shape", shape, from, to), settings);
+  return {data.shape().begin(), data.shape().end()};
 }
 
 /// One of each type but planes, about as large as 1.
@@ -124,9 +105,9 @@ TEST(DistinctShapeContacts, OfAFlatFloorHaveItsNormal) {
                          to = at + floorTurn * Vector3d(0.1, 0.05,
                                                         uniform(random, isRound ? -0.1 : -0.02, 0));
           PairSettings settings{method, 0.05};
-          const auto distinct = contactsOf(floor, shape, settings, turn, at, to);
+          const auto distinct = contactsOf(floor, shape, settings, {turn, at}, {turn, to});
           settings.contacts = Contacts::All;
-          const auto all = contactsOf(floor, shape, settings, turn, at, to);
+          const auto all = contactsOf(floor, shape, settings, {turn, at}, {turn, to});
           EXPECT_EQ(distinct.empty(), all.empty());
           const auto isTilted = [&](const ShapeContact& c) {
             return c.element != ShapeElement::Face && c.normal.cross(up).norm() > tiltOf(shape);
@@ -268,76 +249,10 @@ TEST(DistinctShapeContacts, OfARimOnAFlatSideStayWhateverTheTilt) {
                                     .toRotationMatrix();
           const Vector3d at(0.3, 0.1, -0.05);
           std::set<std::uint32_t> corners;
-          for (const ShapeContact& c : contactsOf(body, table, settings, turn, at, at))
+          for (const ShapeContact& c : contactsOf(body, table, settings, {turn, at}, {turn, at}))
             if (c.element == ShapeElement::Vertex) corners.insert(c.id);
           EXPECT_EQ(corners.size(), n) << "table " << table.index() << ", tilt " << angle;
         }
-  }
-}
-
-/// A projected Gauss-Seidel solver moves a body by translation over a floor without friction.
-struct Sliding {
-  double speed;   ///< at the end, relative to the start
-  double height;  ///< at the end
-  std::size_t tilted = 0, contacts = 0;
-};
-Sliding slide(const Mesh& floor, const AnalyticalGeometry& shape, const Matrix3d& floorTurn,
-              const Matrix3d& turn, Method method, double depth) {
-  constexpr double kThickness = 0.05, kGap = 0.025, kStep = 0.01;
-  FloorScene scene(floor, shape, {method, kThickness});
-  const Vector3d up = floorTurn.col(2), ahead = floorTurn * Vector3d(0.8, 0.6, 0);
-  const double low = depthOf(shape, turn, up);
-  Vector3d x = (low + kGap - depth) * up - ahead, v = 1.5 * ahead;
-  Sliding result{};
-  for (int step = 0; step < 100; ++step) {
-    v -= 9.81 * kStep * up;
-    const Vector3d predicted = x + kStep * v;
-    const std::vector<ShapeContact> rows = scene.contacts(turn, x, predicted);
-    std::vector<double> pushes(rows.size(), 0.0);
-    Vector3d y = predicted;
-    for (int round = 0; round < 50; ++round)
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const ShapeContact& c = rows[i];
-        const Vector3d at = x + c.timeOfImpact * (predicted - x);
-        const double gap = c.distance - c.normal.dot(y - at) - kGap,
-                     push = std::max(0.0, pushes[i] - gap);
-        y -= (push - pushes[i]) * c.normal;
-        pushes[i] = push;
-      }
-    for (const ShapeContact& c : rows) result.tilted += c.normal.cross(up).norm() > tiltOf(shape);
-    result.contacts += rows.size();
-    v = (y - x) / kStep;
-    v -= std::max(0.0, v.dot(up)) * up;  // what pushed the body out
-    x = y;
-    scene.collisions.advance();
-  }
-  result.speed = v.dot(ahead) / 1.5;
-  result.height = x.dot(up) - low;
-  return result;
-}
-
-TEST(DistinctShapeContacts, LetABodySlideOverAFlatFloorWithoutLossOfSpeed) {
-  Random random(4);
-  for (const bool irregular : {false, true}) {
-    const Matrix3d floorTurn = randomTurn(random);
-    const Mesh floor = flatFloor(random, irregular, floorTurn);
-    for (const AnalyticalGeometry& shape : bodies(random))
-      for (const bool lies : {false, true}) {
-        if (kShareOfCases > 1 && lies == irregular) continue;
-        for (const Method method : supportedMethods(GeometryType::Shape, GeometryType::Triangles))
-          for (const double depth : {0.0, 0.2}) {
-            const bool isRound = shape.index() < 2,
-                       isThin = depthOf(shape, floorTurn, floorTurn.col(2)) < 0.3;
-            if (depth > 0 && (!isRound || isThin)) continue;
-            const Matrix3d turn = lies ? floorTurn : Matrix3d(randomTurn(random));
-            const Sliding result = slide(floor, shape, floorTurn, turn, method, depth);
-            EXPECT_EQ(result.tilted, 0u) << shape.index() << ' ' << int(method) << ' ' << depth;
-            EXPECT_GE(result.contacts, 100u) << shape.index() << ' ' << int(method);
-            EXPECT_NEAR(result.speed, 1, std::holds_alternative<Sphere>(shape) ? 1e-9 : 1e-4)
-                << shape.index() << ' ' << int(method);
-            EXPECT_NEAR(result.height, 0.025, 1e-3) << shape.index() << ' ' << int(method);
-          }
-      }
   }
 }
 
@@ -352,16 +267,13 @@ TEST(DistinctShapeContacts, OfACylinderThatTurnsOverAFlatFloorHaveItsNormal) {
       for (const double start : {0.0, 0.1, 0.37, 0.9})
         for (const double turn : {0.05, 0.1, 0.3})
           for (const double thickness : {0.2, 0.5}) {
-            FloorScene scene(floor, cylinder, {method, thickness});
             const auto turnBy = [](double angle) -> Matrix3d {
               return Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
             };
             const Vector3d at(0.25, 0.125, 1 + gap);
-            scene.collisions.setTransform(scene.tool, {turnBy(start), at},
-                                          {turnBy(start + turn), at});
-            scene.collisions.detectCollision();
             for (const ShapeContact& c :
-                 scene.collisions.collisionData(scene.mesh, scene.tool).shape()) {
+                 contactsOf(floor, cylinder, {method, thickness}, {turnBy(start), at},
+                            {turnBy(start + turn), at})) {
               ++contacts;
               EXPECT_LE(c.normal.cross(Vector3d::UnitZ()).norm(), tiltOf(cylinder));
             }
@@ -394,7 +306,7 @@ TEST(DistinctShapeContacts, OfABodyThatStandsInAFloorLeadOut) {
                                                    depthOf(shape, turn, up) - depth};
           bool separates = false;
           for (const ShapeContact& c :
-               contactsOf(floor, shape, {Method::Proximity, 0.02}, turn, at, at)) {
+               contactsOf(floor, shape, {Method::Proximity, 0.02}, {turn, at}, {turn, at})) {
             const bool leadsOut = c.normal.dot(up) < -0.998;
             EXPECT_TRUE(leadsOut) << shape.index() << ' ' << tilt << ' ' << depth;
             separates = separates || leadsOut;

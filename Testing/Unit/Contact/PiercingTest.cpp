@@ -16,61 +16,45 @@ namespace palpate::test {
 namespace {
 
 using Eigen::Vector3d;
-using Vertices = std::vector<Vector3d>;
+using testing::Mesh, testing::boxMesh;
 
-TriangleMesh piercingMesh(const Vertices& positions, const std::vector<Triangle>& triangles) {
-  return {MeshTopology(positions.size(), triangles), positions, positions};
-}
-
-ContactBuffers piercingContacts(const TriangleMesh& a, const TriangleMesh& b) {
+ContactBuffers piercingContacts(const Mesh& a, const Mesh& b) {
+  const auto meshOf = [](const Mesh& mesh) -> TriangleMesh {
+    return {MeshTopology(mesh.positions.size(), mesh.triangles), mesh.positions, mesh.positions};
+  };
+  const TriangleMesh first = meshOf(a), second = meshOf(b);
   ContactBuffers out;
-  findContactsByBruteForce({a, b, {.method = Method::Intersection}}, out);
+  findContactsByBruteForce({first, second, {.method = Method::Intersection}}, out);
   return out;
 }
 
 /// A closed pyramid with its tip, vertex 0, down.
-TriangleMesh pyramid(const Vector3d& tip, double height, double halfWidth) {
-  Vertices positions{tip};
+Mesh pyramid(const Vector3d& tip, double height, double halfWidth) {
+  Mesh mesh{{tip}, {{0, 2, 1}, {0, 3, 2}, {0, 4, 3}, {0, 1, 4}, {1, 2, 3}, {1, 3, 4}}};
   for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
-    positions.push_back(tip + Vector3d(x * halfWidth, y * halfWidth, height));
-  return piercingMesh(positions,
-                      {{0, 2, 1}, {0, 3, 2}, {0, 4, 3}, {0, 1, 4}, {1, 2, 3}, {1, 3, 4}});
-}
-
-TriangleMesh piercingMesh(const testing::Mesh& mesh) {
-  return piercingMesh(mesh.positions, mesh.triangles);
+    mesh.positions.push_back(tip + Vector3d(x * halfWidth, y * halfWidth, height));
+  return mesh;
 }
 
 /// Vertex i + 5 j is at (i, j, 0) for 0 <= i, j <= 4. All diagonals are along (1, 1, 0).
-TriangleMesh plate() { return piercingMesh(testing::moved(testing::flat(4, 0), {0, 0, 0}, 4)); }
+Mesh plate() { return testing::moved(testing::flat(4, 0), {0, 0, 0}, 4); }
 
-TriangleMesh cuboid(const Vector3d& lower, const Vector3d& upper) {
-  return piercingMesh(testing::boxMesh(lower, upper));
-}
-
-TriangleMesh turned(TriangleMesh mesh, const Eigen::AngleAxisd& by, const Vector3d& shift) {
-  Vertices positions;
-  for (std::size_t v = 0; v < mesh.now.size(); ++v) positions.push_back(by * mesh.now[v] + shift);
-  std::vector<Triangle> triangles(mesh.topology.elements.begin(), mesh.topology.elements.end());
-  return piercingMesh(positions, triangles);
-}
-
-Vector3d weightedSum(const VertexTriangleContact& c, const TriangleMesh& vertices,
-                     const TriangleMesh& triangles) {
-  Vector3d sum = vertices.now[c.vertex];
-  for (int i = 0; i < 3; ++i) sum -= c.weights[i] * triangles.now[c.vertices[i]];
-  return sum;
+Mesh turned(Mesh mesh, double angle, const Vector3d& axis, const Vector3d& shift = {0, 0, 0}) {
+  for (Vector3d& p : mesh.positions) p = Eigen::AngleAxisd(angle, axis) * p + shift;
+  return mesh;
 }
 
 /// The only contact of the tip, and of any vertex of the pyramid.
 VertexTriangleContact contactOfTip(const Vector3d& tip, double halfWidth = 0.7) {
-  const TriangleMesh a = pyramid(tip, 1, halfWidth), b = plate();
+  const Mesh a = pyramid(tip, 1, halfWidth), b = plate();
   const ContactBuffers found = piercingContacts(a, b);
   EXPECT_EQ(found.vertexTriangle.size(), 1u);
   if (found.vertexTriangle.empty()) return {};
   const VertexTriangleContact c = found.vertexTriangle[0];
   EXPECT_EQ(c.vertex, 0u);
-  EXPECT_LE((weightedSum(c, a, b) - c.distance * c.normal).norm(), 1e-15);
+  Vector3d way = a.positions[c.vertex];
+  for (int i = 0; i < 3; ++i) way -= c.weights[i] * b.positions[c.vertices[i]];
+  EXPECT_LE((way - c.distance * c.normal).norm(), 1e-15);
   const ContactBuffers swapped = piercingContacts(b, a);
   EXPECT_EQ(swapped.triangleVertex.size(), 1u);
   EXPECT_TRUE(swapped.triangleVertex[0] == c);
@@ -109,7 +93,7 @@ TEST(Piercing, EdgesThroughEdgesAndVerticesCountOnce) {
   const VertexTriangleContact inEdges = contactOfTip({2, 2, -0.5}, 1.0);
   EXPECT_EQ(inEdges.feature, TriangleFeature::CornerC);
   EXPECT_EQ(inEdges.distance, -0.5);
-  const TriangleMesh a = pyramid({2, 2, -0.5}, 1, 2), b = plate();
+  const Mesh a = pyramid({2, 2, -0.5}, 1, 2), b = plate();
   const ContactBuffers inVertices = piercingContacts(a, b);
   ASSERT_EQ(std::count_if(inVertices.vertexTriangle.begin(), inVertices.vertexTriangle.end(),
                           [](const auto& c) { return c.vertex == 0 && c.distance < 0; }),
@@ -118,13 +102,13 @@ TEST(Piercing, EdgesThroughEdgesAndVerticesCountOnce) {
 
 /// Its edges enter the bar and leave it: neither end is inside.
 TEST(Piercing, ANeedleThroughABarHasNoEndBehindIt) {
-  const TriangleMesh needle = cuboid({0.4, 0.4, -1}, {0.5, 0.5, 5}),
-                     bar = cuboid({0, 0, 0}, {1, 1, 0.2});
+  const Mesh needle = boxMesh({0.4, 0.4, -1}, {0.5, 0.5, 5}), bar = boxMesh({0, 0, 0}, {1, 1, 0.2});
   const ContactBuffers found = piercingContacts(needle, bar);
   EXPECT_FALSE(found.intersectingTriangles.empty());
   for (const VertexTriangleContact& c : found.vertexTriangle) {
-    const double z = needle.now[c.vertex].z();
-    const bool isTop = bar.now[c.vertices[0]].z() == 0.2 && bar.now[c.vertices[1]].z() == 0.2;
+    const double z = needle.positions[c.vertex].z();
+    const bool isTop =
+        bar.positions[c.vertices[0]].z() == 0.2 && bar.positions[c.vertices[1]].z() == 0.2;
     EXPECT_EQ(c.distance < 0, (z < 0) == isTop);
   }
 }
@@ -132,7 +116,7 @@ TEST(Piercing, ANeedleThroughABarHasNoEndBehindIt) {
 /// The corner is inside: its three faces are pierced by edges of the other cube, and it leaves
 /// through the nearest face.
 TEST(Piercing, CornersOfOverlappingCubesLeaveThroughTheNearestFace) {
-  const TriangleMesh a = cuboid({0.9, 0.8, 0.7}, {1.9, 1.8, 1.7}), b = cuboid({0, 0, 0}, {1, 1, 1});
+  const Mesh a = boxMesh({0.9, 0.8, 0.7}, {1.9, 1.8, 1.7}), b = boxMesh({0, 0, 0}, {1, 1, 1});
   const ContactBuffers found = piercingContacts(a, b);
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
   EXPECT_EQ(found.vertexTriangle[0].vertex, 0u);
@@ -159,13 +143,11 @@ TEST(Piercing, ABluntToolLeavesThroughItsEnd) {
     for (const double width : {0.9, 1.3, 3.3})
       for (const double bump : {0.0, 0.004}) {
         const double low = 2.1 - width / 2, high = low + width;
-        TriangleMesh tool = cuboid({low, low + 0.1, -depth}, {high, high + 0.1, 5}), flat = plate();
-        Vertices positions;
-        for (std::size_t v = 0; v < flat.now.size(); ++v)
-          positions.push_back(flat.now[v] + Vector3d(0, 0, v % 2 == 0 ? bump : -bump));
-        const TriangleMesh surface =
-            piercingMesh(positions, {flat.topology.elements.begin(), flat.topology.elements.end()});
-        const ContactBuffers found = piercingContacts(tool, surface);
+        Mesh surface = plate();
+        for (std::size_t v = 0; v < surface.positions.size(); ++v)
+          surface.positions[v].z() = v % 2 == 0 ? bump : -bump;
+        const ContactBuffers found =
+            piercingContacts(boxMesh({low, low + 0.1, -depth}, {high, high + 0.1, 5}), surface);
         EXPECT_EQ(found.vertexTriangle.size(), 4u);
         for (const EdgeEdgeContact& c : found.edgeEdge) {
           EXPECT_GE(c.distance, -depth - 2 * bump - 1e-12);
@@ -185,7 +167,7 @@ TEST(Piercing, ABluntToolLeavesThroughItsEnd) {
 /// The far side of a thin bar is nearer to the tip. The needle's sides do not leave there.
 TEST(Piercing, ATipDeepInABarLeavesTheWayItCame) {
   for (const double depth : {0.3, 0.7, 0.95}) {
-    const TriangleMesh bar = cuboid({-5, -5, -1}, {5, 5, 0});
+    const Mesh bar = boxMesh({-5, -5, -1}, {5, 5, 0});
     const ContactBuffers found = piercingContacts(pyramid({0.1, 0.2, -depth}, 2, 0.1), bar);
     ASSERT_EQ(found.vertexTriangle.size(), 1u);
     EXPECT_DOUBLE_EQ(found.vertexTriangle[0].distance, -depth);
@@ -195,20 +177,10 @@ TEST(Piercing, ATipDeepInABarLeavesTheWayItCame) {
 
 /// A second plate below the first one, in one mesh with it: the tip is behind it, and nearer to it.
 TEST(Piercing, ATipBehindASheetDoesNotLeaveThroughAnother) {
-  TriangleMesh first = plate();
-  Vertices positions;
-  std::vector<Triangle> triangles(first.topology.elements.begin(), first.topology.elements.end());
-  const std::size_t count = triangles.size();
-  const auto vertices = static_cast<std::uint32_t>(first.now.size());
-  for (std::uint32_t v = 0; v < vertices; ++v) positions.push_back(first.now[v]);
-  for (std::uint32_t v = 0; v < vertices; ++v)
-    positions.push_back({1.6, first.now[v].y(), first.now[v].x() - 3});
-  for (std::size_t t = 0; t < count; ++t) {
-    const auto [i, j, k] = triangles[t];
-    triangles.push_back({i + vertices, k + vertices, j + vertices});
-  }
+  Mesh second = testing::insideOut(plate());
+  for (Vector3d& p : second.positions) p = {1.6, p.y(), p.x() - 3};
   const ContactBuffers found =
-      piercingContacts(pyramid({1.5, 2.2, -0.9}, 1, 0.05), piercingMesh(positions, triangles));
+      piercingContacts(pyramid({1.5, 2.2, -0.9}, 1, 0.05), testing::joined(plate(), second));
   ASSERT_EQ(found.vertexTriangle.size(), 1u);
   EXPECT_EQ(found.vertexTriangle[0].normal, Vector3d::UnitZ());
   EXPECT_NEAR(found.vertexTriangle[0].distance, -0.9, 1e-15);
@@ -216,7 +188,7 @@ TEST(Piercing, ATipBehindASheetDoesNotLeaveThroughAnother) {
 
 /// A rod that is far through the plate is led out sideways: its end is further than its wall.
 TEST(Piercing, ARodThroughAPlateLeavesThroughItsWall) {
-  const TriangleMesh rod = cuboid({1.6, 1.7, -3}, {2.5, 2.3, 3});
+  const Mesh rod = boxMesh({1.6, 1.7, -3}, {2.5, 2.3, 3});
   const ContactBuffers found = piercingContacts(rod, plate());
   ASSERT_EQ(found.triangleVertex.size(), 1u);
   EXPECT_NEAR(found.triangleVertex[0].distance, -0.3, 1e-15);
@@ -226,14 +198,10 @@ TEST(Piercing, ARodThroughAPlateLeavesThroughItsWall) {
 /// Two long roofs cross at a right angle, ridge below ridge by 0.1.
 TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
   const double c = std::sqrt(0.5);
-  const TriangleMesh bar = cuboid({-5, -0.5, -0.5}, {5, 0.5, 0.5});
-  const auto diamond = [&](const Vector3d& shift) {
-    return turned(bar, Eigen::AngleAxisd(std::numbers::pi / 4, Vector3d::UnitX()), shift);
-  };
-  const TriangleMesh below = diamond({0, 0, 0});
-  const TriangleMesh above =
-      turned(diamond({0, 0, 0}), Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitZ()),
-             {0.013, 0.017, 2 * c - 0.1});
+  const Mesh below =
+      turned(boxMesh({-5, -0.5, -0.5}, {5, 0.5, 0.5}), std::numbers::pi / 4, Vector3d::UnitX());
+  const Mesh above =
+      turned(below, std::numbers::pi / 2, Vector3d::UnitZ(), {0.013, 0.017, 2 * c - 0.1});
   const ContactBuffers found = piercingContacts(above, below);
   EXPECT_TRUE(found.vertexTriangle.empty() && found.triangleVertex.empty());
   ASSERT_FALSE(found.edgeEdge.empty());
@@ -250,11 +218,10 @@ TEST(Piercing, EdgesThatHaveCrossedHaveADepth) {
 /// cross do so twice, and no end is behind. Corners of the tool are 1 beside the ridge.
 TEST(Piercing, EdgesBelowARidgeHaveItsDepth) {
   for (const double angle : {0.0, 0.3, 1.1}) {
-    const TriangleMesh roof =
-        turned(piercingMesh({{0, -5, 0.05}, {0, 5, 0.05}, {-5, 0, -1}, {5, 0, -1}},
-                            {{0, 1, 2}, {1, 0, 3}}),
-               Eigen::AngleAxisd(angle, Vector3d::UnitZ()), {0, 0, 0});
-    const TriangleMesh tool = cuboid({-1.3, -1.1, 0}, {1.2, 1.0, 3});
+    const Mesh roof =
+        turned({{{0, -5, 0.05}, {0, 5, 0.05}, {-5, 0, -1}, {5, 0, -1}}, {{0, 1, 2}, {1, 0, 3}}},
+               angle, Vector3d::UnitZ());
+    const Mesh tool = boxMesh({-1.3, -1.1, 0}, {1.2, 1.0, 3});
     for (const bool swapped : {false, true}) {
       const ContactBuffers found =
           swapped ? piercingContacts(roof, tool) : piercingContacts(tool, roof);
@@ -272,20 +239,17 @@ TEST(Piercing, EdgesBelowARidgeHaveItsDepth) {
 /// A bumpy plate: the depth is the least distance to any point near the tip.
 TEST(Piercing, TheDepthIsThatOfTheNearestTriangleAround) {
   for (int seed = 0; seed < 200; ++seed) {
-    const TriangleMesh flat = plate();
-    Vertices positions;
-    for (std::size_t v = 0; v < flat.now.size(); ++v) positions.push_back(flat.now[v]);
-    for (std::size_t v = 0; v < positions.size(); ++v)
-      positions[v].z() = 0.05 * (static_cast<double>((v * 7 + seed * 13) % 11) / 5 - 1);
-    std::vector<Triangle> triangles(flat.topology.elements.begin(), flat.topology.elements.end());
-    const TriangleMesh b = piercingMesh(positions, triangles);
+    Mesh b = plate();
+    for (std::size_t v = 0; v < b.positions.size(); ++v)
+      b.positions[v].z() = 0.05 * (static_cast<double>((v * 7 + seed * 13) % 11) / 5 - 1);
     const Vector3d tip(1.5 + seed % 10 * 0.1, 1.5 + seed / 10 % 10 * 0.1, -0.15);
-    const TriangleMesh a = pyramid(tip, 1, 0.4 + 0.01 * (seed % 30));
+    const Mesh a = pyramid(tip, 1, 0.4 + 0.01 * (seed % 30));
     const ContactBuffers found = piercingContacts(a, b);
     double least = 1;
-    for (const auto& [p, q, r] : triangles)
+    for (const auto& [p, q, r] : b.triangles)
       least = std::min(
-          least, vertexTriangleDistance(tip, positions[p], positions[q], positions[r]).distance);
+          least,
+          vertexTriangleDistance(tip, b.positions[p], b.positions[q], b.positions[r]).distance);
     int ofTip = 0;
     for (const VertexTriangleContact& c : found.vertexTriangle) {
       if (c.vertex != 0) continue;

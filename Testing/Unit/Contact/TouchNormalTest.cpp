@@ -23,11 +23,6 @@ Mesh plate(int n, double halfSide) {
   return testing::moved(testing::flat(n, 0), {-halfSide, -halfSide, 0}, 2 * halfSide);
 }
 
-Mesh flipped(Mesh mesh) {
-  for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
-  return mesh;
-}
-
 struct Case {
   const char* name;
   Mesh a, b;
@@ -43,7 +38,7 @@ std::vector<Case> restingBodies(double gap) {
   };
   return {{"on a table", box({-.5, -.5, 0}, {.5, .5, 1}, z), plate(1, 2), z},
           {"on a table that is wound down", box({-.5, -.5, 0}, {.5, .5, 1}, z),
-           flipped(plate(1, 2)), z},
+           testing::insideOut(plate(1, 2)), z},
           {"on a fine table", box({-.5, -.5, 0}, {.5, .5, 1}, z, 3), plate(8, 2), z},
           {"common face across x", box({1, 0, 0}, {2, 1, 1}, x), unit, x},
           {"common face across y", box({0, 1, 0}, {1, 2, 1}, y), unit, y},
@@ -54,19 +49,23 @@ std::vector<Case> restingBodies(double gap) {
           {"inside a face", box({.25, .25, 1}, {.75, .75, 2}, z), unit, z}};
 }
 
-std::vector<ConstraintRow> rowsOf(const Case& bodies, const PairSettings& settings,
-                                  Validity* validity = nullptr) {
+struct TouchAnswer {
+  std::vector<ConstraintRow> rows;
+  Validity validity;
+  bool intersects;
+};
+TouchAnswer answerOf(const Case& bodies, const PairSettings& settings) {
   OctreeBasedCD collisions(Settings{.threads = 1});
   const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
                    b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
   collisions.addCollisionPair(a, b, settings);
   collisions.detectCollision();
-  std::vector<ConstraintRow> rows;
+  const CollisionData& data = collisions.collisionData(a, b);
+  TouchAnswer answer{{}, data.validity(), !data.intersectingTriangles().empty()};
   const auto first = static_cast<std::uint32_t>(bodies.a.positions.size());
-  appendRows(collisions.collisionData(a, b), {0, bodies.a.positions, bodies.a.positions},
-             {first, bodies.b.positions, bodies.b.positions}, rows);
-  if (validity) *validity = collisions.collisionData(a, b).validity();
-  return rows;
+  appendRows(data, {0, bodies.a.positions, bodies.a.positions},
+             {first, bodies.b.positions, bodies.b.positions}, answer.rows);
+  return answer;
 }
 
 /// How far a row moves a along `apart`, for a unit of force: 1 if it only separates.
@@ -94,11 +93,10 @@ TEST(TouchNormal, RestingBodiesAreOnlyPushedApart) {
       SCOPED_TRACE(std::string(touching[i].name) + ", method " +
                    std::to_string(static_cast<int>(settings.method)) + ", contacts " +
                    std::to_string(static_cast<int>(settings.contacts)));
-      Validity validity;
-      const auto rows = rowsOf(touching[i], settings, &validity);
+      const auto& [rows, validity, intersects] = answerOf(touching[i], settings);
       EXPECT_FALSE(validity.startedApart);
       EXPECT_FALSE(validity.trusted);
-      EXPECT_EQ(rows.size(), rowsOf(apart[i], settings).size());
+      EXPECT_EQ(rows.size(), answerOf(apart[i], settings).rows.size());
       EXPECT_FALSE(rows.empty());
       // Which side an open surface has is not known to contacts between its edges and a face.
       const double least = i == 1 && settings.contacts == Contacts::All ? -2 : 1 - 1e-12;
@@ -125,7 +123,7 @@ TEST(TouchNormal, TipsInManyTrianglesAreSeparated) {
     const Case tips{"tips", cone(n, 3.0, 1.0), cone(n, 0.2, -1.0), Vector3d::UnitZ()};
     for (const Method method : {Method::Auto, Method::Proximity}) {
       SCOPED_TRACE(static_cast<int>(method));
-      const auto rows = rowsOf(tips, {.method = method, .thickness = 0.01});
+      const auto rows = answerOf(tips, {.method = method, .thickness = 0.01}).rows;
       EXPECT_FALSE(rows.empty());
       for (const ConstraintRow& row : rows) {
         const Vector3d up = row.normal * (separation(row, tips) < 0 ? -1 : 1);
@@ -143,15 +141,9 @@ TEST(TouchNormal, AlignedOverlapIsNoRest) {
   for (const double overlap : {0.1, 0.3, 0.7}) {
     const Case bodies{"", dividedBox({1 - overlap, 0, 0}, {2 - overlap, 1, 1}),
                       dividedBox({0, 0, 0}, {1, 1, 1}), Vector3d::UnitX()};
-    Validity validity;
-    rowsOf(bodies, {.thickness = 0.01}, &validity);
-    EXPECT_FALSE(validity.startedApart);
-    OctreeBasedCD collisions;
-    const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
-                     b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
-    collisions.addCollisionPair(a, b, {.thickness = 0.01});
-    collisions.detectCollision();
-    EXPECT_FALSE(collisions.collisionData(a, b).intersectingTriangles().empty()) << overlap;
+    const TouchAnswer answer = answerOf(bodies, {.thickness = 0.01});
+    EXPECT_FALSE(answer.validity.startedApart);
+    EXPECT_TRUE(answer.intersects) << overlap;
   }
 }
 
@@ -207,6 +199,11 @@ class TouchSides : public ::testing::TestWithParam<Method> {
     for (Vector3d& p : positions) p += by;
     return positions;
   }
+  void expectOnTheirSides(const Sides& sides, int contacts) const {
+    EXPECT_GT(sides.contacts, contacts);
+    EXPECT_EQ(sides.wrong, 0);
+    EXPECT_EQ(sides.across, 0);
+  }
 
  private:
   testing::Random m_random{5};
@@ -228,12 +225,8 @@ TEST_P(TouchSides, OfParallelEdgesAreWhereTheyCameFrom) {
     b.push_back(rounded(b[0] - across + 0.1 * between(-9, 9) * u.cross(across)));
     countSides({a, b}, {a, moved(b, 2 * w)}, GetParam(), addTriangle, triangles);
   }
-  EXPECT_GT(lines.contacts, 800 / testing::kShareOfCases);
-  EXPECT_GT(triangles.contacts, 2000 / testing::kShareOfCases);
-  for (const Sides& sides : {lines, triangles}) {
-    EXPECT_EQ(sides.wrong, 0);
-    EXPECT_EQ(sides.across, 0);
-  }
+  expectOnTheirSides(lines, 800 / testing::kShareOfCases);
+  expectOnTheirSides(triangles, 2000 / testing::kShareOfCases);
 }
 
 /// Law: motion within one plane has normals in that plane.
@@ -249,9 +242,7 @@ TEST_P(TouchSides, OfMotionInOnePlaneAreInThePlane) {
     const std::vector<Vector3d> a{at(-10), at(-10), at(-10)}, b{at(10), at(10), at(10)};
     countSides({a, b}, {a, moved(b, -24 * e + between(-3, 3) * f)}, GetParam(), addTriangle, sides);
   }
-  EXPECT_GT(sides.contacts, 2000 / testing::kShareOfCases);
-  EXPECT_EQ(sides.wrong, 0);
-  EXPECT_EQ(sides.across, 0);
+  expectOnTheirSides(sides, 2000 / testing::kShareOfCases);
 }
 
 /// Collinear segments that meet end to end, and ends that meet.
@@ -265,9 +256,7 @@ TEST_P(TouchSides, OfEndsThatMeetAreWhereTheyCameFrom) {
     countSides({a, behind}, {a, moved(behind, -1.5 * u)}, GetParam(), addLine, sides);
     countSides({a, end}, {a, moved(end, 2 * w)}, GetParam(), addLine, sides);
   }
-  EXPECT_GT(sides.contacts, 800);
-  EXPECT_EQ(sides.wrong, 0);
-  EXPECT_EQ(sides.across, 0);
+  expectOnTheirSides(sides, 800);
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, TouchSides, ::testing::Values(Method::Continuous, Method::Auto));

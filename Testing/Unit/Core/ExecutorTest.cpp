@@ -28,7 +28,7 @@ namespace palpate {
 namespace {
 
 /// Two meshes that move: contacts of each method in a few frames.
-std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed, int frames = 4) {
+std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed) {
   std::vector<std::uint64_t> hashes;
   for (const Method method :
        testing::supportedMethods(GeometryType::Triangles, GeometryType::Triangles)) {
@@ -43,7 +43,7 @@ std::vector<std::uint64_t> hashesOf(const Settings& settings, std::uint64_t seed
     pair.thickness = 0.01;
     detection.addCollisionPair(idA, idB, pair);
     detection.addCollisionPair(idA, idA, pair);
-    for (int frame = 0; frame < frames; ++frame) {
+    for (int frame = 0; frame < 4; ++frame) {
       const std::vector<Eigen::Vector3d> before = a.positions;
       for (Eigen::Vector3d& p : a.positions) p.z() += 0.01;
       detection.setPositions(idA, before, a.positions);
@@ -66,14 +66,6 @@ bool allRun(const Threads& threads, std::size_t size = 1000) {
   std::vector<int> runs(size, 0);
   threads.forEach(size, [&](std::size_t i) { ++runs[i]; });
   return std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; });
-}
-
-TEST(Executor, ChangesNoBitOfAFrame) {
-  const std::vector<std::uint64_t> truth = hashesOf({.threads = 1}, 1);
-  EXPECT_GT(std::count_if(truth.begin(), truth.end(), [&](auto h) { return h != truth[0]; }), 8);
-  for (const auto& [name, executor] : executors())
-    for (const int threads : {0, 1, 2})
-      EXPECT_EQ(hashesOf(sharing(executor, threads), 1), truth) << name << ' ' << threads;
 }
 
 TEST(Executor, RunsTheWorkOfAFrame) {

@@ -234,6 +234,27 @@ std::chrono::nanoseconds cpuTime() {
   return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
 }
 
+/// What f() returns in a child whose main thread is real-time, on one core with its workers, which
+/// are not.
+template <class F>
+void expectInRealTime(int threadCount, F&& f) {
+  const std::string outcome = inChild(
+      [&] {
+        cpu_set_t cores;
+        CPU_ZERO(&cores);
+        CPU_SET(sched_getcpu(), &cores);
+        if (sched_setaffinity(0, sizeof cores, &cores) != 0) _exit(77);
+        const Threads threads(threadCount);
+        if (!everyIndexRuns(threads)) return false;
+        const sched_param priority{1};
+        if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) _exit(77);
+        return f(threads);
+      },
+      60);
+  if (outcome == "exit 77") GTEST_SKIP() << "SCHED_FIFO is not permitted here";
+  EXPECT_EQ(outcome, "passed");
+}
+
 void work(std::chrono::nanoseconds time) {
   for (const auto end = cpuTime() + time; cpuTime() < end;) {
   }
@@ -246,15 +267,7 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
 #ifdef PALPATE_THREADS_TBB
   GTEST_SKIP() << "oneTBB's own rules hold";
 #endif
-  const std::string outcome = inChild([] {
-    cpu_set_t cores;
-    CPU_ZERO(&cores);
-    CPU_SET(sched_getcpu(), &cores);
-    if (sched_setaffinity(0, sizeof cores, &cores) != 0) _exit(77);
-    const Threads threads(2);  // the worker is not real-time
-    if (!everyIndexRuns(threads)) return false;
-    const sched_param priority{1};
-    if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) _exit(77);
+  expectInRealTime(2, [](const Threads& threads) {
     const auto start = cpuTime();
     for (int loop = 0; loop < 50; ++loop) {
       std::atomic<bool> begun{false};
@@ -270,30 +283,17 @@ TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkerDoesNotSpinForever) {
     }
     return cpuTime() - start < std::chrono::milliseconds(100);  // as much as the worker
   });
-  if (outcome == "exit 77") GTEST_SKIP() << "SCHED_FIFO is not permitted here";
-  EXPECT_EQ(outcome, "passed");
 }
 
 /// Many short loops. Either thread may hold the pool's lock when the other one preempts it.
 TEST(ThreadFailures, RealTimeCallerOnTheCoreOfItsWorkersRunsManyLoops) {
-  const std::string outcome = inChild(
-      [] {
-        cpu_set_t cores;
-        CPU_ZERO(&cores);
-        CPU_SET(sched_getcpu(), &cores);
-        if (sched_setaffinity(0, sizeof cores, &cores) != 0) _exit(77);
-        const Threads threads(4);
-        const sched_param priority{1};
-        if (sched_setscheduler(0, SCHED_FIFO, &priority) != 0) _exit(77);
-        for (int loop = 0; loop < 2000; ++loop) {
-          if (!everyIndexRuns(threads, 8)) return false;
-          if (loop % 10 == 0) std::this_thread::sleep_for(std::chrono::microseconds(20));
-        }
-        return true;
-      },
-      60);
-  if (outcome == "exit 77") GTEST_SKIP() << "SCHED_FIFO is not permitted here";
-  EXPECT_EQ(outcome, "passed");
+  expectInRealTime(4, [](const Threads& threads) {
+    for (int loop = 0; loop < 2000; ++loop) {
+      if (!everyIndexRuns(threads, 8)) return false;
+      if (loop % 10 == 0) std::this_thread::sleep_for(std::chrono::microseconds(20));
+    }
+    return true;
+  });
 }
 
 }  // namespace

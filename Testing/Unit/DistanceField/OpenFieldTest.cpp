@@ -35,15 +35,8 @@ Mesh hemisphere() {
 
 std::vector<NamedMesh> openMeshes() {
   std::vector<NamedMesh> meshes{{"hemisphere", hemisphere()}};
-  Mesh patch;
-  for (int y = 0; y <= 4; ++y)
-    for (int x = 0; x <= 4; ++x) patch.positions.emplace_back(0.25 * x, 0.25 * y, 0.0);
-  for (std::uint32_t y = 0; y < 4; ++y)
-    for (std::uint32_t x = 0; x < 4; ++x) {
-      const std::uint32_t v = 5 * y + x;
-      patch.triangles.push_back({v, v + 1, v + 6});
-      patch.triangles.push_back({v, v + 6, v + 5});
-    }
+  Mesh patch = sheet(4, 0.0, 0.0);
+  for (Vector3d& p : patch.positions) p.z() = 0.0;
   meshes.push_back({"patch", patch});
   Mesh crossing = sphere(9, 12, {0, 0, 0}, 1.0);
   append(crossing, boxMesh({0.2, -0.3, -0.4}, {1.4, 0.3, 0.4}));
@@ -244,7 +237,7 @@ TEST(OpenField, CountsVerticesAtOnePlaceAsOne) {
   }
 }
 
-/// Contacts of points and triangles with a bowl, by both engines.
+/// Contacts of points and triangles with a bowl.
 TEST(OpenField, ListsContactsWithoutAReliableSign) {
   Random random(15);
   const Mesh bowl = hemisphere(), loose = soup(random, 60, 0.4);
@@ -252,29 +245,22 @@ TEST(OpenField, ListsContactsWithoutAReliableSign) {
   std::vector<Vector3d> points(casesOf(3000));
   for (Vector3d& p : points) p = randomPoint(random, -1.1, 1.1);
   constexpr double kThickness = 0.1;
-  const auto answer = [&](Engine engine, bool isMesh) {
-    OctreeBasedCD detection(Settings{.engine = engine, .threads = 1});
+  for (const bool isMesh : {false, true}) {
+    OctreeBasedCD detection(Settings{.threads = 1});
     const GeometryId other = isMesh ? detection.addTriangleMesh(loose.positions, loose.triangles)
                                     : detection.addPointSet(points),
                      body = detection.addDistanceField(field);
     detection.addCollisionPair(other, body,
                                {.method = Method::DistanceField, .thickness = kThickness});
     detection.detectCollision();
-    return detection.collisionData(other, body);
-  };
-  for (const bool isMesh : {false, true}) {
-    const CollisionData data = answer(Engine::Octree, isMesh),
-                        truth = answer(Engine::BruteForce, isMesh);
-    EXPECT_EQ(data.hash(), truth.hash());
-    EXPECT_EQ(data.validity(), truth.validity());
+    const CollisionData& data = detection.collisionData(other, body);
     std::vector<std::uint32_t> unreliable;
     std::size_t inside = 0;
     for (std::uint32_t i = 0; i < data.shape().size(); ++i) {
       const ShapeContact& contact = data.shape()[i];
       EXPECT_LE(contact.distance, kThickness);
       inside += contact.distance < 0;
-      if (field->signIsReliable(contact.point)) continue;
-      unreliable.push_back(i);
+      if (!field->signIsReliable(contact.point)) unreliable.push_back(i);
     }
     EXPECT_EQ(data.validity().unreliableSign, unreliable);
     EXPECT_GE(unreliable.size(), leastOf(6));

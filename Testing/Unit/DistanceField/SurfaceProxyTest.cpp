@@ -6,6 +6,7 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
+#include "Common/PairRun.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "Common/FieldMeshes.h"
@@ -90,23 +91,15 @@ std::vector<Vector3d> pointsOf(const SurfaceProxy& proxy, const SurfaceProxy::Le
   return points;
 }
 
-/// Exact answers, and the surface point that is nearest.
-struct Exact {
-  explicit Exact(const Mesh& mesh) {
-    id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-  }
-  OctreeBasedCD detection;
-  GeometryId id;
-};
-
 TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
   Random random(1);
   std::size_t number = 0;
   for (const Scene& scene : scenes()) {
     if (isLeftOut(number++)) continue;
     SCOPED_TRACE(scene.name);
-    Exact exact(scene.body);
-    const SpatialQueries queries = exact.detection.queries();
+    OctreeBasedCD exact;
+    const GeometryId id = addMesh(exact, scene.body);
+    const SpatialQueries queries = exact.queries();
     const SurfaceProxy proxy(meshOf(scene.body), scene.settings, Threads(2));
     const double rounding = 1e-14 * proxy.magnitude();
     std::size_t planes = 0, lists = 0;
@@ -116,7 +109,7 @@ TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
       ++(leaf.hasPlane() ? planes : lists);
       EXPECT_LE(leaf.error, scene.settings.allowedError);
       for (const Vector3d& p : pointsOf(proxy, leaf, random)) {
-        const double distance = queries.closestPoint(exact.id, p)->distance;
+        const double distance = queries.closestPoint(id, p)->distance;
         if (!leaf.hasPlane()) {
           double listed = kInfinity;
           for (const SurfaceProxy::Listed& each : proxy.trianglesOf(leaf)) {
@@ -130,7 +123,7 @@ TEST(SurfaceProxy, EachLeafIsAsItsLawsSay) {
         const double height = leaf.distance(p[0], p[1], p[2]);
         ASSERT_NEAR(std::abs(height), distance, leaf.error + rounding);
         if (!proxy.isClosed() || std::abs(height) <= leaf.error + rounding) continue;
-        ASSERT_EQ(height < 0, queries.signedDistance(exact.id, p).distance < 0);
+        ASSERT_EQ(height < 0, queries.signedDistance(id, p).distance < 0);
       }
     }
     EXPECT_GT(planes + lists, 500u / kShareOfCases);
@@ -147,8 +140,9 @@ TEST(SurfaceProxy, PlacesWithoutALeafAreBeyondTheReach) {
   for (const Scene& scene : scenes()) {
     if (isLeftOut(number++)) continue;
     SCOPED_TRACE(scene.name);
-    Exact exact(scene.body);
-    const SpatialQueries queries = exact.detection.queries();
+    OctreeBasedCD exact;
+    const GeometryId id = addMesh(exact, scene.body);
+    const SpatialQueries queries = exact.queries();
     const SurfaceProxy proxy(meshOf(scene.body), scene.settings, Threads(1));
     std::size_t far = 0;
     const double units = proxy.unitCount();
@@ -167,7 +161,7 @@ TEST(SurfaceProxy, PlacesWithoutALeafAreBeyondTheReach) {
       if (leaf != SurfaceProxy::kNoLeaf) continue;
       ++far;
       const Vector3d p = proxy.lower() + proxy.unit() * at;
-      ASSERT_GT(queries.closestPoint(exact.id, p)->distance, scene.settings.reach);
+      ASSERT_GT(queries.closestPoint(id, p)->distance, scene.settings.reach);
     }
     EXPECT_GT(far, 200u / kShareOfCases);
   }

@@ -1,11 +1,11 @@
 #include "Mesh/TetrahedraCut.h"
 
 #include "Common/RandomMeshes.h"
+#include "Common/Solids.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <vector>
 
@@ -16,35 +16,6 @@ namespace {
 
 using testing::Random;
 using Ids = std::vector<std::uint32_t>;
-
-/// Cells of six tetrahedra each, with vertices that are moved a little.
-struct Solid {
-  std::vector<Eigen::Vector3d> rest;
-  std::vector<Tetrahedron> tetrahedra;
-};
-Solid cells(std::uint32_t n, Random& random) {
-  Solid solid;
-  const auto vertex = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    return (z * (n + 1) + y) * (n + 1) + x;
-  };
-  for (std::uint32_t i = 0; i < (n + 1) * (n + 1) * (n + 1); ++i)
-    solid.rest.push_back(
-        Eigen::Vector3d(i % (n + 1), i / (n + 1) % (n + 1), i / (n + 1) / (n + 1)) +
-        testing::randomPoint(random, -0.05, 0.05));
-  for (std::uint32_t i = 0; i < n * n * n; ++i) {
-    std::array<std::uint32_t, 3> axes{0, 1, 2};
-    do {  // a way along the axes from one corner to the opposite one
-      std::array<std::uint32_t, 3> at{i % n, i / n % n, i / n / n};
-      Tetrahedron t{vertex(at[0], at[1], at[2])};
-      for (std::size_t k = 0; k < 3; ++k) {
-        ++at[axes[k]];
-        t[k + 1] = vertex(at[0], at[1], at[2]);
-      }
-      solid.tetrahedra.push_back(t);
-    } while (std::next_permutation(axes.begin(), axes.end()));
-  }
-  return solid;
-}
 
 void expectSame(const TetrahedralTopology& found, const TetrahedralTopology& truth) {
   EXPECT_EQ(found.tetrahedra, truth.tetrahedra);
@@ -59,14 +30,15 @@ TEST(TetrahedraCut, EqualsATopologyThatIsComputedAnew) {
   std::size_t cuts = 0, faults = 0, passed = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     Random random(seed);
-    Solid solid = cells(2, random);
+    testing::Solid solid = testing::cells(2, random);
+    for (Eigen::Vector3d& p : solid.positions) p += testing::randomPoint(random, -0.05, 0.05);
     std::optional<OverusedFace> fault;
-    TetrahedralTopology topology = topologyOf(solid.rest, solid.tetrahedra, fault);
+    TetrahedralTopology topology = topologyOf(solid.positions, solid.tetrahedra, fault);
     ASSERT_FALSE(fault);
     for (int cut = 0; cut < 12; ++cut) {
       Ids gone;
       std::vector<Tetrahedron> added;
-      std::vector<Eigen::Vector3d> rest = solid.rest;
+      std::vector<Eigen::Vector3d> rest = solid.positions;
       const auto addVertex = [&](const Eigen::Vector3d& p) {
         rest.push_back(p);
         return static_cast<std::uint32_t>(rest.size() - 1);
@@ -134,7 +106,7 @@ TEST(TetrahedraCut, EqualsATopologyThatIsComputedAnew) {
       found.apply();
       expectSame(next, truth);
       topology = next;
-      solid.rest = rest;
+      solid.positions = rest;
       ++cuts;
       if (::testing::Test::HasFailure()) FAIL() << "seed " << seed << ", cut " << cut;
     }

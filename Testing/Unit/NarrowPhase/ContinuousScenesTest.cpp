@@ -25,7 +25,22 @@ struct Step {
   std::size_t vertexTriangle, edgeEdge;  ///< labelled pairs
 };
 
-class ContinuousScenes : public ::testing::TestWithParam<Step> {};
+class ContinuousScenes : public ::testing::TestWithParam<Step> {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::is_directory(folder))
+      GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
+    const auto frame = [&](const char* name) {
+      return folder / "frames" / (std::string(name) + ".ply");
+    };
+    mesh = testing::readStep(frame(GetParam().before), frame(GetParam().now));
+    candidates = testing::sweptCandidates(mesh);
+  }
+  const std::filesystem::path folder =
+      std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + GetParam().scene;
+  TriangleMesh mesh;
+  std::vector<ElementPair> candidates;
+};
 
 using Pairs = std::set<std::array<std::uint32_t, 2>>;
 
@@ -53,12 +68,6 @@ struct PublishedIds {
 
 TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
   const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
-  const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
-  if (!std::filesystem::is_directory(folder))
-    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
-  const TriangleMesh mesh = testing::readStep(folder / "frames" / (std::string(before) + ".ply"),
-                                              folder / "frames" / (std::string(now) + ".ply"));
-  const std::vector<ElementPair> candidates = testing::sweptCandidates(mesh);
   const MeshPair pair{mesh, mesh, {Method::Continuous, 0.0, Contacts::All}};
   ContactBuffers found{};
   findContinuous(pair, candidates, found);
@@ -109,12 +118,6 @@ TEST_P(ContinuousScenes, HaveNoFalseNegativesAndNoFalsePositives) {
 /// Of those through an edge or a vertex, all features around the place decide which of them pass.
 TEST_P(ContinuousScenes, ReportExactlyThePassages) {
   const auto& [scene, before, now, vertexTriangle, edgeEdge] = GetParam();
-  const std::filesystem::path folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/" + scene;
-  if (!std::filesystem::is_directory(folder))
-    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
-  const TriangleMesh mesh = testing::readStep(folder / "frames" / (std::string(before) + ".ply"),
-                                              folder / "frames" / (std::string(now) + ".ply"));
-  std::vector<ElementPair> candidates = testing::sweptCandidates(mesh);
   std::erase_if(candidates,
                 [](const ElementPair& pair) { return testing::isLeftOut(pair.a + pair.b); });
   std::vector<Crossing> truth, atBorders;

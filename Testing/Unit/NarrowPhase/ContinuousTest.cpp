@@ -226,28 +226,6 @@ TEST(Continuous, ContactsBesideATouchAreReplacedByTheirImpacts) {
       }
 }
 
-TEST(Continuous, EarliestTimeDoesNotDependOnOrderOrBatches) {
-  testing::Random random(2);
-  for (int i = 0; i < 20; ++i) {
-    const TriangleMesh a = movingSoup(random, 20, 0.3, i % 2 ? 0.25 : 0.0);
-    const MeshPair pair{a, a, {Method::Continuous, i % 4 == 3 ? 0.01 : 0.0, Contacts::All}};
-    std::vector<ElementPair> candidates = everyPair(a, a);
-    ContactBuffers counts{}, all{};
-    findContinuous(pair, candidates, all);
-    for (int repeat = 0; repeat < 4; ++repeat) {
-      double earliest = kUnbounded;
-      for (std::size_t begin = 0; begin < candidates.size(); begin += 1 + 37 * repeat)
-        earliest = findEarliestImpact(
-            pair,
-            std::span(candidates)
-                .subspan(begin, std::min<std::size_t>(1 + 37 * repeat, candidates.size() - begin)),
-            earliest, counts);
-      EXPECT_EQ(earliest, earliestOf(all));
-      std::shuffle(candidates.begin(), candidates.end(), random);
-    }
-  }
-}
-
 /// A time of impact may be reported where features only nearly come within the distance. It is no
 /// contact, and no earliest time, if their boxes stay apart.
 TEST(Continuous, FeaturesThatStopBeforeTheDistanceHaveNoImpact) {

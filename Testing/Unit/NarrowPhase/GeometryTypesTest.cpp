@@ -20,22 +20,6 @@
 namespace palpate::testing {
 namespace {
 
-/// Without one, SupportedPairsTest.cpp compares every pair of types.
-TEST(GeometryTypes, LinesWithARestDistanceMatchBruteForce) {
-  Random random(1);
-  const TestGeometry line = thread(random, 150, 0.12, 0.01, false),
-                     loop = thread(random, 80, 0.15, 0, true),
-                     needle = tapered(random, thread(random, 60, 0.1, 0, false), 0.03);
-  std::size_t contacts = 0, number = 0;
-  for (const TestGeometry* geometry : {&line, &loop, &needle})
-    for (PairSettings pair : settingsFor(0.02, geometry != &needle)) {
-      if (isLeftOut(number++)) continue;
-      pair.restDistance = 0.3;
-      contacts += expectOracle(random, *geometry, *geometry, pair);
-    }
-  EXPECT_GE(contacts, leastOf(100));
-}
-
 using Ids = std::vector<std::uint32_t>;
 
 /// The definition of All with public functions: vertices of the other geometry against triangles,
@@ -182,20 +166,18 @@ TEST(GeometryTypes, ParticlesTouchThreadsAndEachOther) {
                            {},
                            {},
                            {0.25}};
-  const PairSettings near{Method::Proximity, 0.25, Contacts::Distinct};
-  const CollisionData data = answer(drops, thread, near);
+  const CollisionData data = answer(drops, thread, kNear);
   ASSERT_EQ(data.vertexTriangle().size(), 3u);
   const VertexTriangleContact &over = data.vertexTriangle()[0], &corner = data.vertexTriangle()[1];
   EXPECT_EQ(over.vertices, (Triangle{0, 1, 1}));
   EXPECT_EQ(over.weights, Vector3d(0.75, 0.25, 0));
   EXPECT_EQ(over.distance, 0.125);  // 0.5 less both radii
   EXPECT_EQ(over.normal, Vector3d(0, 0, 1));
-  EXPECT_EQ(corner.triangle,
-            0u);  // of the two segments at the corner, the one with the lower index
+  EXPECT_EQ(corner.triangle, 0u);  // the lower one of the two segments at the corner
   EXPECT_EQ(corner.weights[0], 0.0);
   EXPECT_EQ(answer(drops, thread, {Method::Proximity, 0.25, Contacts::All}).vertexTriangle().size(),
             4u);
-  const CollisionData self = answer(drops, drops, near);
+  const CollisionData self = answer(drops, drops, kNear);
   ASSERT_EQ(self.vertexTriangle().size(), 1u);
   EXPECT_EQ(self.vertexTriangle()[0].vertex, 0u);
   EXPECT_EQ(self.vertexTriangle()[0].triangle, 3u);
@@ -233,44 +215,41 @@ TEST(GeometryTypes, ContinuousStopsAtTheRadius) {
   EXPECT_NEAR(data.vertexTriangle()[0].distance, 0.0, 1e-5);
 }
 
-std::set<Ids> pairsFoundIn(const TestGeometry& line, const PairSettings& pair) {
-  return idsOf(Rows(answer(line, line, pair)).edgeEdge, 4);
-}
-
 TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
   // A hairpin with corners half a unit apart, ten units long: 0-1-2-3 and back at height 0.125.
   const TestGeometry hairpin =
       lineOf({{0, 0, 0}, {4, 0, 0}, {5, 0, 0.0625}, {4, 0, 0.125}, {0, 0, 0.125}});
-  PairSettings pair{Method::Proximity, 0.25, Contacts::All};
-  const auto pairsFound = [&] { return pairsFoundIn(hairpin, pair); };
-  EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}));
-  pair.restDistance = 1.5;  // edges next but one are 1.002 apart
-  EXPECT_EQ(pairsFound(), (std::set<Ids>{{0, 1, 3, 4}}));
-  pair.restDistance = 2.5;
-  EXPECT_TRUE(pairsFound().empty());
-  // Only the positions given with the topology count as the rest positions.
-  Positions stretched = hairpin.positions;
-  stretched[2][0] = 400;
-  EXPECT_EQ(Rows(answer(settingsOf(Engine::Octree), hairpin, hairpin, pair, stretched, stretched))
-                .edgeEdge.size(),
-            0u);
-  // On a closed thread, the shorter way around counts.
-  TestGeometry ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  TestGeometry ring = lineOf({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}),
+               branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
   ring.segments.push_back({3, 0});
-  pair = {Method::Proximity, 1.5, Contacts::All};
-  EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 2u);
-  pair.restDistance = 1.25;  // opposite edges are one apart, either way
-  EXPECT_EQ(answer(ring, ring, pair).edgeEdge().size(), 0u);
-  // The shortest way between branches counts, too.
-  TestGeometry branching = lineOf({{0, 0, 0}, {0, 0, 1}, {0, 0, 2}});
   branching.positions.insert(branching.positions.end(), {{1, 0, 1}, {1, 0, 2}});
   branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
-  pair = {Method::Proximity, 1.0, Contacts::All};
-  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
-  pair.restDistance = 1.0;
-  EXPECT_EQ(pairsFoundIn(branching, pair), (std::set<Ids>{{0, 1, 3, 4}, {1, 2, 3, 4}}));
-  pair.restDistance = 1.25;
-  EXPECT_TRUE(pairsFoundIn(branching, pair).empty());
+  Positions stretched = hairpin.positions;
+  stretched[2][0] = 400;
+  struct Case {
+    const char* name;
+    const TestGeometry& line;
+    double thickness, restDistance;
+    std::set<Ids> pairs;
+    Positions now{};
+  };
+  for (const auto& [name, line, thickness, restDistance, pairs, now] :
+       {Case{"all", hairpin, 0.25, 0, {{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}},
+        {"edges next but one are 1.002 apart", hairpin, 0.25, 1.5, {{0, 1, 3, 4}}},
+        {"none is so far", hairpin, 0.25, 2.5, {}},
+        {"the rest positions count", hairpin, 0.25, 2.5, {}, stretched},
+        {"a closed thread", ring, 1.5, 0, {{0, 1, 2, 3}, {0, 3, 1, 2}}},
+        {"opposite edges are one apart, either way", ring, 1.5, 1.25, {}},
+        {"branches", branching, 1.0, 0, {{0, 1, 3, 4}, {1, 2, 3, 4}}},
+        {"branches one apart", branching, 1.0, 1.0, {{0, 1, 3, 4}, {1, 2, 3, 4}}},
+        {"the shortest way between branches", branching, 1.0, 1.25, {}}}) {
+    SCOPED_TRACE(name);
+    PairSettings pair{Method::Proximity, thickness, Contacts::All};
+    pair.restDistance = restDistance;
+    const Positions& at = now.empty() ? line.positions : now;
+    const Rows rows(answer(settingsOf(Engine::Octree), line, line, pair, at, at));
+    EXPECT_EQ(idsOf(rows.edgeEdge, 4), pairs);
+  }
 }
 
 // ---- Degenerate ----
@@ -305,12 +284,10 @@ TEST(GeometryTypes, DegenerateLinesAndPointsMatchBruteForce) {
       for (const PairSettings& pair : settingsFor(run % 3 ? 0.5 : 1.0)) {
         const bool lands = run % 4 > 1 && a == &drops;  // on others
         const Positions& now = lands ? others.positions : a->positions;
-        const TestGeometry &first = *a, &second = *b;  // clang 14 captures no structured binding
-        const auto found = [&](Engine engine) {
-          return answer(settingsOf(engine), first, second, pair, now, second.positions);
-        };
-        const CollisionData data = found(Engine::Octree);
-        expectSameContacts(data, found(Engine::BruteForce));
+        const CollisionData data =
+            answer(settingsOf(Engine::Octree), *a, *b, pair, now, b->positions);
+        expectSameContacts(data,
+                           answer(settingsOf(Engine::BruteForce), *a, *b, pair, now, b->positions));
         EXPECT_TRUE(data.validity().degenerateTrianglesA.empty());
         EXPECT_TRUE(data.validity().degenerateTrianglesB.empty());
         for (const auto& c : data.edgeEdge()) expectWellFormed(c);

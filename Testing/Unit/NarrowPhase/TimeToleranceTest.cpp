@@ -1,5 +1,4 @@
 #include "Common/PairRun.h"
-#include "Common/Sanitized.h"
 
 #include <palpate/FeaturePairs.h>
 
@@ -27,9 +26,8 @@ Moving movingSoup(Random& random) {
   return moving;
 }
 
-PairRun runOf(const Settings& settings, const PairSettings& pair, const Moving& a,
-              const Moving& b) {
-  PairRun run(settings, a.mesh, b.mesh, pair);
+PairRun runOf(const PairSettings& pair, const Moving& a, const Moving& b) {
+  PairRun run({}, a.mesh, b.mesh, pair);
   run.step(a.mesh.positions, a.now, b.mesh.positions, b.now);
   return run;
 }
@@ -63,18 +61,15 @@ std::vector<std::array<std::uint32_t, 4>> idsOf(const CollisionData& data) {
 TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
   Random random(5);
   const Moving a = movingSoup(random), b = movingSoup(random);
-  const auto truth = idsOf(runOf(testing::settingsOf(Engine::BruteForce),
-                                 {.method = Method::Continuous, .contacts = Contacts::All}, a, b)
-                               .data());
+  const auto truth =
+      idsOf(runOf({.method = Method::Continuous, .contacts = Contacts::All}, a, b).data());
   ASSERT_GT(truth.size(), 50u);
   for (const double tolerance : {0x1p-50, 1e-10, 1e-3, 0.25, 1.0}) {
     SCOPED_TRACE(tolerance);
     const PairSettings settings{.method = Method::Continuous,
                                 .contacts = Contacts::All,
                                 .continuous = {.timeTolerance = tolerance}};
-    const PairRun run = runOf({}, settings, a, b);
-    testing::expectSame(run.answers(),
-                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
+    const PairRun run = runOf(settings, a, b);
     run.expectWellFormed(a.mesh, b.mesh);
     const CollisionData& data = run.data();
     EXPECT_EQ(idsOf(data), truth);
@@ -89,7 +84,7 @@ TEST(TimeTolerance, BoundsHowEarlyTimesAreAndChangesNothingElse) {
     for (const auto& c : data.edgeEdge()) expectTime(c.timeOfImpact, exactTime(c, a, b));
     PairSettings only = settings;
     only.continuous.earliestTimeOnly = true;
-    EXPECT_EQ(runOf({}, only, a, b).data().earliestTimeOfImpact(), earliest);
+    EXPECT_EQ(runOf(only, a, b).data().earliestTimeOfImpact(), earliest);
   }
 }
 
@@ -103,9 +98,7 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
                                 .thickness = thickness,
                                 .contacts = Contacts::All,
                                 .continuous = {.timeTolerance = tolerance}};
-    const PairRun run = runOf({}, settings, a, b);
-    testing::expectSame(run.answers(),
-                        runOf(testing::settingsOf(Engine::BruteForce), settings, a, b).answers());
+    const PairRun run = runOf(settings, a, b);
     auto ids = idsOf(run.data());
     std::sort(ids.begin(), ids.end());
     return ids;
@@ -117,82 +110,6 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   EXPECT_GT(coarse.size(), fine.size());
   EXPECT_TRUE(std::includes(coarse.begin(), coarse.end(), fine.begin(), fine.end()));
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
-}
-
-/// With many triangles, the time is that of all contacts, in any order of the search. The octrees
-/// sweep the whole step.
-TEST(EarliestTime, MatchesAllContactsOfManyTriangles) {
-  Random random(9);
-  std::size_t number = 0;
-  testing::Mesh a = testing::soup(random, 4500, 0.02), b = testing::soup(random, 4500, 0.02);
-  for (const double speed : {1e-3, 1e-2, 0.1}) {
-    Positions nowA = a.positions, nowB = b.positions;
-    // Half of them hardly move.
-    for (auto* now : {&nowA, &nowB})
-      for (Eigen::Vector3d& p : *now)
-        p += testing::randomPoint(random, -speed, speed) * (p.x() > 0.5 ? 1.0 : 0.01);
-    for (const double thickness : {0.0, 1e-4})
-      for (const bool self : {false, true}) {
-        if (testing::isLeftOut(number++)) continue;
-        SCOPED_TRACE(::testing::Message() << speed << " " << thickness << " " << self);
-        const auto run = [&](bool earliestTimeOnly, int threads,
-                             std::vector<ElementPair>& candidates) {
-          OctreeBasedCD detection({.threads = threads});
-          const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
-                           second =
-                               self ? first : detection.addTriangleMesh(b.positions, b.triangles);
-          detection.addCollisionPair(first, second,
-                                     {.method = Method::Continuous,
-                                      .thickness = thickness,
-                                      .contacts = Contacts::All,
-                                      .continuous = {.earliestTimeOnly = earliestTimeOnly}});
-          detection.setPositions(first, a.positions, nowA);
-          if (!self) detection.setPositions(second, b.positions, nowB);
-          detection.detectCollision();
-          EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-          const double earliest = detection.collisionData(first, second).earliestTimeOfImpact();
-          detection.setPositions(first, a.positions, nowA);
-          candidates = detection.candidatePairs(first, second);
-          return earliest;
-        };
-        std::vector<ElementPair> expected;
-        const double time = run(false, 1, expected);
-        ASSERT_LE(time, 1.0);
-        for (const int threads : {1, 2}) {
-          std::vector<ElementPair> candidates;
-          EXPECT_EQ(run(true, threads, candidates), time);
-          EXPECT_EQ(candidates, expected);
-        }
-      }
-  }
-}
-
-/// A shape's octree is empty. Its pair is unchanged.
-TEST(EarliestTime, MatchesAllContactsOfAShapeBesideOtherPairs) {
-  Random random(12);
-  const testing::Mesh a = testing::soup(random, 9000, 0.02), b = testing::soup(random, 9000, 0.02);
-  Positions now = a.positions;
-  for (Eigen::Vector3d& p : now) p += Eigen::Vector3d(0.01, 0, 0);
-  OctreeBasedCD detection({.threads = 1});
-  const GeometryId tissue = detection.addTriangleMesh(a.positions, a.triangles),
-                   first = detection.addTriangleMesh(b.positions, b.triangles),
-                   tool = detection.addAnalyticalGeometry(Box{{0.5, 0.5, 0.5}, {0.3, 0.3, 0.3}});
-  const PairSettings earliest{.method = Method::Continuous,
-                              .continuous = {.earliestTimeOnly = true}};
-  detection.addCollisionPair(tool, tissue, earliest);
-  detection.addCollisionPair(first, first, earliest);
-  detection.setTransform(tool, {});
-  detection.detectCollision();
-  detection.advance();
-  detection.setTransform(tool, {.translation = {0.2, 0, 0}});
-  detection.setPositions(tissue, a.positions, now);
-  Positions moved = b.positions;
-  for (Eigen::Vector3d& p : moved) p += testing::randomPoint(random, -0.02, 0.02);
-  detection.setPositions(first, b.positions, moved);
-  detection.detectCollision();
-  EXPECT_EQ(detection.collisionData(tool, tissue).earliestTimeOfImpact(), 0.0);
-  EXPECT_LE(detection.collisionData(first, first).earliestTimeOfImpact(), 1.0);
-  EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
 }
 
 /// A predicate that throws after boxes sweep less: the next frame has boxes of the whole step.

@@ -71,27 +71,6 @@ TEST(Octree, HoldsEachElementOnceWithinItsLooseBounds) {
     }
 }
 
-TEST(Octree, IsTheSameForAnyNumberOfThreadsAndAnyHistory) {
-  Random random(2);
-  const Mesh mesh = testing::soup(random, 40000, 0.01);
-  std::vector<Eigen::Vector3d> elsewhere = mesh.positions;
-  for (Eigen::Vector3d& p : elsewhere) p += testing::randomPoint(random, -0.3, 0.3);
-  TreeContents expected;
-  for (const int threads : {1, 2, 8}) {
-    OctreeBasedCD detection(rebuilding(threads));
-    const GeometryId id = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-    if (threads == 8) {  // another past
-      detection.setPositions(id, elsewhere);
-      detection.update();
-      detection.setPositions(id, mesh.positions);
-    }
-    detection.update();
-    EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-    if (threads == 1) expected = treeOf(detection, id);
-    EXPECT_EQ(treeOf(detection, id), expected);
-  }
-}
-
 /// Ever more and smaller triangles towards a point: more levels of cells than a key has.
 TEST(Octree, HoldsSizesOfManyLevelsTheSameForAnyNumberOfThreads) {
   Random random(12);
@@ -142,21 +121,6 @@ TEST(Octree, KeepsMaxDepthAndMaxElementsPerLeaf) {
           }
         }
       }
-    }
-}
-
-TEST(Octree, OneFarTriangleDoesNotCoarsenIt) {
-  Random random(4);
-  for (const std::size_t size : {200u, 3000u, 20000u})
-    for (const int threads : {1, 2}) {
-      Mesh mesh = testing::soup(random, size, 0.01);
-      mesh.positions[300] = {1e6, -1e6, 1e6};
-      OctreeBasedCD detection(rebuilding(threads));
-      detection.addTriangleMesh(mesh.positions, mesh.triangles);
-      detection.update();
-      EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-      EXPECT_LE(detection.octree().statistics().maxElementsInNode,
-                static_cast<std::size_t>(OctreeSettings{}.maxElementsPerLeaf));
     }
 }
 

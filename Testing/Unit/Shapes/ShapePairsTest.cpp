@@ -168,34 +168,6 @@ TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
       }
 }
 
-TEST(ShapePairs, DoNotDependOnScale) {
-  Random random(3);
-  const auto scaled = [](AnalyticalGeometry geometry, double by) {
-    if (auto* box = std::get_if<Box>(&geometry)) box->centre *= by, box->halfExtents *= by;
-    if (auto* hull = std::get_if<ConvexHull>(&geometry))
-      for (Vector3d& p : hull->points) p *= by;
-    if (auto* cylinder = std::get_if<Cylinder>(&geometry)) {
-      cylinder->p0 *= by;
-      cylinder->p1 *= by;
-      cylinder->radius *= by;
-    }
-    return geometry;
-  };
-  const std::vector<AnalyticalGeometry> all = shapesOfEveryKind(random);
-  for (const std::size_t i : {4, 5, 6, 9, 11, 12})
-    for (const std::size_t j : {4, 5, 6})
-      for (const double by : {1e-9, 1e-3, 1e7}) {
-        PlacedShape a{scaled(all[i], by), randomTurn(random), by * randomPoint(random, -.3, .3)},
-            b{scaled(all[j], by), randomTurn(random), by * randomPoint(random, -.3, .3)};
-        if (by > 1)  // flat against each other
-          b.rotation = a.rotation = Matrix3d::Identity(), a.translation = {0, 0, 0.25 * by};
-        OctreeBasedCD collisions;
-        const auto found = answer(a, b, Engine::Octree, kFar * by);
-        ASSERT_TRUE(found);
-        expectDistance(random, a, b, *found, by);
-      }
-}
-
 TEST(ShapePairs, MatchHandComputedValues) {
   const Vector3d zero = Vector3d::Zero();
   const Box table{{0, 0, 0}, {2, 2, 1}};
@@ -299,27 +271,6 @@ TEST(ShapePairs, NearlyAlignedBoxesAndHullsMatchTheDefinition) {
           {0.1 * half(), 0.1, sizes[0][2] + sizes[1][2] - overlap}};
     expectPair(random, a, b, 4.0);
   }
-}
-
-/// A regression: among many directions of almost equal length, the points were those of a face far
-/// from the nearest one, and off by up to the depth.
-TEST(ShapePairs, PointsOfOverlappingCylindersMatchTheDistance) {
-  Random random(7);
-  int overlapping = 0;
-  for (int run = 0; run < 60; ++run) {
-    const std::vector<AnalyticalGeometry> all = shapesOfEveryKind(random);
-    for (const AnalyticalGeometry& one : all)
-      for (const AnalyticalGeometry& other : all) {
-        if (!std::holds_alternative<Cylinder>(one)) continue;
-        const PlacedShape a{one, randomTurn(random), randomPoint(random, -.3, .3)},
-            b{other, randomTurn(random), randomPoint(random, -.3, .3)};
-        const auto c = answer(a, b);
-        if (!c || c->distance >= 0) continue;
-        EXPECT_LE((c->pointA - c->pointB - c->distance * c->normal).norm(), 1e-7);
-        ++overlapping;
-      }
-  }
-  EXPECT_GT(overlapping, 300);
 }
 
 }  // namespace

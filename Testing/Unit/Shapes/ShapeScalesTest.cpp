@@ -3,6 +3,7 @@
 #include "Common/ExpectRefused.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Common/StepBodies.h"
 #include "Common/TestGeometry.h"
 #include "Shapes/Shape.h"
 
@@ -39,17 +40,12 @@ AnalyticalGeometry scaled(AnalyticalGeometry geometry, double by) {
   return geometry;
 }
 
-struct Move {
-  Matrix3d turn;
-  Vector3d shift;
-};
-
 /// A shape and a geometry with elements, or two shapes, in one step.
 struct Scene {
   AnalyticalGeometry shape;
-  std::array<Move, 2> ends;
+  std::array<Pose, 2> ends;
   std::optional<AnalyticalGeometry> other{};
-  std::array<Move, 2> otherEnds{};
+  std::array<Pose, 2> otherEnds{};
   TestGeometry geometry{};
   Positions now{};
 
@@ -58,7 +54,7 @@ struct Scene {
     scene.shape = scaled(shape, by);
     if (other) scene.other = scaled(*other, by);
     for (auto* moves : {&scene.ends, &scene.otherEnds})
-      for (Move& move : *moves) move.shift *= by;
+      for (Pose& move : *moves) move.translation *= by;
     for (auto* list : {&scene.geometry.positions, &scene.now})
       for (Vector3d& p : *list) p *= by;
     for (double& radius : scene.geometry.radii) radius *= by;
@@ -66,20 +62,11 @@ struct Scene {
   }
 
   CollisionData answer(const PairSettings& pair) const {
-    OctreeBasedCD collisions(settingsOf(Engine::Octree));
-    const GeometryId first = collisions.addAnalyticalGeometry(shape),
-                     second = other ? collisions.addAnalyticalGeometry(*other)
-                                    : geometry.addTo(collisions);
-    collisions.addCollisionPair(first, second, pair);
-    for (const std::size_t end : {0, 1}) {
-      collisions.setTransform(first, {ends[end].turn, ends[end].shift});
-      if (other)
-        collisions.setTransform(second, {otherEnds[end].turn, otherEnds[end].shift});
-      else if (end == 1)
-        collisions.setPositions(second, geometry.positions, now);
-      collisions.detectCollision();
-    }
-    return collisions.collisionData(first, second);
+    const auto moving = [](const AnalyticalGeometry& tool, const std::array<Pose, 2>& poses) {
+      return shapeOf("shape", tool, poses[0], poses[1]);
+    };
+    return stepOf(settingsOf(Engine::Octree), moving(shape, ends),
+                  other ? moving(*other, otherEnds) : bodyOf("elements", geometry, now), pair);
   }
 };
 
@@ -91,8 +78,8 @@ std::vector<AnalyticalGeometry> measuredShapes() {
   return all;
 }
 
-std::array<Move, 2> randomMoves(Random& random) {
-  std::array<Move, 2> ends;
+std::array<Pose, 2> randomMoves(Random& random) {
+  std::array<Pose, 2> ends;
   ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
   ends[1] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};
   return ends;
@@ -278,7 +265,7 @@ TEST(ShapeScales, ContactsAreCorrectFarFromTheOrigin) {
       Scene scene{shape, randomMoves(random)};
       scene.geometry = elements(random, type);
       const Vector3d far(0x1p20, -0x1p19, 0x1p18);
-      for (Move& end : scene.ends) end.shift += far;
+      for (Pose& end : scene.ends) end.translation += far;
       for (Vector3d& p : scene.geometry.positions) p += far;
       scene.now = moved(random, scene.geometry.positions, 0.3);
       // Coordinates are rounded to 2^-32 of the lengths here.
@@ -287,18 +274,25 @@ TEST(ShapeScales, ContactsAreCorrectFarFromTheOrigin) {
   EXPECT_GT(contacts, 50u);
 }
 
-TEST(ShapeScales, NormalsOfPlanesMayHaveAnyLength) {
-  for (const double length : {0x1p1023, 0x1p600, 0x1p-600, 0x1p-1060, 0x1p-1074}) {
-    OctreeBasedCD collisions(settingsOf(Engine::Octree));
-    const GeometryId plane =
-        collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, length, length}});
-    const GeometryId points = collisions.addPointSet(Positions{{0, 1, 1}});
-    collisions.addCollisionPair(points, plane, {Method::Proximity, 2.0});
-    collisions.detectCollision();
-    const CollisionData data = collisions.collisionData(points, plane);
-    ASSERT_EQ(data.shape().size(), 1u) << length;
-    EXPECT_NEAR(data.shape()[0].distance, std::sqrt(2.0), 1e-15) << length;
-    EXPECT_NEAR(data.shape()[0].normal.norm(), 1, 1e-15) << length;
+/// Normals of planes may have any length, and the half-length of a capsule may overflow when
+/// squared.
+TEST(ShapeScales, LengthsMayBeAnywhereInTheRangeOfDouble) {
+  const auto expectDistance = [](const AnalyticalGeometry& shape, const Vector3d& point,
+                                 double distance, double thickness) {
+    const CollisionData data =
+        stepOf(settingsOf(Engine::Octree),
+               bodyOf("point", {GeometryType::Points, {point}, {}, {}}, {point}),
+               shapeOf("shape", shape, {}, {}), {Method::Proximity, thickness});
+    ASSERT_EQ(data.shape().size(), 1u) << thickness;
+    EXPECT_NEAR(data.shape()[0].distance / thickness, distance / thickness, 1e-13) << thickness;
+    EXPECT_NEAR(data.shape()[0].normal.norm(), 1, 1e-15);
+  };
+  for (const double length : {0x1p1023, 0x1p600, 0x1p-600, 0x1p-1060, 0x1p-1074})
+    expectDistance(Plane{{0, 0, 0}, {0, length, length}}, {0, 1, 1}, std::sqrt(2.0), 2.0);
+  for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
+    const Capsule capsule{{-half, 0, 0}, {half, 0, 0}, 0.5 * half};
+    expectDistance(capsule, {0, 0.25 * half, 0}, -0.25 * half, 0.5 * half);
+    expectDistance(capsule, {0.5 * half, 0, 0.75 * half}, 0.25 * half, 0.5 * half);
   }
 }
 
@@ -337,23 +331,6 @@ TEST(ShapeScales, HullsOfTooManyPointsAreRefused) {
   hull.points.push_back({0, 0, 0});
   expectRefused(ErrorCode::InvalidShape, "131073 points; it must have at most 131072",
                 [&] { collisions.addAnalyticalGeometry(hull); });
-}
-
-/// A regression: a capsule whose half-length overflows when squared.
-TEST(ShapeScales, LongCapsuleIsTouched) {
-  for (const double half : {1e155, 1e160, 1e-160, 1e-300, 1e-308}) {
-    OctreeBasedCD collisions(settingsOf(Engine::Octree));
-    const GeometryId capsule =
-        collisions.addAnalyticalGeometry(Capsule{{-half, 0, 0}, {half, 0, 0}, 0.5 * half});
-    const GeometryId points =
-        collisions.addPointSet(Positions{{0, 0.25 * half, 0}, {0.5 * half, 0, 0.75 * half}});
-    collisions.addCollisionPair(points, capsule, {Method::Proximity, 0.5 * half});
-    collisions.detectCollision();
-    const CollisionData data = collisions.collisionData(points, capsule);
-    ASSERT_EQ(data.shape().size(), 2u) << half;
-    EXPECT_NEAR(data.shape()[0].distance / half, -0.25, 1e-13);
-    EXPECT_NEAR(data.shape()[1].distance / half, 0.25, 1e-13);
-  }
 }
 
 }  // namespace
