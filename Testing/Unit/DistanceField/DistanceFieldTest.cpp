@@ -98,6 +98,10 @@ TEST(DistanceField, IsWithinItsBoundEverywhere) {
       expectWithinBound(random, mesh, field, casesOf(10000));
     }
   }
+}
+
+TEST(DistanceField, HoldsOnRandomStars) {
+  Random random(2);
   std::size_t furtherThanBand = 0;
   for (int i = 0; i < casesOf(20); ++i) {
     Mesh mesh = starMesh(random);
