@@ -12,7 +12,6 @@
 #include <vector>
 
 namespace palpate {
-
 namespace {
 
 using Eigen::Vector3d;
@@ -262,5 +261,4 @@ TEST_P(TouchSides, OfEndsThatMeetAreWhereTheyCameFrom) {
 INSTANTIATE_TEST_SUITE_P(Methods, TouchSides, ::testing::Values(Method::Continuous, Method::Auto));
 
 }  // namespace
-
 }  // namespace palpate

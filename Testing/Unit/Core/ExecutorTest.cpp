@@ -7,6 +7,7 @@
 #include <palpate/Error.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/SupportedMethods.h"
@@ -116,14 +117,10 @@ TEST(Executor, NoMoreThreadsThanRequested) {
 }
 
 TEST(Executor, WithoutConcurrencyIsRefused) {
-  for (const int concurrency : {0, -1}) {
-    try {
+  for (const int concurrency : {0, -1})
+    testing::expectRefused(ErrorCode::InvalidSettings, "", [&] {
       OctreeBasedCD detection(sharing(executorOf(concurrency, backwards)));
-      ADD_FAILURE() << concurrency;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-    }
-  }
+    });
   for (const int threads : {-1, 1025}) EXPECT_THROW(makeThreadPool(threads), Error) << threads;
 }
 
@@ -146,12 +143,8 @@ TEST(Executor, ReturningEarlyIsAnErrorAndLaterTasksDoNothing) {
     const Threads threads(0, executor);
     std::atomic<int> runs{0};
     for (int repeat = 0; repeat < 3; ++repeat) {
-      try {
-        threads.forEach(10, [&](std::size_t) { ++runs; });
-        ADD_FAILURE() << "no error";
-      } catch (const Error& error) {
-        EXPECT_EQ(error.code(), ErrorCode::InvalidSettings);
-      }
+      testing::expectRefused(ErrorCode::InvalidSettings, "",
+                             [&] { threads.forEach(10, [&](std::size_t) { ++runs; }); });
       faulty = false;
       EXPECT_TRUE(allRun(threads));
       faulty = true;

@@ -1,14 +1,12 @@
 #include "Core/WholeFile.h"
 
-#include <palpate/Error.h>
+#include "Common/ExpectRefused.h"
+#include "Common/TemporaryFolder.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 
 namespace palpate {
@@ -16,41 +14,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using testing::contentOf;
+
 class WholeFile : public ::testing::Test {
  protected:
-  WholeFile() { fs::create_directories(m_folder); }
-  ~WholeFile() override { fs::remove_all(m_folder); }
-
-  fs::path in(const char* name) const { return m_folder / name; }
-  std::ptrdiff_t count() const { return std::distance(fs::directory_iterator(m_folder), {}); }
-  static std::string contentOf(const fs::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  fs::path in(const char* name) const { return m_folder.path / name; }
+  std::size_t count() const { return m_folder.fileCount(); }
   void expectRefused(const fs::path& path) const {
-    const std::ptrdiff_t before = count();
-    try {
-      writeWholeFile(path, "new", "the file");
-      ADD_FAILURE() << path;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::File);
-      EXPECT_NE(std::string(error.what()).find("the file \"" + path.string() + "\" cannot be"),
-                std::string::npos)
-          << error.what();
-    }
+    const std::size_t before = count();
+    testing::expectRefused(ErrorCode::File, "the file \"" + path.string() + "\" cannot be",
+                           [&] { writeWholeFile(path, "new", "the file"); });
     EXPECT_EQ(count(), before);
   }
 
  private:
-  const fs::path m_folder =
-      fs::temp_directory_path() / ("palpate-whole-file-" + std::to_string(getpid()));
+  const testing::TemporaryFolder m_folder;
 };
 
 TEST_F(WholeFile, ReplacesAFileAndLeavesNoOther) {
   for (const std::string& content : {std::string("first"), std::string("a\0b\n", 4)}) {
     writeWholeFile(in("file"), content, "the file");
     EXPECT_EQ(contentOf(in("file")), content);
-    EXPECT_EQ(count(), 1);
+    EXPECT_EQ(count(), 1u);
   }
 }
 
@@ -64,17 +49,12 @@ TEST_F(WholeFile, IsReadOrRefusedWithTheReason) {
         std::pair(in("link"), "there is no such file"), std::pair(in(""), "no regular file"),
         std::pair(in("pipe"), "no regular file"),
         std::pair(fs::path("/dev/null"), "no regular file"),
-        std::pair(fs::path("/proc/self/mem"), "an error")})
-    try {
-      readWholeFile(path, "the file");
-      ADD_FAILURE() << path;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::File);
-      EXPECT_NE(
-          std::string(error.what()).find("the file \"" + path.string() + "\" cannot be read: "),
-          std::string::npos);
-      EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
-    }
+        std::pair(fs::path("/proc/self/mem"), "an error")}) {
+    const auto read = [&, &file = path] { readWholeFile(file, "the file"); };
+    testing::expectRefused(ErrorCode::File,
+                           "the file \"" + path.string() + "\" cannot be read: ", read);
+    testing::expectRefused(ErrorCode::File, reason, read);
+  }
 }
 
 TEST_F(WholeFile, LeavesWhatIsNoRegularFile) {

@@ -18,7 +18,6 @@
 #include <limits>
 
 namespace palpate::testing {
-
 namespace {
 
 namespace fs = std::filesystem;

@@ -13,7 +13,6 @@
 
 /// Fields of meshes that are not closed and consistently oriented.
 namespace palpate::testing {
-
 namespace {
 
 using Eigen::Vector3d;

@@ -20,7 +20,6 @@
 #include <string>
 
 namespace palpate::testing {
-
 namespace {
 
 using Eigen::Vector3d;
@@ -294,5 +293,4 @@ TEST(SurfaceProxy, RefusesLongListsSoon) {
 }
 
 }  // namespace
-
 }  // namespace palpate::testing

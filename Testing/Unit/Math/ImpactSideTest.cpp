@@ -7,7 +7,6 @@
 #include <cmath>
 
 namespace palpate {
-
 namespace {
 
 /// Edge p along x comes down (side 1) or up on edge q, turned by the angle against it; both are
@@ -140,5 +139,4 @@ TEST(ImpactSide, NormalsPointToWhereTheFirstFeatureCameFrom) {
 }
 
 }  // namespace
-
 }  // namespace palpate

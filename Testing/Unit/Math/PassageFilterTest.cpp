@@ -9,7 +9,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <vector>
 
 // PassagesTest compares findPassages() of one query with rational arithmetic. Here blocks of eight
 // queries are compared with it, bit by bit and on every SIMD path.
@@ -77,17 +76,6 @@ TEST(PassageFilter, HasTheBitsOfOneQuery) {
   }
   EXPECT_GT(counts.known, counts.queries / 20);
   EXPECT_GT(counts.passing, counts.queries / 500);
-}
-
-TEST(PassageFilter, HasTheBitsOfOneQueryOnSmallGrids) {
-  test::Random random(7);
-  Counts counts;
-  for (int i = 0; i < testing::casesOf(6000) && !::testing::Test::HasFailure(); ++i) {
-    Eight eight;
-    for (ImpactCase& query : eight) query = randomGridCase(random, i % 2, 1 + i % 3);
-    expectSame(eight, 1e-6, counts);
-  }
-  EXPECT_GT(counts.passing, counts.queries / 100);
 }
 
 /// What findPassages() of one query decides without exact arithmetic is rarely left to it.

@@ -1,15 +1,18 @@
 #include "Math/VertexTriangleDistances.h"
 
+#include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "DistanceCases.h"
 #include "Math/ClosestPoint.h"
+#include "Math/DistanceBounds.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
 #include <array>
 #include <bit>
+#include <cmath>
 
 // Lanes have the bits of finiteVertexTriangleDistance().
 namespace palpate {
@@ -48,6 +51,41 @@ TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
         ASSERT_TRUE(isSame(found.difference, expected.difference)) << path << i;
         ASSERT_TRUE(isSame(found.normal, expected.normal)) << path << i;
         ASSERT_TRUE(isSame(found.distance, expected.distance)) << path << i;
+      }
+    }
+  }
+  useSimdPath("");
+}
+
+/// Triangles of any shape: with narrow angles, tiny, and without area.
+TriangleBatch randomTriangles(testing::Random& random) {
+  TriangleBatch batch;
+  for (std::size_t i = 0; i < TriangleBatch::kSize; ++i) {
+    const double length = std::pow(10.0, testing::uniform(random, -8, 0)),
+                 width = std::pow(10.0, testing::uniform(random, -12, 0));
+    const Vector3d a = testing::randomPoint(random, -1, 1),
+                   b = a + length * testing::randomPoint(random, -1, 1),
+                   along = testing::uniform(random, -1, 2) * (b - a);
+    batch.set(i, a, b, a + along + width * length * testing::randomPoint(random, -1, 1));
+  }
+  return batch;
+}
+
+TEST(DistanceBounds, EncloseTheDistanceOnEveryPath) {
+  for (const std::string& path : simdPaths()) {
+    useSimdPath(path);
+    testing::Random random(1);
+    for (int i = 0; i < testing::casesOf(5000); ++i) {
+      const TriangleBatch batch = randomTriangles(random);
+      Vector3d p = testing::randomPoint(random, -2, 2);
+      if (i % 3 == 0) p = 0.5 * (batch.corner(0, 0) + batch.corner(0, 1));
+      if (i % 7 == 0) p = batch.corner(1, 2);
+      const DistanceBounds bounds(p, batch, TriangleBatch::kSize);
+      const VertexTriangleDistances exact(p, batch, TriangleBatch::kSize);
+      for (std::size_t k = 0; k < TriangleBatch::kSize; ++k) {
+        const double distance = exact[k].distance;
+        ASSERT_LE(bounds.lower[k], distance) << path;
+        ASSERT_LE(distance, bounds.distance[k] + bounds.error[k]) << path;
       }
     }
   }

@@ -17,7 +17,6 @@
 #include <tuple>
 
 namespace palpate {
-
 namespace {
 
 struct Step {
@@ -182,5 +181,4 @@ INSTANTIATE_TEST_SUITE_P(Published, ContinuousScenes,
                          });
 
 }  // namespace
-
 }  // namespace palpate

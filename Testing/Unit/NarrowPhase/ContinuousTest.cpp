@@ -16,7 +16,6 @@
 #include <tuple>
 
 namespace palpate {
-
 namespace {
 
 using Eigen::Vector3d;
@@ -265,5 +264,4 @@ TEST(Continuous, NeighboursTouchOnlyInUnsharedFeatures) {
 }
 
 }  // namespace
-
 }  // namespace palpate

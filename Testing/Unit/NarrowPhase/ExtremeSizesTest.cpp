@@ -27,17 +27,12 @@ Mesh atOnePoint(std::uint32_t n) {
   return mesh;
 }
 
-/// Triangle i is about `width` 2^e wide and `distance` 2^e from the origin; e is evenly spaced.
-Mesh spaced(std::uint32_t n, double first, double last, double width, double distance) {
+/// A triangle around a position: `width` wide.
+Mesh triangleAt(const Vector3d& centre, double width) {
+  const Vector3d u(0, 1, 0), v(0.3, 0, -1);
   Mesh mesh;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const double unit = std::exp2(first + (last - first) * i / n);
-    const Vector3d out(std::cos(2.4 * i), std::sin(2.4 * i), 0.3),
-        u(-std::sin(2.4 * i), std::cos(2.4 * i), 0), v = out.cross(u);
-    addTriangle(mesh, unit * (distance * out + width * u),
-                unit * (distance * out + width * (0.8 * v - 0.5 * u)),
-                unit * (distance * out - width * (0.8 * v + 0.5 * u)));
-  }
+  addTriangle(mesh, centre + width * u, centre + width * (0.8 * v - 0.5 * u),
+              centre - width * (0.8 * v + 0.5 * u));
   return mesh;
 }
 
@@ -89,11 +84,11 @@ TEST(ExtremeSizes, FewPairsAroundAVertexAreMeasured) {
 /// Of a large and a tiny triangle, a feature pair is measured only if they may be near.
 TEST(ExtremeSizes, TinyTrianglesAreDroppedByTheirBoxes) {
   TrianglePairBatch batch{};
-  const Mesh large = spaced(1, 0, 0, 0.02, 1);
+  const Mesh large = triangleAt({1, 0, 0.3}, 0.02);
   for (int lane = 0; lane < TrianglePairBatch::kSize; ++lane) {
     // The tiny triangle is near the origin, or, in odd lanes, at a corner of the large one.
-    const Mesh tiny = moved(spaced(1, 0, 0, 1, 0), lane % 2 ? large.positions[1] : Vector3d::Zero(),
-                            std::exp2(-12 - 3 * lane));
+    const Mesh tiny =
+        triangleAt(lane % 2 ? large.positions[1] : Vector3d::Zero(), std::exp2(-12 - 3 * lane));
     for (int corner = 0; corner < 3; ++corner)
       for (int axis = 0; axis < 3; ++axis) {
         batch.coordinates[TrianglePairBatch::rowOfA(corner, axis)][lane] =

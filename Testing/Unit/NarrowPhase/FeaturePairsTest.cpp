@@ -17,7 +17,6 @@
 #include <string>
 
 namespace palpate {
-
 namespace {
 
 using Eigen::AlignedBox3d;
@@ -335,5 +334,4 @@ TEST(FeaturePairs, IncludePairsWithinTheThickness) {
 }
 
 }  // namespace
-
 }  // namespace palpate

@@ -112,12 +112,25 @@ TEST(IntersectionFilter, KeepsEveryIntersectingPair) {
   EXPECT_EQ(known, unscaled);
 }
 
+/// Expects that each of so many pairs, whose triangles meet, is kept.
+template <class Make>
+void expectKept(std::uint32_t count, Make&& make) {
+  Side a, b;
+  std::vector<ElementPair> pairs;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const CornersPair pair = make();
+    a.add(pair.first);
+    b.add(pair.second);
+    pairs.push_back({i, i});
+  }
+  const std::vector<bool> isKept = answersTo(a.placed(), b.placed(), false, pairs).isKept;
+  EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
+}
+
 /// A corner that touches a plane, or is off by the last bits.
 TEST(IntersectionFilter, KeepsCornersOnThePlane) {
   Random random(2);
-  Side a, b;
-  std::vector<ElementPair> pairs;
-  for (std::uint32_t i = 0; i < 40000; ++i) {
+  expectKept(40000, [&]() -> CornersPair {
     // a's plane is x + y + z = 0 of a grid, exactly; far away and at any scale.
     const double unit = std::ldexp(1.0, random.between(-20, 20));
     const Vector3d far =
@@ -130,21 +143,15 @@ TEST(IntersectionFilter, KeepsCornersOnThePlane) {
     const Corners triangle = cornersOf([&] { return inPlane(0x1p20); });
     Corners other = cornersOf([&] { return Vector3d(inPlane(0x1p20) + unit * Vector3d(1, 1, 1)); });
     other[0] = (triangle[0] + triangle[1]) / 2;
-    a.add(triangle);
-    b.add(other);
-    pairs.push_back({i, i});
-  }
-  const std::vector<bool> isKept = answersTo(a.placed(), b.placed(), false, pairs).isKept;
-  EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
+    return {triangle, other};
+  });
 }
 
 /// A sliver, and a triangle that touches the middle of its side. Along one axis only that corner is
 /// far from the sliver's first corner, and only there do products round.
 TEST(IntersectionFilter, KeepsCornersThatBoundTheErrorAlone) {
   Random random(4);
-  Side a, b;
-  std::vector<ElementPair> pairs;
-  for (std::uint32_t i = 0; i < 20000; ++i) {
+  expectKept(20000, [&]() -> CornersPair {
     const int x = random.below(3), y = (x + 1) % 3, z = (x + 2) % 3;
     const auto whole = [&] { return std::floor(0x1p31 * random.unit()) + 1.0; };
     Corners triangle = cornersOf([] { return Vector3d(0, 0, 0); });
@@ -165,12 +172,8 @@ TEST(IntersectionFilter, KeepsCornersThatBoundTheErrorAlone) {
       return corner;
     });
     other[random.below(3)] = (triangle[1] + triangle[2]) / 2;
-    a.add(triangle);
-    b.add(other);
-    pairs.push_back({i, i});
-  }
-  const std::vector<bool> isKept = answersTo(a.placed(), b.placed(), false, pairs).isKept;
-  EXPECT_EQ(std::count(isKept.begin(), isKept.end(), false), 0);
+    return {triangle, other};
+  });
 }
 
 TEST(IntersectionFilter, IgnoresCommonCornersOfOneMeshAsTheDefinitionDoes) {

@@ -4,6 +4,7 @@
 #include "Core/SimdPath.h"
 #include "NarrowPhase/FeatureTests.h"
 #include "Math/ClosestPoint.h"
+#include "Unit/Math/TrianglePairs.h"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +14,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -55,38 +55,32 @@ Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct,
   return std::to_array(possible);
 }
 
-class RandomPoints {
- public:
-  double real() { return std::uniform_real_distribution<double>(-1, 1)(m_engine); }
-  int below(int n) { return static_cast<int>(m_engine() % static_cast<unsigned>(n)); }
-  Vector3d vector() { return {real(), real(), real()}; }
-  double smallPower() { return std::pow(10.0, -below(12)); }
-  int edges() {
-    const int i = below(3), j = below(3);
-    return edgeTest(i, j);
-  }
+using test::Random;
 
- private:
-  std::mt19937_64 m_engine{3};
-};
+double real(Random& random) { return 2 * random.unit() - 1; }
+double smallPower(Random& random) { return std::pow(10.0, -random.below(12)); }
+int someEdges(Random& random) {
+  const int i = random.below(3), j = random.below(3);
+  return edgeTest(i, j);
+}
 
 constexpr int kKinds = 12;
 
-Pair pairOf(int kind, RandomPoints& random) {
+Pair pairOf(int kind, Random& random) {
   Pair x;
-  for (Vector3d& v : x) v = random.vector();
+  for (Vector3d& v : x) v = random.inCube();
   switch (kind) {
     case 1:  // far from the origin
       for (Vector3d& v : x) v += Vector3d(1e6, 1e6, -1e6);
       break;
     case 2:  // slivers
       for (const std::size_t i : {0, 3}) {
-        const double share = random.real(), size = random.smallPower();
-        x[i + 2] = x[i] + share * (x[i + 1] - x[i]) + size * random.vector();
+        const double share = real(random), size = smallPower(random);
+        x[i + 2] = x[i] + share * (x[i + 1] - x[i]) + size * random.inCube();
       }
       break;
     case 3: {  // one much smaller than the other
-      const double size = random.smallPower();
+      const double size = smallPower(random);
       for (int i = 3; i < 6; ++i) x[i] = x[0] + size * x[i];
       break;
     }
@@ -96,7 +90,7 @@ Pair pairOf(int kind, RandomPoints& random) {
       break;
     case 5:  // nearly parallel edges and planes
       for (int i = 3; i < 6; ++i)
-        x[i] = x[i - 3] + 0.1 * Vector3d::Ones() + random.smallPower() * x[i];
+        x[i] = x[i - 3] + 0.1 * Vector3d::Ones() + smallPower(random) * x[i];
       break;
     case 7: {  // a tiny one beyond the other's outermost corner
       const int axis = random.below(3);
@@ -112,9 +106,9 @@ Pair pairOf(int kind, RandomPoints& random) {
       break;
     }
     case 8: {  // edges that cross near an end of one of them
-      const double s = random.real(), t = random.smallPower();
+      const double s = real(random), t = smallPower(random);
       const Vector3d v = x[4] - x[3], normal = (x[1] - x[0]).cross(v);
-      x[3] = x[0] + 0.5 * (1 + s) * (x[1] - x[0]) - t * v + random.real() * normal;
+      x[3] = x[0] + 0.5 * (1 + s) * (x[1] - x[0]) - t * v + real(random) * normal;
       x[4] = x[3] + v;
       if (random.below(2)) std::swap(x[3], x[4]);
       if (random.below(2))
@@ -135,7 +129,7 @@ Pair pairOf(int kind, RandomPoints& random) {
     case 11: {  // a small edge over the middle of a long one
       const Vector3d u = x[1] - x[0], normal = u.cross(x[3]).normalized(),
                      v = std::ldexp(1.0, -5 - random.below(15)) * normal.cross(x[4]);
-      x[3] = x[0] + 0.5 * u + random.real() * normal - 0.4 * v;
+      x[3] = x[0] + 0.5 * u + real(random) * normal - 0.4 * v;
       x[4] = x[3] + v;
       x[5] = x[3] + v.norm() * x[5];
       break;
@@ -149,7 +143,7 @@ Pair pairOf(int kind, RandomPoints& random) {
   return x;
 }
 
-std::vector<Pair> batchOf(int kind, RandomPoints& random) {
+std::vector<Pair> batchOf(int kind, Random& random) {
   std::vector<Pair> pairs;
   for (int i = 0; i < TrianglePairBatch::kSize; ++i) pairs.push_back(pairOf(kind, random));
   return pairs;
@@ -158,7 +152,7 @@ std::vector<Pair> batchOf(int kind, RandomPoints& random) {
 /// The thickness is exactly the distance of one of the feature pairs, which must be kept, or a
 /// little more.
 TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
-  RandomPoints random;
+  Random random(3);
   std::size_t within = 0;
   for (int round = 0; round < testing::casesOf(4800); ++round) {
     const int kind = round % kKinds;
@@ -167,9 +161,9 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
     const int corner = random.below(6);
     const int ofCorner = corner < 3 ? cornerTestOfA(corner) : cornerTestOfB(corner - 3);
-    const std::optional<double> ofEdges = distanceOf(chosen, random.edges(), distinct);
+    const std::optional<double> ofEdges = distanceOf(chosen, someEdges(random), distinct);
     const double thickness = ofEdges && random.below(3)
-                                 ? *ofEdges * (random.below(2) ? 1.0 : 1.0 + random.smallPower())
+                                 ? *ofEdges * (random.below(2) ? 1.0 : 1.0 + smallPower(random))
                                  : distanceOf(chosen, ofCorner, distinct).value();
     const Possible possible = filter(pairs, thickness, distinct);
     for (std::size_t n = 0; n < pairs.size(); ++n) {
@@ -187,7 +181,7 @@ TEST(ProximityFilter, KeepsEveryPairWithinTheThickness) {
 
 /// Edges whose closest points are ends are kept as well, up to a distance of their own.
 TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
-  RandomPoints random;
+  Random random(3);
   std::size_t ends = 0;
   for (int round = 0; round < testing::casesOf(2400); ++round) {
     const int kind = round % kKinds;
@@ -196,7 +190,7 @@ TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
       if (random.below(2))  // in one plane
         for (Vector3d& v : pair) v.z() = 0.25 * v.x();
     const Pair& chosen = pairs[random.below(TrianglePairBatch::kSize)];
-    const double checked = distanceOf(chosen, random.edges(), false).value();
+    const double checked = distanceOf(chosen, someEdges(random), false).value();
     if (checked == 0.0) continue;
     const Possible possible = filter(pairs, checked * (random.below(2) ? 1.0 : 1.5), true, checked);
     for (std::size_t n = 0; n < pairs.size(); ++n)
@@ -213,10 +207,10 @@ TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
 }
 
 TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
-  RandomPoints random;
+  Random random(3);
   for (int round = 0; round < 300; ++round) {
     const std::vector<Pair> pairs = batchOf(round % kKinds, random);
-    const double thickness = random.smallPower();
+    const double thickness = smallPower(random);
     useSimdPath("");
     const Possible best = filter(pairs, thickness, round % 2 == 0);
     for (const std::string& path : simdPaths()) {
@@ -229,7 +223,7 @@ TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
 
 /// For well-shaped triangles, few pairs beyond the thickness are kept.
 TEST(ProximityFilter, DropsNearlyAllPairsBeyondTheThickness) {
-  RandomPoints random;
+  Random random(3);
   const double thickness = 0.03;
   int kept = 0, contacts = 0, all = 0;
   for (int round = 0; round < 300; ++round) {

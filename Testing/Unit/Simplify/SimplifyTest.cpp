@@ -19,7 +19,6 @@
 #include <limits>
 
 namespace palpate::testing {
-
 namespace {
 
 double diagonalOf(const Mesh& mesh) {
@@ -361,5 +360,4 @@ TEST(SimplifyCertificate, BoundsHoldForAllPoints) {
 }
 
 }  // namespace
-
 }  // namespace palpate::testing
