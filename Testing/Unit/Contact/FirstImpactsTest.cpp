@@ -13,8 +13,8 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <set>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -40,48 +40,6 @@ VertexSet closestVerticesOf(const std::array<std::uint32_t, 2>& edge, double wei
   if (weight != 1.0) vertices.insert(edge[0]);
   if (weight != 0.0) vertices.insert(edge[1]);
   return vertices;
-}
-
-/// The data of a contact that the definition needs.
-struct Impact {
-  FeaturePair features;
-  std::uint32_t triangle;  ///< the triangle with a closest point in its interior, or none
-  double time;
-  int list;
-  std::size_t index;
-
-  bool isBefore(const Impact& other) const {
-    return std::tie(time, list, index) < std::tie(other.time, other.list, other.index);
-  }
-  bool hasFeaturesOf(const Impact& other, bool self) const {
-    if (triangle != other.triangle) return false;
-    const FeaturePair swapped{features.second, features.first};
-    return features == other.features || (self && swapped == other.features);
-  }
-};
-
-std::vector<Impact> impactsOf(const CollisionData& data) {
-  std::vector<Impact> impacts;
-  const auto addVertex = [&](const VertexTriangleContact& c, int list, std::size_t index) {
-    const VertexSet vertex{c.vertex}, others = closestVerticesOf(c);
-    const std::uint32_t triangle =
-        others.size() == 3 ? c.triangle : std::numeric_limits<std::uint32_t>::max();
-    impacts.push_back({list == 1 ? FeaturePair{others, vertex} : FeaturePair{vertex, others},
-                       triangle, c.timeOfImpact, list, index});
-  };
-  std::size_t index = 0;
-  for (const auto& c : data.vertexTriangle()) addVertex(c, 0, index++);
-  index = 0;
-  for (const auto& c : data.triangleVertex()) addVertex(c, 1, index++);
-  index = 0;
-  for (const EdgeEdgeContact& c : data.edgeEdge())
-    impacts.push_back(
-        {{closestVerticesOf(c.edgeA, c.weightA), closestVerticesOf(c.edgeB, c.weightB)},
-         std::numeric_limits<std::uint32_t>::max(),
-         c.timeOfImpact,
-         2,
-         index++});
-  return impacts;
 }
 
 /// One of the two geometries of a step.
@@ -113,41 +71,68 @@ struct Moving {
   double radius() const { return geometry.radii.empty() ? 0.0 : geometry.radii.front(); }
 };
 
-/// An impact as the two sets of vertices that it names, of the pair's first and second geometry.
-struct Named {
+/// An impact by sets of vertices of the pair's first and second geometry.
+struct Impact {
   FeaturePair elements, closest;
-  Vector3d normal;  ///< from the second geometry to the first
+  std::uint32_t triangle;  ///< the triangle with a closest point in its interior, or none
+  Vector3d normal;         ///< from the second geometry to the first
   double time, distance;
   std::array<Vector3d, 2> points;  ///< closest ones, of either geometry, at the step's end
+  int list;
+  std::size_t index;
+
+  bool isBefore(const Impact& other) const {
+    return std::tie(time, list, index) < std::tie(other.time, other.list, other.index);
+  }
+  bool hasFeaturesOf(const Impact& other, bool self) const {
+    if (triangle != other.triangle) return false;
+    const FeaturePair swapped{closest.second, closest.first};
+    return closest == other.closest || (self && swapped == other.closest);
+  }
 };
-std::vector<Named> namedOf(const CollisionData& data, const std::array<Moving, 2>& pair) {
-  std::vector<Named> all;
+
+std::vector<Impact> impactsOf(const CollisionData& data, const std::array<Moving, 2>& pair) {
+  std::vector<Impact> all;
+  const auto addOfVertices = [&](std::span<const VertexTriangleContact> contacts, bool swapped) {
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const VertexTriangleContact& c = contacts[i];
+      const VertexSet vertex{c.vertex}, corners(c.vertices.begin(), c.vertices.end()),
+          nearest = closestVerticesOf(c);
+      Impact& impact = all.emplace_back(Impact{{vertex, corners},
+                                               {vertex, nearest},
+                                               nearest.size() == 3 ? c.triangle : kNoElement,
+                                               c.normal,
+                                               c.timeOfImpact,
+                                               c.distance,
+                                               {pair[swapped].now[c.vertex], Vector3d::Zero()},
+                                               swapped,
+                                               i});
+      for (int k = 0; k < 3; ++k)
+        impact.points[1] += c.weights[k] * pair[!swapped].now[c.vertices[k]];
+      if (!swapped) continue;
+      for (FeaturePair* sets : {&impact.elements, &impact.closest})
+        std::swap(sets->first, sets->second);
+      std::swap(impact.points[0], impact.points[1]);
+      impact.normal = -impact.normal;
+    }
+  };
+  addOfVertices(data.vertexTriangle(), false);
+  addOfVertices(data.triangleVertex(), true);
   const auto onEdge = [](const Positions& x, const Segment& edge, double weight) -> Vector3d {
     return (1 - weight) * x[edge[0]] + weight * x[edge[1]];
   };
-  const std::vector<Impact> impacts = impactsOf(data);
-  for (const Impact& impact : impacts) {
-    if (impact.list == 2) {
-      const EdgeEdgeContact& c = data.edgeEdge()[impact.index];
-      all.push_back(
-          {{{c.edgeA[0], c.edgeA[1]}, {c.edgeB[0], c.edgeB[1]}},
-           impact.features,
-           c.normal,
-           c.timeOfImpact,
-           c.distance,
-           {onEdge(pair[0].now, c.edgeA, c.weightA), onEdge(pair[1].now, c.edgeB, c.weightB)}});
-    } else {
-      const bool swapped = impact.list == 1;
-      const auto& c = (swapped ? data.triangleVertex() : data.vertexTriangle())[impact.index];
-      const VertexSet vertex{c.vertex}, corners(c.vertices.begin(), c.vertices.end());
-      const Positions &own = pair[swapped].now, &other = pair[!swapped].now;
-      std::array<Vector3d, 2> points{own[c.vertex], Vector3d::Zero()};
-      for (int i = 0; i < 3; ++i) points[1] += c.weights[i] * other[c.vertices[i]];
-      if (swapped) std::swap(points[0], points[1]);
-      all.push_back({swapped ? FeaturePair{corners, vertex} : FeaturePair{vertex, corners},
-                     impact.features, swapped ? Vector3d(-c.normal) : c.normal, c.timeOfImpact,
-                     c.distance, points});
-    }
+  for (std::size_t i = 0; i < data.edgeEdge().size(); ++i) {
+    const EdgeEdgeContact& c = data.edgeEdge()[i];
+    all.push_back(
+        {{{c.edgeA[0], c.edgeA[1]}, {c.edgeB[0], c.edgeB[1]}},
+         {closestVerticesOf(c.edgeA, c.weightA), closestVerticesOf(c.edgeB, c.weightB)},
+         kNoElement,
+         c.normal,
+         c.timeOfImpact,
+         c.distance,
+         {onEdge(pair[0].now, c.edgeA, c.weightA), onEdge(pair[1].now, c.edgeB, c.weightB)},
+         2,
+         i});
   }
   return all;
 }
@@ -160,9 +145,9 @@ struct Sides {
   const VertexSet& ofOwn(const FeaturePair& f) const { return ownIsSecond ? f.second : f.first; }
   const VertexSet& ofOther(const FeaturePair& f) const { return ownIsSecond ? f.first : f.second; }
   /// From the other geometry.
-  Vector3d upOf(const Named& c) const { return ownIsSecond ? Vector3d(-c.normal) : c.normal; }
+  Vector3d upOf(const Impact& c) const { return ownIsSecond ? Vector3d(-c.normal) : c.normal; }
 
-  bool isExcluded(const Named& c) const {
+  bool isExcluded(const Impact& c) const {
     const VertexSet& feature = ofOther(c.closest);
     if (feature.size() > 2) return false;
     // A vertex is tested against elements, an edge of a line against the triangles at an edge.
@@ -176,14 +161,14 @@ struct Sides {
 
   /// Whether all vertices of an impact's element are of another one's, as a vertex is one of a
   /// triangle with it.
-  bool isPartOf(const Named& s, const VertexSet& whole) const {
+  bool isPartOf(const Impact& s, const VertexSet& whole) const {
     const VertexSet& part = ofOwn(s.elements);
     return std::includes(whole.begin(), whole.end(), part.begin(), part.end());
   }
-  double heightOf(const Named& s, const Vector3d& up) const {
+  double heightOf(const Impact& s, const Vector3d& up) const {
     return up.dot(s.points[!ownIsSecond]) + other.radius();
   }
-  double gapOf(const Named& s, const Vector3d& up) const {
+  double gapOf(const Impact& s, const Vector3d& up) const {
     return up.dot(s.points[ownIsSecond]) - own.radius() - heightOf(s, up);
   }
   bool haveFaces() const {
@@ -191,7 +176,7 @@ struct Sides {
   }
   /// Whether the other geometry's closest point is on a ridge or a border, as seen from the held
   /// element.
-  bool isOnRidge(const Named& c, const PairSettings& pair) const {
+  bool isOnRidge(const Impact& c, const PairSettings& pair) const {
     const VertexSet& held = ofOwn(c.elements);
     double length = 0;
     for (const std::uint32_t p : held)
@@ -204,7 +189,7 @@ struct Sides {
 
 /// An impact that is not excluded, seen from a side whose element it holds.
 struct Holder {
-  const Named& impact;
+  const Impact& impact;
   Sides sides;
 
   Vector3d up() const { return sides.upOf(impact); }
@@ -212,7 +197,7 @@ struct Holder {
 };
 
 /// Whether s keeps c away, together with others on its plane. sides: those of c.
-bool standsFor(const Holder& s, const Named& c, const Sides& sides,
+bool standsFor(const Holder& s, const Impact& c, const Sides& sides,
                const std::vector<Holder>& holders, const PairSettings& pair) {
   const VertexSet &held = sides.ofOwn(c.elements), &others = sides.ofOther(c.elements);
   const bool isInTime =
@@ -246,8 +231,7 @@ bool standsFor(const Holder& s, const Named& c, const Sides& sides,
 /// All but excluded impacts that others stand for.
 std::vector<Impact> includedOf(const CollisionData& all, const std::array<Moving, 2>& pair,
                                const PairSettings& settings) {
-  const std::vector<Impact> impacts = impactsOf(all);
-  const std::vector<Named> named = namedOf(all, pair);
+  const std::vector<Impact> impacts = impactsOf(all, pair);
   const std::array views{Sides{pair[0], pair[1], false}, Sides{pair[1], pair[0], true}};
   const bool haveFaces = views[0].haveFaces(), self = &pair[0].geometry == &pair[1].geometry;
   // Both sides of two meshes with faces, the vertex of a vertex and an element, or the edge of a
@@ -260,13 +244,13 @@ std::vector<Impact> includedOf(const CollisionData& all, const std::array<Moving
   std::vector<char> isExcluded;
   for (std::size_t i = 0; i < impacts.size(); ++i) {
     const auto sides = heldSidesOf(i);
-    isExcluded.push_back(impacts[i].triangle == std::numeric_limits<std::uint32_t>::max() &&
+    isExcluded.push_back(impacts[i].triangle == kNoElement &&
                          std::ranges::any_of(sides, [&](std::size_t side) {
-                           return views[side].isExcluded(named[i]);
+                           return views[side].isExcluded(impacts[i]);
                          }));
     if (isExcluded[i]) continue;
     for (const std::size_t side : sides)
-      holders[self ? 0 : side].push_back({named[i], views[side]});
+      holders[self ? 0 : side].push_back({impacts[i], views[side]});
   }
   std::vector<Impact> included;
   for (std::size_t i = 0; i < impacts.size(); ++i) {
@@ -274,7 +258,7 @@ std::vector<Impact> includedOf(const CollisionData& all, const std::array<Moving
     if (!isExcluded[i] || std::ranges::none_of(sides, [&](std::size_t side) {
           const auto& others = holders[self ? 0 : side];
           return std::ranges::any_of(others, [&](const Holder& s) {
-            return standsFor(s, named[i], views[side], others, settings);
+            return standsFor(s, impacts[i], views[side], others, settings);
           });
         }))
       included.push_back(impacts[i]);
@@ -437,10 +421,10 @@ TEST(FirstImpacts, FilteredContactsSuppressNoOthers) {
 }
 
 /// Regular grids that fall onto each other touch where weights are 0 up to rounding.
-TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
+TEST(FirstImpacts, OfAlignedGridsAreThoseOfTheDefinition) {
   Random random(18);
-  std::size_t contacts = 0;
-  for (std::uint32_t n = 2; n < 6; ++n)
+  std::size_t dropped = 0;
+  for (std::uint32_t n = 2; n < 4; ++n)
     for (int run = 0; run < casesOf(40); ++run) {
       const TestGeometry floor = testGeometry(sheet(n, 0.0, 0.0));
       TestGeometry above = floor;
@@ -448,23 +432,9 @@ TEST(FirstImpacts, AlignedGridsReportEachFeaturePairOnce) {
       for (Vector3d& p : above.positions) p += Vector3d(along, 0, time);
       Positions now = above.positions;
       for (Vector3d& p : now) p.z() -= 1;
-      const CollisionData data = answer(settingsOf(Engine::Octree), floor, above,
-                                        {Method::Continuous}, floor.positions, now);
-      // Grouped by the vertices with weights other than 0: those of a, then those of b.
-      std::set<std::array<std::set<std::uint32_t>, 2>> seen;
-      const auto add = [&](const auto& contact, std::array<std::size_t, 4> sides) {
-        const Stencil of = stencil(contact);
-        std::array<std::set<std::uint32_t>, 2> features;
-        for (std::size_t i = 0; i < 4; ++i)
-          if (of.weights[i] != 0.0) features[sides[i]].insert(of.vertices[i]);
-        EXPECT_TRUE(seen.insert(features).second) << n << ", run " << run;
-        ++contacts;
-      };
-      for (const auto& c : data.vertexTriangle()) add(c, {0, 1, 1, 1});
-      for (const auto& c : data.triangleVertex()) add(c, {1, 0, 0, 0});
-      for (const auto& c : data.edgeEdge()) add(c, {0, 0, 1, 1});
+      dropped += expectFirstImpacts(floor, above, {Method::Continuous}, floor.positions, now);
     }
-  EXPECT_GE(contacts, leastOf(500));
+  EXPECT_GE(dropped, leastOf(100));
 }
 
 }  // namespace

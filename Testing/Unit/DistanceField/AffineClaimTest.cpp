@@ -1,8 +1,8 @@
 #include "DistanceField/AffineClaim.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "Mesh/FloatPositions.h"
 
 #include <gtest/gtest.h>
@@ -110,11 +110,9 @@ TEST(AffineClaim, HoldsOnlyIfNoSampleDisprovesIt) {
       }
     const bool holds = claim.holds(geometry);
     ASSERT_FALSE(holds && isDisproved) << "case " << i;
-    for (const std::string& path : simdPaths()) {
-      useSimdPath(path);
+    for (const std::string& path : EverySimdPath()) {
       ASSERT_EQ(claim.holds(geometry), holds) << "case " << i << ", " << path;
     }
-    useSimdPath("");
     held += holds;
     disproved += isDisproved;
   }

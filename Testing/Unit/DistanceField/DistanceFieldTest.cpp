@@ -1,11 +1,11 @@
 #include <palpate/DistanceField.h>
 #include <palpate/OctreeBasedCD.h>
 
+#include "Common/EverySimdPath.h"
 #include "Common/ExpectRefused.h"
 #include "Common/FailingAllocation.h"
 #include "Common/Sanitized.h"
 #include "Common/TemporaryFolder.h"
-#include "Core/SimdPath.h"
 #include "DistanceField/FieldCells.h"
 #include "FieldPoints.h"
 
@@ -171,15 +171,13 @@ TEST(DistanceField, DoesNotDependOnThreadsOrInstructions) {
       EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1, threads)), expected);
     const DistanceField field = fieldOf(mesh, 0.05, 0.1);
     const auto points = adversarialPoints(random, mesh, field, 1001);
-    for (const std::string& path : simdPaths()) {
-      useSimdPath(path);
+    for (const std::string& path : EverySimdPath()) {
       EXPECT_EQ(bytesOf(fieldOf(mesh, 0.05, 0.1)), expected) << path;
       std::vector<double> values(points.size());
       field.values(points, values);
       for (std::size_t i = 0; i < points.size(); ++i)
         ASSERT_EQ(values[i], field.value(points[i])) << path << ", point " << points[i].transpose();
     }
-    useSimdPath("");
   }
 }
 
@@ -246,26 +244,14 @@ TEST(DistanceField, KeepsItsMemoryLimit) {
 
 /// A value within a bound of more than the band could have the wrong sign beyond the band.
 TEST(DistanceField, SignsBeyondTheBandAreRightForEveryErrorBound) {
+  Random random(4);
   const Mesh mesh = sphere(20, 30, {0.1, 0.2, 0.3}, 1.0);
   for (const double errorBound : {0.05, 0.1, 0.4, 3.0}) {
     const double band = 0.05;
     const DistanceField field =
         DistanceField::build({mesh.positions, mesh.triangles}, {errorBound, band});
     EXPECT_EQ(field.errorBound(), band);
-    OctreeBasedCD detection;
-    const GeometryId body = detection.addTriangleMesh(mesh.positions, mesh.triangles);
-    const SpatialQueries queries = detection.queries();
-    Random random(4);
-    for (int i = 0; i < casesOf(20000); ++i) {
-      Eigen::Vector3d point = randomPoint(random, -1, 1);
-      point = mesh.positions[random() % mesh.positions.size()] + 3 * band * point;
-      const double exact = queries.signedDistance(body, point).distance;
-      if (std::abs(exact) > band) {
-        ASSERT_EQ(field.value(point) < 0, exact < 0) << exact;
-      } else {
-        ASSERT_NEAR(field.value(point), exact, band);
-      }
-    }
+    expectWithinBound(random, mesh, field, casesOf(20000));
   }
 }
 

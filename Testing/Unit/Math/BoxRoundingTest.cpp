@@ -1,6 +1,6 @@
 #include "Math/Box.h"
 
-#include "Core/SimdPath.h"
+#include "Common/EverySimdPath.h"
 #include "Unit/Math/TrianglePairs.h"
 
 #include <gtest/gtest.h>
@@ -35,8 +35,7 @@ HWY_EXPORT(roundOutwardKernel);
 namespace {
 
 TEST(BoxRounding, LanesHaveTheBitsOfSingleBoundsOnEverySimdPath) {
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     test::Random random(9);
     for (int repeat = 0; repeat < 200; ++repeat) {
       alignas(64) std::array<float, 16> values, down, up;
@@ -52,7 +51,6 @@ TEST(BoxRounding, LanesHaveTheBitsOfSingleBoundsOnEverySimdPath) {
       }
     }
   }
-  useSimdPath("");
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include "Math/ImpactFilter.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "DistanceAtTime.h"
 
 #include <gtest/gtest.h>
@@ -46,11 +46,9 @@ unsigned leftOut(const Eight& eight, const TimeOfImpactSettings& settings) {
     }
   const auto out = [&] { return ~mayImpact(eight[0].query().kind, block, settings) & 255u; };
   const unsigned best = out();
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     EXPECT_EQ(out(), best) << path;
   }
-  useSimdPath("");
   return best;
 }
 
@@ -89,12 +87,10 @@ TEST(ImpactFilter, ReadsNothingBeyondTheBlock) {
   ASSERT_EQ(mprotect(static_cast<char*>(pages) + page, page, PROT_NONE), 0);
   const ImpactBlock& block =
       *new (static_cast<char*>(pages) + page - sizeof(ImpactBlock)) ImpactBlock;
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     for (const auto kind : {ImpactQuery::Kind::VertexTriangle, ImpactQuery::Kind::EdgeEdge})
       EXPECT_EQ(mayImpact(kind, block, {}), 255u) << path;
   }
-  useSimdPath("");
   munmap(pages, 2 * page);
 }
 

@@ -1,5 +1,6 @@
 #include "Math/PassageFilter.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
 #include "Core/SimdPath.h"
 #include "ImpactCheck.h"
@@ -33,8 +34,7 @@ void expectSame(const Eight& eight, double tolerance, Counts& counts) {
       block.set(static_cast<int>(lane), i, vertex.before, vertex.now);
     }
   }
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     const BlockPassages found = findPassages(eight[0].query().kind, block, tolerance);
     for (std::size_t lane = 0; lane < eight.size(); ++lane) {
       ++counts.queries;
@@ -55,7 +55,6 @@ void expectSame(const Eight& eight, double tolerance, Counts& counts) {
           << path << ", " << text(eight[lane]);
     }
   }
-  useSimdPath("");
 }
 
 TEST(PassageFilter, HasTheBitsOfOneQuery) {

@@ -1,7 +1,7 @@
 #include "Math/RayTriangle.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "Math/RayTriangles.h"
 #include "Math/Tolerances.h"
 #include "RationalOracle.h"
@@ -181,8 +181,7 @@ RayPair nextPair(Random& random, int kind) {
 
 TEST(RayTriangles, HaveTheBitsOfEachPairOnEverySimdPath) {
   constexpr std::size_t kSize = RayTriangles::kSize;
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     Random random(71);
     std::size_t hits = 0, undecided = 0, points = 0;
     for (int i = 0; i < testing::casesOf(20'000); ++i) {
@@ -224,7 +223,6 @@ TEST(RayTriangles, HaveTheBitsOfEachPairOnEverySimdPath) {
     EXPECT_GE(undecided, testing::leastOf(1'000)) << path;
     EXPECT_GE(2 * points, hits) << path;  // a third is beyond the range
   }
-  useSimdPath("");
 }
 
 }  // namespace

@@ -75,35 +75,6 @@ TEST(TriangleIntersection, ReorderingCornersOrTrianglesPermutesTheResult) {
   }
 }
 
-TEST(TriangleIntersection, MirroringExchangingAxesAndPowersOfTwoChangeNothing) {
-  Random random(12);
-  SignCounts counts;
-  for (int repeat = 0; repeat < 2000 * kKinds; ++repeat) {
-    const auto kind = static_cast<Kind>(repeat % kKinds);
-    const CornersPair pair = makePair(kind, random);
-    const TriangleIntersection result = intersectTriangles(pair.first, pair.second, counts);
-    CornersPair mirrored = pair, turned = pair;
-    for (auto& [from, to] : {std::pair(&mirrored, &turned)})
-      for (int i = 0; i < 3; ++i) {
-        from->first[i][repeat % 3] *= -1;
-        from->second[i][repeat % 3] *= -1;
-        std::swap(to->first[i][0], to->first[i][1]);
-        std::swap(to->second[i][0], to->second[i][1]);
-      }
-    expectSame(intersectTriangles(mirrored.first, mirrored.second, counts), result,
-               repeat % kKinds);
-    expectSame(intersectTriangles(turned.first, turned.second, counts), result, repeat % kKinds);
-    // Only where no bit is lost: grids may reach the denormals, others stay well above.
-    if (kind == Kind::SmallGrid || kind == Kind::Random || kind == Kind::CoplanarTilted) {
-      for (const int exponent : {-900, -400, 400, 900}) {
-        const CornersPair other = scaled(pair, exponent);
-        expectSame(intersectTriangles(other.first, other.second, counts), result, repeat % kKinds);
-      }
-    }
-    if (HasFatalFailure()) return;
-  }
-}
-
 /// The reported features must be consistent for any triangles.
 TEST(TriangleIntersection, IntersectionWithoutTouchHasTwoCrossings) {
   Random random(13);

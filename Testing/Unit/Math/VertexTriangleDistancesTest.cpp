@@ -1,8 +1,8 @@
 #include "Math/VertexTriangleDistances.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "DistanceCases.h"
 #include "Math/ClosestPoint.h"
 #include "Math/DistanceBounds.h"
@@ -29,8 +29,7 @@ bool isSame(const Vector3d& a, const Vector3d& b) {
 }
 
 TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     DistanceCases cases(21);
     for (int i = 0; i < testing::casesOf(20'000); ++i) {
       const std::size_t count = 1 + i % TriangleBatch::kSize;
@@ -54,7 +53,6 @@ TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
       }
     }
   }
-  useSimdPath("");
 }
 
 /// Triangles of any shape: with narrow angles, tiny, and without area.
@@ -72,8 +70,7 @@ TriangleBatch randomTriangles(testing::Random& random) {
 }
 
 TEST(DistanceBounds, EncloseTheDistanceOnEveryPath) {
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     testing::Random random(1);
     for (int i = 0; i < testing::casesOf(5000); ++i) {
       const TriangleBatch batch = randomTriangles(random);
@@ -89,7 +86,6 @@ TEST(DistanceBounds, EncloseTheDistanceOnEveryPath) {
       }
     }
   }
-  useSimdPath("");
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #include "Mesh/FaceBlock.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
-#include "Core/SimdPath.h"
 #include "Mesh/FaceAtCorner.h"
 
 #include <gtest/gtest.h>
@@ -37,8 +37,7 @@ TEST(FaceBlock, HasTheBitsOfOneTriangle) {
         for (Vector3d& position : p) position *= std::ldexp(1.0, 10 * below(60) - 300);
       block.set(lane, p[1] - p[0], p[2] - p[0]);
     }
-    for (const std::string& path : simdPaths()) {
-      useSimdPath(path);
+    for (const std::string& path : testing::EverySimdPath()) {
       const FaceBlockNormals normals = weightedNormals(block);
       for (std::size_t lane = 0; lane < FaceBlock::kLanes; ++lane) {
         const FaceAtCorner face(corners[lane], 0);
@@ -53,7 +52,6 @@ TEST(FaceBlock, HasTheBitsOfOneTriangle) {
       }
     }
   }
-  useSimdPath("");
   // Both kinds are common, however many SIMD paths the build has.
   EXPECT_GT(4 * plain, plain + others);
   EXPECT_GT(4 * others, plain + others);

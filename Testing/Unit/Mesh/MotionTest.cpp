@@ -1,7 +1,7 @@
 #include "Mesh/Motion.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
-#include "Core/SimdPath.h"
 #include "Mesh/PieceMotion.h"
 
 #include <gtest/gtest.h>
@@ -40,8 +40,7 @@ TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
   for (const std::size_t first : {0, 3})
     for (std::size_t last = first; last <= before.size(); ++last) {
       const MotionRange expected = oneByOne(before, now, first, last);
-      for (const std::string& path : simdPaths()) {
-        useSimdPath(path);
+      for (const std::string& path : testing::EverySimdPath()) {
         const MotionRange range = motionRange(std::span(before).subspan(first, last - first),
                                               std::span(now).subspan(first, last - first));
         EXPECT_EQ(range.lower, expected.lower) << path << ", " << first << " to " << last;
@@ -49,7 +48,6 @@ TEST(Motion, RangeMatchesEachVertexOnEverySimdPath) {
         EXPECT_EQ(range.isEmpty, expected.isEmpty);
       }
     }
-  useSimdPath("");
 }
 
 TEST(Motion, FastShareIsAboutThatOfAllPairs) {

@@ -2,8 +2,8 @@
 
 #include <palpate/FeaturePairs.h>
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
-#include "Core/SimdPath.h"
 
 #include <gtest/gtest.h>
 
@@ -44,8 +44,7 @@ std::vector<ElementPair> answered(const Step& step) {
   std::vector<std::uint32_t> order(step.topology.elements.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<Triangle> first;
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     for (const int threads : {1, 3}) {
       UnfoldedStars stars;
       stars.find(step.topology, order, step.topology.elements, before.data(), now.data(),
@@ -56,7 +55,6 @@ std::vector<ElementPair> answered(const Step& step) {
       EXPECT_EQ(found, first) << path;
     }
   }
-  useSimdPath("");
   std::vector<ElementPair> pairs;
   for (std::uint32_t a = 0; a < first.size(); ++a)
     for (std::uint32_t b = a + 1; b < first.size(); ++b)

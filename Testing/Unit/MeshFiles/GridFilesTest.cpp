@@ -182,7 +182,6 @@ std::vector<std::pair<std::string, std::string>> goodFiles() {
 }
 
 bool isWhole(const MeshArrays& mesh, bool isMedit) {
-  std::vector<Vector3d> positions = kPositions;
   return mesh.positions.size() == 5 && mesh.tetrahedra.size() == 2 && mesh.triangles.size() == 1 &&
          mesh.segments.size() == 1 && mesh.points.size() == (isMedit ? 0 : 1);
 }

@@ -1,11 +1,10 @@
 #include "NarrowPhase/FeaturePairs.h"
 
-#include "Core/SimdPath.h"
 #include "Octree/Traversal.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
-#include "PublishedFrames.h"
 
 #include <gtest/gtest.h>
 
@@ -218,8 +217,7 @@ TEST(FeaturePairs, AreEachTestedOnce) {
           pairsOf(a, *second,
                   [&](const auto& p, const auto& q) { return isUsed(a, p) && isUsed(*second, q); });
       std::vector<FeaturePair> first;
-      for (const std::string& path : simdPaths()) {
-        useSimdPath(path);
+      for (const std::string& path : testing::EverySimdPath()) {
         FeaturePairs pairs;
         findFeaturePairs(a, *second, nullptr, candidates, pairs);
         EXPECT_EQ(sorted(pairs.vertexTriangle), vertexTriangle) << path;
@@ -235,53 +233,7 @@ TEST(FeaturePairs, AreEachTestedOnce) {
                        [](const auto& l, const auto& r) { return l.a == r.a && l.b == r.b; }))
             << path;
       }
-      useSimdPath("");
     }
-  }
-}
-
-struct PublishedStep {
-  const char *before, *now;
-  std::size_t vertexTriangle, edgeEdge;
-};
-
-TEST(FeaturePairs, MatchBoxesInDoubleOnPublishedSteps) {
-  const std::string folder = std::string(PALPATE_SHARED_DATA) + "/ccd-scenes/";
-  if (!std::filesystem::is_directory(folder))
-    GTEST_SKIP() << "no ccd-scenes in PALPATE_SHARED_DATA";
-  for (const auto& [before, now, vertexTriangles, edgeEdges] :
-       {PublishedStep{"cloth-funnel/frames/227", "cloth-funnel/frames/228", 7'319, 33'770},
-        PublishedStep{"rod-twist/frames/3036", "rod-twist/frames/3037", 448'270, 2'041'334}}) {
-    const TriangleMesh mesh = testing::readStep(folder + before + ".ply", folder + now + ".ply");
-    const MeshTopology& topology = mesh.topology;
-    const auto vertexCount = static_cast<std::uint32_t>(topology.vertexCount);
-    std::vector<Eigen::AlignedBox3d> edges, corners;
-    for (const Segment& edge : topology.edges) edges.push_back(testing::sweptBox(mesh, edge));
-    for (std::uint32_t v = 0; v < vertexCount; ++v)
-      corners.push_back(testing::sweptBox(mesh, std::array{v}));
-    for (const Triangle& triangle : topology.elements)
-      corners.push_back(testing::sweptBox(mesh, triangle));
-    std::vector<Ids> vertexTriangle, edgeEdge;
-    testing::forEachOverlap(edges, [&](std::uint32_t p, std::uint32_t q) {
-      if (!meet(topology.edges[p], topology.edges[q])) edgeEdge.push_back({p, q});
-    });
-    testing::forEachOverlap(corners, [&](std::uint32_t v, std::uint32_t t) {
-      if (v < vertexCount && t >= vertexCount && !holds(topology.elements[t - vertexCount], v))
-        vertexTriangle.push_back({v, t - vertexCount});
-    });
-    EXPECT_EQ(vertexTriangle.size(), vertexTriangles);
-    EXPECT_EQ(edgeEdge.size(), edgeEdges);
-
-    std::vector<FloatPoint> floatsBefore(mesh.before.size()), floatsNow(mesh.now.size());
-    toFloats(mesh.before.body(), {mesh.now[0], 1.0}, floatsBefore.data());
-    toFloats(mesh.now.body(), {mesh.now[0], 1.0}, floatsNow.data());
-    const FloatPair floats{floatsNow.data(), floatsNow.data(), floatsBefore.data(),
-                           floatsBefore.data()};
-    FeaturePairs pairs;
-    findFeaturePairs(topology, topology, &floats, testing::sweptCandidates(mesh), pairs);
-    expectOverlapping(pairs.vertexTriangle, vertexTriangle);
-    expectOverlapping(pairs.edgeEdge, edgeEdge);
-    if (testing::kShareOfCases > 1) break;  // the second step is much larger
   }
 }
 

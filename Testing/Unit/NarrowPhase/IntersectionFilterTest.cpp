@@ -1,8 +1,8 @@
 #include "Diagnostics/ContactsByBruteForce.h"
 #include "NarrowPhase/IntersectionFilter.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Unit/Math/TrianglePairs.h"
 
@@ -48,8 +48,7 @@ struct Answers {
 Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
                   const std::vector<ElementPair>& pairs) {
   std::vector<Answers> ofPaths;
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     Buffer<PossibleIntersection> out = {{{7, 7}, {}}};  // goes
     keepPossiblyIntersecting(a, b, self, pairs, out);
     Answers& answers = ofPaths.emplace_back();
@@ -64,7 +63,6 @@ Answers answersTo(const PlacedTriangles& a, const PlacedTriangles& b, bool self,
     EXPECT_EQ(next, out.size()) << path;
     EXPECT_TRUE(answers == ofPaths.front()) << path;
   }
-  useSimdPath("");
   return ofPaths.front();
 }
 

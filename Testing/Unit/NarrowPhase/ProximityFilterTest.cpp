@@ -1,7 +1,7 @@
 #include "NarrowPhase/ProximityFilter.h"
 
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
-#include "Core/SimdPath.h"
 #include "NarrowPhase/FeatureTests.h"
 #include "Math/ClosestPoint.h"
 #include "Unit/Math/TrianglePairs.h"
@@ -45,14 +45,20 @@ std::optional<double> distanceOf(const Pair& x, int test, bool distinct) {
   return answer ? std::optional(answer->distance) : std::nullopt;
 }
 
+/// The tests that the filter keeps of each pair, the same on every SIMD path.
 Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct,
                 double checkedEdgeDistance = 0.0) {
   TrianglePairBatch batch{};
   for (std::size_t n = 0; n < pairs.size(); ++n)
     for (int row = 0; row < 18; ++row) batch.coordinates[row][n] = pairs[n][row / 3][row % 3];
-  std::uint32_t possible[TrianglePairBatch::kSize];
-  findPossibleProximity(batch, thickness, distinct, checkedEdgeDistance, possible);
-  return std::to_array(possible);
+  const auto find = [&] {
+    std::uint32_t possible[TrianglePairBatch::kSize];
+    findPossibleProximity(batch, thickness, distinct, checkedEdgeDistance, possible);
+    return std::to_array(possible);
+  };
+  const Possible best = find();
+  for (const std::string& path : testing::EverySimdPath()) EXPECT_EQ(find(), best) << path;
+  return best;
 }
 
 using test::Random;
@@ -204,21 +210,6 @@ TEST(ProximityFilter, KeepsEdgesWithinTheCheckedDistance) {
         }
   }
   EXPECT_GE(ends, testing::leastOf(5000));
-}
-
-TEST(ProximityFilter, EverySimdPathDropsTheSamePairs) {
-  Random random(3);
-  for (int round = 0; round < 300; ++round) {
-    const std::vector<Pair> pairs = batchOf(round % kKinds, random);
-    const double thickness = smallPower(random);
-    useSimdPath("");
-    const Possible best = filter(pairs, thickness, round % 2 == 0);
-    for (const std::string& path : simdPaths()) {
-      useSimdPath(path);
-      ASSERT_EQ(filter(pairs, thickness, round % 2 == 0), best) << path;
-    }
-  }
-  useSimdPath("");
 }
 
 /// For well-shaped triangles, few pairs beyond the thickness are kept.

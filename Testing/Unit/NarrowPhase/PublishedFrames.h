@@ -75,36 +75,23 @@ inline std::vector<bool> readTruth(const std::filesystem::path& path) {
   return truth;
 }
 
-/// The box of some vertices over the step.
-template <class Vertices>
-Eigen::AlignedBox3d sweptBox(const TriangleMesh& mesh, const Vertices& vertices) {
-  Eigen::AlignedBox3d box;
-  for (const std::uint32_t vertex : vertices)
-    box.extend(mesh.before[vertex]).extend(mesh.now[vertex]);
-  return box;
-}
-
-/// f(i, j), i < j, for each two boxes that overlap, by sorting along x.
-template <class F>
-void forEachOverlap(const std::vector<Eigen::AlignedBox3d>& boxes, F&& f) {
+/// Every pair of triangles of a mesh, a < b, whose boxes over the step overlap.
+inline std::vector<ElementPair> sweptCandidates(const TriangleMesh& mesh) {
+  std::vector<Eigen::AlignedBox3d> boxes(mesh.topology.elements.size());
+  for (std::size_t t = 0; t < boxes.size(); ++t)
+    for (const std::uint32_t vertex : mesh.topology.elements[t])
+      boxes[t].extend(mesh.before[vertex]).extend(mesh.now[vertex]);
   std::vector<std::uint32_t> order(boxes.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](std::uint32_t l, std::uint32_t r) {
     return boxes[l].min().x() < boxes[r].min().x();
   });
+  std::vector<ElementPair> pairs;
   for (std::size_t i = 0; i < order.size(); ++i)
     for (std::size_t j = i + 1;
          j < order.size() && boxes[order[j]].min().x() <= boxes[order[i]].max().x(); ++j)
       if (boxes[order[i]].intersects(boxes[order[j]]))
-        f(std::min(order[i], order[j]), std::max(order[i], order[j]));
-}
-
-/// Every pair of triangles of a mesh, a < b, whose boxes over the step overlap.
-inline std::vector<ElementPair> sweptCandidates(const TriangleMesh& mesh) {
-  std::vector<Eigen::AlignedBox3d> boxes;
-  for (const Triangle& triangle : mesh.topology.elements) boxes.push_back(sweptBox(mesh, triangle));
-  std::vector<ElementPair> pairs;
-  forEachOverlap(boxes, [&](std::uint32_t a, std::uint32_t b) { pairs.push_back({a, b}); });
+        pairs.push_back({std::min(order[i], order[j]), std::max(order[i], order[j])});
   std::sort(pairs.begin(), pairs.end());
   return pairs;
 }

@@ -4,9 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <stdexcept>
-
 namespace palpate {
 namespace {
 
@@ -110,49 +107,6 @@ TEST(TimeTolerance, BoundsTimeAndDistanceWithAThickness) {
   EXPECT_GT(coarse.size(), fine.size());
   EXPECT_TRUE(std::includes(coarse.begin(), coarse.end(), fine.begin(), fine.end()));
   EXPECT_TRUE(std::includes(wider.begin(), wider.end(), coarse.begin(), coarse.end()));
-}
-
-/// A predicate that throws after boxes sweep less: the next frame has boxes of the whole step.
-TEST(EarliestTime, PredicateThatThrowsLeavesTheOctreesCorrect) {
-  Random random(13);
-  const testing::Mesh a = testing::soup(random, 9000, 0.02);
-  Positions now = a.positions;
-  for (Eigen::Vector3d& p : now) p += testing::randomPoint(random, -0.02, 0.02);
-  OctreeBasedCD detection({.threads = 1});
-  const GeometryId id = detection.addTriangleMesh(a.positions, a.triangles);
-  detection.addCollisionPair(
-      id, id, {.method = Method::Continuous, .continuous = {.earliestTimeOnly = true}});
-  int calls = 0, allowed = std::numeric_limits<int>::max();
-  detection.setContactPredicate(id, id, [&](const ContactFeatures&) {
-    if (++calls > allowed) throw std::runtime_error("enough");
-    return true;
-  });
-  const auto frame = [&] {
-    detection.setPositions(id, a.positions, now);
-    detection.setPairSettings(id, id, detection.pairs().front().settings);  // no contacts yet
-    calls = 0;
-    detection.detectCollision();
-    return detection.collisionData(id, id).earliestTimeOfImpact();
-  };
-  const auto boxes = [&] {
-    std::vector<Eigen::AlignedBox3d> all;
-    for (const LooseOctree::Node& node : detection.octree().nodes(id))
-      all.push_back(node.fittedBox);
-    return all;
-  };
-  const double time = frame();
-  const int asked = calls;
-  ASSERT_GT(asked, 2);
-  const auto whole = boxes();
-  for (allowed = 1; allowed < asked; ++allowed) {
-    EXPECT_THROW(frame(), std::runtime_error);
-    const auto after = boxes();
-    ASSERT_EQ(after.size(), whole.size());
-    for (std::size_t i = 0; i < whole.size(); ++i)
-      ASSERT_TRUE(after[i].min() == whole[i].min() && after[i].max() == whole[i].max());
-  }
-  allowed = std::numeric_limits<int>::max();
-  EXPECT_EQ(frame(), time);
 }
 
 }  // namespace

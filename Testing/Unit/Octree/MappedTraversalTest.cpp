@@ -1,9 +1,9 @@
 #include "Octree/Traversal.h"
 
 #include "BoxOctree.h"
+#include "Common/EverySimdPath.h"
 #include "Common/Sanitized.h"
 #include "Common/TraversedPairs.h"
-#include "Core/SimdPath.h"
 
 #include <gtest/gtest.h>
 
@@ -76,12 +76,10 @@ OctreeSettings smallLeaves() {
 /// The pairs of a traversal, sorted; the same on every SIMD path.
 std::vector<ElementPair> pairsOf(const TreePair& trees) {
   std::vector<std::vector<ElementPair>> found;
-  for (const std::string& path : simdPaths()) {
-    useSimdPath(path);
+  for (const std::string& path : testing::EverySimdPath()) {
     found.push_back(testing::traversedPairs(trees));
     EXPECT_EQ(found.back(), found.front()) << path;
   }
-  useSimdPath("");
   return found.front();
 }
 

@@ -1,8 +1,8 @@
 #include "Octree/PointQueries.h"
 
 #include "CollisionDetection/GeometryTable.h"
+#include "Common/EverySimdPath.h"
 #include "Common/RandomMeshes.h"
-#include "Core/SimdPath.h"
 #include "Octree/Traversal.h"
 
 #include <gtest/gtest.h>
@@ -67,8 +67,7 @@ void forEachCase(F&& f) {
       const FloatBox root = c.octree->blocks()[0].box(0);
       for (int k = 0; k < 3; ++k)
         reach = std::max({reach, -double{root.lower[k]}, double{root.upper[k]}});
-      for (const std::string& path : simdPaths()) {
-        useSimdPath(path);
+      for (const std::string& path : testing::EverySimdPath()) {
         for (const BoxMap& map : c.maps) {
           SCOPED_TRACE(path + ", " + std::to_string(size) + " of size " + std::to_string(extent) +
                        ", ends " + std::to_string(map.count));
@@ -76,7 +75,6 @@ void forEachCase(F&& f) {
         }
       }
     }
-  useSimdPath("");
 }
 
 TEST(PointQueries, FindEveryOverlappingElement) {

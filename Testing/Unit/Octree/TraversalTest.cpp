@@ -1,8 +1,8 @@
 #include "Octree/Traversal.h"
 
 #include "BoxOctree.h"
+#include "Common/EverySimdPath.h"
 #include "Common/TraversedPairs.h"
-#include "Core/SimdPath.h"
 
 #include <gtest/gtest.h>
 
@@ -75,8 +75,7 @@ TEST(Traversal, FindsThePairsOfOneTree) {
     return std::ranges::any_of(s, [&](auto v) { return std::ranges::find(t, v) != t.end(); });
   };
   for (const bool adjacent : {false, true})
-    for (const std::string& path : simdPaths()) {
-      useSimdPath(path);
+    for (const std::string& path : testing::EverySimdPath()) {
       TreePair trees{&tree.octree, &tree.octree};
       if (adjacent) trees.adjacency = ordered.data();
       const std::vector<ElementPair> pairs = testing::traversedPairs(trees, 20);
@@ -88,7 +87,6 @@ TEST(Traversal, FindsThePairsOfOneTree) {
       EXPECT_EQ(pairs, expected) << path;
       EXPECT_GT(expected.size(), 50u);
     }
-  useSimdPath("");
 }
 
 /// A function receives every pair once, in batches that are not empty.
