@@ -241,4 +241,27 @@ inline std::vector<AnalyticalGeometry> shapesOfEveryKind(Random& random) {
           ConvexHull{{{0.1, 0, 0}, {0.1, 0, 0}}}};
 }
 
+/// Shapes on a grid around the origin: with parallel parts, flat, thin, or a point.
+inline std::vector<AnalyticalGeometry> degenerateShapes() {
+  return {Sphere{{0, 0, 0}, 1},
+          Sphere{{1, 0, 0}, 0},
+          Capsule{{0, 0, 0}, {2, 0, 0}, 0},
+          Capsule{{0, 0, 0}, {0, 2, 0}, 1},
+          Capsule{{1, 1, 1}, {1, 1, 1}, 1},
+          Plane{{0, 0, 0}, {0, 0, 1}, false},
+          Plane{{0, 0, 0}, {0, 1, 1}, true},
+          Box{{0, 0, 0}, {0, 0, 0}},
+          Box{{0, 0, 0}, {1, 1, 0}},
+          Box{{0, 0, 0}, {0, 1, 0}},
+          Box{{0, 0, 0}, {1, 1, 1}},
+          Box{{0, 0, 0}, {1, 2, 0.5}},
+          Cylinder{{0, 0, -1}, {0, 0, 1}, 1},
+          Cylinder{{0, -1, 0}, {0, 1, 0}, 0.5},
+          Cylinder{{0, 0, -1}, {0, 0, 1}, 0},
+          ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}},
+          ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}},
+          ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}},
+          ConvexHull{{{1, 1, 1}}}};
+}
+
 }  // namespace palpate::testing

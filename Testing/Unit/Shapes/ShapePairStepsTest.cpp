@@ -267,20 +267,7 @@ TEST(ShapePairSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
 /// Shapes that are parallel, in one plane or on one line, on a grid.
 TEST(ShapePairSteps, DegenerateShapesHaveCorrectTimes) {
   Random random(2);
-  const std::vector<AnalyticalGeometry> all{
-      Sphere{{0, 0, 0}, 1},
-      Sphere{{0, 0, 0}, 0},
-      Capsule{{0, 0, 0}, {2, 0, 0}, 0},
-      Capsule{{0, 0, 0}, {0, 2, 0}, 1},
-      Plane{{0, 0, 0}, {0, 0, 1}, false},
-      Plane{{0, 0, 0}, {0, 1, 1}, true},
-      Box{{0, 0, 0}, {0, 0, 0}},
-      Box{{0, 0, 0}, {1, 1, 0}},
-      Box{{0, 0, 0}, {1, 1, 1}},
-      Cylinder{{0, 0, -1}, {0, 0, 1}, 1},
-      Cylinder{{0, -1, 0}, {0, 1, 0}, 0.5},
-      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}},
-      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}}};
+  const std::vector<AnalyticalGeometry> all = degenerateShapes();
   PairTally tally;
   const Matrix3d turns[] = {Matrix3d::Identity(),
                             Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix(),

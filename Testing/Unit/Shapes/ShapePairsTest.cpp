@@ -131,26 +131,7 @@ TEST(ShapePairs, MatchTheDefinition) {
 /// Shapes that are parallel, touching or in one plane.
 TEST(ShapePairs, DegenerateShapesMatchTheDefinition) {
   Random random(2);
-  const std::vector<AnalyticalGeometry> all{
-      Sphere{{0, 0, 0}, 1},
-      Sphere{{1, 0, 0}, 0},
-      Capsule{{0, 0, 0}, {2, 0, 0}, 0},
-      Capsule{{0, 0, 0}, {0, 2, 0}, 1},
-      Capsule{{1, 1, 1}, {1, 1, 1}, 1},
-      Plane{{0, 0, 0}, {0, 0, 1}, false},
-      Plane{{0, 0, 0}, {0, 1, 1}, true},
-      Box{{0, 0, 0}, {0, 0, 0}},
-      Box{{0, 0, 0}, {1, 1, 0}},
-      Box{{0, 0, 0}, {0, 1, 0}},
-      Box{{0, 0, 0}, {1, 1, 1}},
-      Box{{0, 0, 0}, {1, 2, 0.5}},
-      Cylinder{{0, 0, -1}, {0, 0, 1}, 1},
-      Cylinder{{0, -1, 0}, {0, 1, 0}, 0.5},
-      Cylinder{{0, 0, -1}, {0, 0, 1}, 0},
-      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}},
-      ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}},
-      ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}},
-      ConvexHull{{{1, 1, 1}}}};
+  const std::vector<AnalyticalGeometry> all = degenerateShapes();
   std::size_t number = 0;
   for (std::size_t i = 0; i < all.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j)

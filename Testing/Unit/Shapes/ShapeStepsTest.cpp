@@ -97,12 +97,12 @@ double distanceAt(const Tool& tool, const std::vector<Triangle>& faces,
                   const std::array<Vector3d, 3>& x, double t) {
   if (const auto* plane = std::get_if<Plane>(&tool.geometry)) return distanceAt(*plane, tool, x, t);
   const auto* cylinder = std::get_if<Cylinder>(&tool.geometry);
-  if (cylinder && cylinder->radius > 0) return distanceAt(*cylinder, tool, x, t);
+  if (cylinder) return distanceAt(*cylinder, tool, x, t);
   double radius = 0;
   Positions corners = testing::cornersOf({tool.geometry}, radius);
   for (Vector3d& p : corners) p = tool.at(p, t);
   std::vector<Triangle> parts = faces;
-  if (corners.size() <= 2) parts = {{0, static_cast<std::uint32_t>(corners.size() - 1), 0}};
+  if (faces.empty()) parts = {{0, static_cast<std::uint32_t>(corners.size() - 1), 0}};
   double least = kInfinity;
   bool inside = !faces.empty();
   for (const auto& [i, j, k] : parts) {
@@ -218,23 +218,6 @@ Tally expectTrue(const CollisionData& data, const Moving& body, const Tool& tool
   return tally;
 }
 
-std::vector<AnalyticalGeometry> geometries(Random& random) {
-  ConvexHull cloud;
-  for (int i = 0; i < 5; ++i) cloud.points.push_back(randomPoint(random, -0.4, 0.4));
-  std::vector<AnalyticalGeometry> all{Sphere{{0.1, 0, 0}, 0.3},
-                                      Sphere{{0, 0, 0}, 0},
-                                      Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0.1},
-                                      Capsule{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0},
-                                      Box{{0.1, 0, 0}, {0.3, 0.2, 0.1}},
-                                      Box{{0, 0, 0}, {0.3, 0.2, 0}},
-                                      cloud,
-                                      Plane{{0.1, 0, 0}, {1, 2, 3}},
-                                      Plane{{0.1, 0, 0}, {1, 2, 3}, true},
-                                      Cylinder{{-0.4, 0, 0}, {0.3, 0.1, 0}, 0.2},
-                                      Cylinder{{0, 0, -0.01}, {0, 0, 0.01}, 0.5}};
-  return all;
-}
-
 Moving movingBody(Random& random, int type, double radius) {
   Moving body;
   body.geometry.type = static_cast<GeometryType>(type);
@@ -263,7 +246,7 @@ TEST(ShapeSteps, TimesAreNeverLateAndEarlyByTheToleranceAtMost) {
   for (int run = 0; run < 4; ++run)
     for (const int kind : {0, 1, 2}) {
       const Moving body = movingBody(random, kind, kind == 0 || run % 2 ? 0.0 : 0.02);
-      for (const AnalyticalGeometry& geometry : geometries(random)) {
+      for (const AnalyticalGeometry& geometry : shapesOfEveryKind(random)) {
         if (isLeftOut(number++, 5)) continue;
         Tool tool{geometry, {}};
         tool.ends[0] = {randomTurn(random), randomPoint(random, -0.3, 0.3)};

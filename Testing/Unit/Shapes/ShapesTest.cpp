@@ -286,26 +286,9 @@ TEST(Shapes, TriangleIsTouchedAtItsClosestPoint) {
 
 TEST(Shapes, DegenerateElementsMatchTheDefinition) {
   Random random(5);
-  Positions unitCube{{1, 1, 1}};
-  for (int v = 0; v < 8; ++v)
-    unitCube.push_back({(v & 1) + 0.5, (v >> 1 & 1) + 0.5, (v >> 2) + 0.5});
-  std::vector<Placed> all{{Sphere{{1, 1, 1}, 0.5}},
-                          {Sphere{{1, 1, 1}, 0}},
-                          {Capsule{{0, 0, 0}, {2, 0, 0}, 0}},
-                          {Capsule{{0, 1, 1}, {2, 1, 1}, 0.5}},
-                          {Capsule{{1, 1, 1}, {1, 1, 1}, 1}},
-                          {Plane{{1, 1, 1}, {0, 0, 1}, false}},
-                          {Plane{{1, 1, 1}, {0, 1, 1}, true}},
-                          {Box{{1, 1, 1}, {0, 0, 0}}},
-                          {Box{{1, 1, 1}, {1, 1, 0}}},
-                          {Box{{1, 1, 1}, {1, 0.5, 0.5}}},
-                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0.5}},
-                          {Cylinder{{1, 1, 0}, {1, 1, 2}, 0}},
-                          {ConvexHull{{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}}}},
-                          {ConvexHull{{{0, 0, 1}, {2, 0, 1}, {0, 2, 1}}}},
-                          {ConvexHull{{{0, 0, 0}, {2, 2, 2}, {1, 1, 1}}}},
-                          {ConvexHull{{{1, 1, 1}}}},
-                          {ConvexHull{unitCube}}};
+  std::vector<Placed> all;
+  for (const AnalyticalGeometry& shape : degenerateShapes())
+    all.push_back({shape, Matrix3d::Identity(), {1, 1, 1}});
   for (int run = 0; run < casesOf(6); ++run) {
     TestGeometry degenerate;  // on a coarse grid
     for (int v = 0; v < 12; ++v) {
