@@ -10,6 +10,7 @@
 #include "FieldPoints.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cmath>
@@ -61,9 +62,12 @@ void write(const fs::path& path, const std::string& content) {
 }
 
 std::string bytesOf(const DistanceField& field) {
-  const TemporaryFolder folder;
-  field.save(folder.path / "bytes");
-  return contentOf(folder.path / "bytes");
+  const fs::path file =
+      fs::path(::testing::TempDir()) / ("palpate-field" + std::to_string(::getpid()));
+  field.save(file);
+  const std::string bytes = contentOf(file);
+  fs::remove(file);
+  return bytes;
 }
 
 void setChecksum(std::string& content) {

@@ -61,7 +61,7 @@ TEST(PassageFilter, HasTheBitsOfOneQuery) {
   HardCases hard(5);
   test::Random random(6);
   Counts counts;
-  for (int i = 0; i < testing::casesOf(6000) && !::testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < testing::casesOf(2400) && !::testing::Test::HasFailure(); ++i) {
     const auto kind = static_cast<ImpactKind>(i % static_cast<int>(ImpactKind::Count));
     Eight eight;
     const bool isScaled = kind < ImpactKind::ScaledAxes && random.below(4) == 0;
@@ -82,7 +82,7 @@ TEST(PassageFilter, KnowsNearlyAllPlainQueries) {
   test::Random random(8);
   Counts counts;
   std::size_t decided = 0;
-  for (int i = 0; i < testing::casesOf(4000) && !::testing::Test::HasFailure(); ++i) {
+  for (int i = 0; i < testing::casesOf(1500) && !::testing::Test::HasFailure(); ++i) {
     Eight eight;
     for (ImpactCase& query : eight) {
       query.edges = i % 2;

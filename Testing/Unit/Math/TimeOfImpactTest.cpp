@@ -194,7 +194,7 @@ TEST(TimeOfImpact, IsNotEarlierThanTheToleranceWhereRoundingHidesTheRoot) {
 TEST(TimeOfImpact, EquivalentQueriesHaveTheSameDecisionAndTime) {
   test::Random random(3);
   int impacts = 0;
-  const int cases = testing::casesOf(4000);
+  const int cases = testing::casesOf(1600);
   for (int i = 0; i < cases && !::testing::Test::HasFatalFailure(); ++i) {
     ImpactCase query =
         i % 4 < 3 ? randomGridCase(random, i % 8 < 4, 2) : randomCase(random, i % 8 < 4);

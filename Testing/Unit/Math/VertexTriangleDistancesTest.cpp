@@ -31,7 +31,7 @@ bool isSame(const Vector3d& a, const Vector3d& b) {
 TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
   for (const std::string& path : testing::EverySimdPath()) {
     DistanceCases cases(21);
-    for (int i = 0; i < testing::casesOf(20'000); ++i) {
+    for (int i = 0; i < testing::casesOf(8'000); ++i) {
       const std::size_t count = 1 + i % TriangleBatch::kSize;
       std::array<Four, TriangleBatch::kSize> x;
       TriangleBatch batch;

@@ -226,7 +226,7 @@ TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
   branching.segments.insert(branching.segments.end(), {{1, 3}, {3, 4}});
   Positions stretched = hairpin.positions;
   stretched[2][0] = 400;
-  struct Case {
+  struct Restrained {
     const char* name;
     const TestGeometry& line;
     double thickness, restDistance;
@@ -234,7 +234,7 @@ TEST(GeometryTypes, RestDistanceExcludesNeighboursAlongTheThread) {
     Positions now{};
   };
   for (const auto& [name, line, thickness, restDistance, pairs, now] :
-       {Case{"all", hairpin, 0.25, 0, {{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}},
+       {Restrained{"all", hairpin, 0.25, 0, {{0, 1, 2, 3}, {0, 1, 3, 4}, {1, 2, 3, 4}}},
         {"edges next but one are 1.002 apart", hairpin, 0.25, 1.5, {{0, 1, 3, 4}}},
         {"none is so far", hairpin, 0.25, 2.5, {}},
         {"the rest positions count", hairpin, 0.25, 2.5, {}, stretched},

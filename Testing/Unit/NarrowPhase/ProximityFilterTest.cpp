@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate {
+namespace palpate::test {
 namespace {
 
 using Eigen::Vector3d;
@@ -60,8 +60,6 @@ Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct,
   for (const std::string& path : testing::EverySimdPath()) EXPECT_EQ(find(), best) << path;
   return best;
 }
-
-using test::Random;
 
 double real(Random& random) { return 2 * random.unit() - 1; }
 double smallPower(Random& random) { return std::pow(10.0, -random.below(12)); }
@@ -242,4 +240,4 @@ TEST(ProximityFilter, KeepsEveryPairWhereCoordinatesOverflow) {
 }
 
 }  // namespace
-}  // namespace palpate
+}  // namespace palpate::test
