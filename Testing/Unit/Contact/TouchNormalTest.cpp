@@ -53,7 +53,7 @@ struct TouchAnswer {
   Validity validity;
   bool intersects;
 };
-TouchAnswer answerOf(const Case& bodies, const PairSettings& settings) {
+TouchAnswer touchAnswerOf(const Case& bodies, const PairSettings& settings) {
   OctreeBasedCD collisions(Settings{.threads = 1});
   const GeometryId a = collisions.addTriangleMesh(bodies.a.positions, bodies.a.triangles),
                    b = collisions.addTriangleMesh(bodies.b.positions, bodies.b.triangles);
@@ -92,10 +92,10 @@ TEST(TouchNormal, RestingBodiesAreOnlyPushedApart) {
       SCOPED_TRACE(std::string(touching[i].name) + ", method " +
                    std::to_string(static_cast<int>(settings.method)) + ", contacts " +
                    std::to_string(static_cast<int>(settings.contacts)));
-      const auto& [rows, validity, intersects] = answerOf(touching[i], settings);
+      const auto& [rows, validity, intersects] = touchAnswerOf(touching[i], settings);
       EXPECT_FALSE(validity.startedApart);
       EXPECT_FALSE(validity.trusted);
-      EXPECT_EQ(rows.size(), answerOf(apart[i], settings).rows.size());
+      EXPECT_EQ(rows.size(), touchAnswerOf(apart[i], settings).rows.size());
       EXPECT_FALSE(rows.empty());
       // Which side an open surface has is not known to contacts between its edges and a face.
       const double least = i == 1 && settings.contacts == Contacts::All ? -2 : 1 - 1e-12;
@@ -122,7 +122,7 @@ TEST(TouchNormal, TipsInManyTrianglesAreSeparated) {
     const Case tips{"tips", cone(n, 3.0, 1.0), cone(n, 0.2, -1.0), Vector3d::UnitZ()};
     for (const Method method : {Method::Auto, Method::Proximity}) {
       SCOPED_TRACE(static_cast<int>(method));
-      const auto rows = answerOf(tips, {.method = method, .thickness = 0.01}).rows;
+      const auto rows = touchAnswerOf(tips, {.method = method, .thickness = 0.01}).rows;
       EXPECT_FALSE(rows.empty());
       for (const ConstraintRow& row : rows) {
         const Vector3d up = row.normal * (separation(row, tips) < 0 ? -1 : 1);
@@ -140,7 +140,7 @@ TEST(TouchNormal, AlignedOverlapIsNoRest) {
   for (const double overlap : {0.1, 0.3, 0.7}) {
     const Case bodies{"", dividedBox({1 - overlap, 0, 0}, {2 - overlap, 1, 1}),
                       dividedBox({0, 0, 0}, {1, 1, 1}), Vector3d::UnitX()};
-    const TouchAnswer answer = answerOf(bodies, {.thickness = 0.01});
+    const TouchAnswer answer = touchAnswerOf(bodies, {.thickness = 0.01});
     EXPECT_FALSE(answer.validity.startedApart);
     EXPECT_TRUE(answer.intersects) << overlap;
   }

@@ -45,14 +45,6 @@ TEST(Threads, ChunksDependOnSizeAndGrainOnly) {
   }
 }
 
-TEST(Threads, EachIndexRunsOnceAndItsWritesAreVisible) {
-  for (const Threads& threads : threadsOfEveryKind()) {
-    std::vector<int> runs(10'000, 0);
-    threads.forEach(runs.size(), [&](std::size_t i) { ++runs[i]; });
-    EXPECT_TRUE(std::all_of(runs.begin(), runs.end(), [](int n) { return n == 1; }));
-  }
-}
-
 TEST(Threads, OnePoolRunsManySmallLoops) {
   for (int count : kCounts) {
     const Threads threads(count);

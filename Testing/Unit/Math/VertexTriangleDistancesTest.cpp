@@ -56,7 +56,7 @@ TEST(VertexTriangleDistances, HaveTheBitsOfEachDistanceOnEverySimdPath) {
 }
 
 /// Triangles of any shape: with narrow angles, tiny, and without area.
-TriangleBatch randomTriangles(testing::Random& random) {
+TriangleBatch batchOfTriangles(testing::Random& random) {
   TriangleBatch batch;
   for (std::size_t i = 0; i < TriangleBatch::kSize; ++i) {
     const double length = std::pow(10.0, testing::uniform(random, -8, 0)),
@@ -73,7 +73,7 @@ TEST(DistanceBounds, EncloseTheDistanceOnEveryPath) {
   for (const std::string& path : testing::EverySimdPath()) {
     testing::Random random(1);
     for (int i = 0; i < testing::casesOf(5000); ++i) {
-      const TriangleBatch batch = randomTriangles(random);
+      const TriangleBatch batch = batchOfTriangles(random);
       Vector3d p = testing::randomPoint(random, -2, 2);
       if (i % 3 == 0) p = 0.5 * (batch.corner(0, 0) + batch.corner(0, 1));
       if (i % 7 == 0) p = batch.corner(1, 2);

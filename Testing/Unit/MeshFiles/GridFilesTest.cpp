@@ -58,28 +58,6 @@ const std::string kVtu =
     "<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">1 3 5 10 10</DataArray>\n"
     "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 
-/// Numbers one after another, as int32, uint64 and double.
-class Binary {
- public:
-  explicit Binary(bool bigEndian) : m_bigEndian(bigEndian) {}
-  Binary& ints(std::initializer_list<std::int32_t> values) { return add(values); }
-  Binary& sizes(std::initializer_list<std::uint64_t> values) { return add(values); }
-  Binary& point(const Vector3d& p) { return add(p); }
-  Binary& text(const std::string& words) {
-    content += words;
-    return *this;
-  }
-  std::string content;
-
- private:
-  template <class Values>
-  Binary& add(const Values& values) {
-    for (const auto value : values) content += bytes(value, m_bigEndian);
-    return *this;
-  }
-  bool m_bigEndian;
-};
-
 std::string binaryGmsh22(bool bigEndian) {
   Binary out(bigEndian);
   out.text("$MeshFormat\n2.2 1 8\n").ints({1}).text("\n$EndMeshFormat\n$Nodes\n5\n");

@@ -28,6 +28,29 @@ std::string bytes(T value, bool bigEndian = false) {
   return isReversed ? std::string(text.rbegin(), text.rend()) : text;
 }
 
+/// Numbers one after another, as int32, uint64, float and double.
+class Binary {
+ public:
+  explicit Binary(bool bigEndian = false) : m_bigEndian(bigEndian) {}
+  Binary& ints(std::initializer_list<std::int32_t> values) { return add(values); }
+  Binary& sizes(std::initializer_list<std::uint64_t> values) { return add(values); }
+  Binary& point(const Eigen::Vector3d& p) { return add(p); }
+  Binary& coarse(const Eigen::Vector3d& p) { return add(Eigen::Vector3f(p.cast<float>())); }
+  Binary& text(const std::string& words) {
+    content += words;
+    return *this;
+  }
+  std::string content;
+
+ private:
+  template <class Values>
+  Binary& add(const Values& values) {
+    for (const auto value : values) content += bytes(value, m_bigEndian);
+    return *this;
+  }
+  bool m_bigEndian;
+};
+
 inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.rfind(from);
   EXPECT_NE(at, std::string::npos) << from;

@@ -70,36 +70,28 @@ const std::string kStl =
 std::string binaryPly(bool bigEndian) {
   std::string text = kPlyHeader;
   text.replace(text.find("ascii"), 5, bigEndian ? "binary_big_endian" : "binary_little_endian");
-  for (const Vector3d& p : kSquare) {
-    for (const double x : p) text += bytes(static_cast<float>(x), bigEndian);
-    text += '\1';
-  }
-  text += '\4';
-  for (int i = 0; i < 4; ++i) text += bytes(i, bigEndian);
-  return text;
+  Binary out(bigEndian);
+  out.text(text);
+  for (const Vector3d& p : kSquare) out.coarse(p).text("\1");
+  return out.text("\4").ints({0, 1, 2, 3}).content;
 }
 
 std::string binaryVtk() {
-  std::string text =
-      "# vtk DataFile Version 3.0\nsquare\nBINARY\nDATASET POLYDATA\nPOINTS 5 double\n";
-  for (const Vector3d& p : kSquare) {
-    for (const double x : p) text += bytes(x, true);
-  }
-  text += "\nPOLYGONS 1 5\n";
-  for (const int i : {4, 0, 1, 2, 3}) text += bytes(i, true);
-  return text + "\n";
+  Binary out(true);
+  out.text("# vtk DataFile Version 3.0\nsquare\nBINARY\nDATASET POLYDATA\nPOINTS 5 double\n");
+  for (const Vector3d& p : kSquare) out.point(p);
+  return out.text("\nPOLYGONS 1 5\n").ints({4, 0, 1, 2, 3}).text("\n").content;
 }
 
 std::string binaryStl() {
-  std::string text = std::string(80, ' ') + bytes(std::uint32_t{2});
+  Binary out;
+  out.text(std::string(80, ' ')).ints({2});
   for (const Triangle& triangle : kFan) {
-    text += std::string(12, '\0');
-    for (const std::uint32_t v : triangle) {
-      for (const double x : kSquare[v]) text += bytes(static_cast<float>(x));
-    }
-    text += std::string(2, '\0');
+    out.coarse(Vector3d::Zero());
+    for (const std::uint32_t v : triangle) out.coarse(kSquare[v]);
+    out.text(std::string(2, '\0'));
   }
-  return text;
+  return out.content;
 }
 
 const std::vector<std::pair<std::string, std::string>> kGood{{"a.obj", kObj},

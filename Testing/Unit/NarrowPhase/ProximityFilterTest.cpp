@@ -61,7 +61,7 @@ Possible filter(const std::vector<Pair>& pairs, double thickness, bool distinct,
   return best;
 }
 
-double real(Random& random) { return 2 * random.unit() - 1; }
+double signedUnit(Random& random) { return 2 * random.unit() - 1; }
 double smallPower(Random& random) { return std::pow(10.0, -random.below(12)); }
 int someEdges(Random& random) {
   const int i = random.below(3), j = random.below(3);
@@ -79,7 +79,7 @@ Pair pairOf(int kind, Random& random) {
       break;
     case 2:  // slivers
       for (const std::size_t i : {0, 3}) {
-        const double share = real(random), size = smallPower(random);
+        const double share = signedUnit(random), size = smallPower(random);
         x[i + 2] = x[i] + share * (x[i + 1] - x[i]) + size * random.inCube();
       }
       break;
@@ -110,9 +110,9 @@ Pair pairOf(int kind, Random& random) {
       break;
     }
     case 8: {  // edges that cross near an end of one of them
-      const double s = real(random), t = smallPower(random);
+      const double s = signedUnit(random), t = smallPower(random);
       const Vector3d v = x[4] - x[3], normal = (x[1] - x[0]).cross(v);
-      x[3] = x[0] + 0.5 * (1 + s) * (x[1] - x[0]) - t * v + real(random) * normal;
+      x[3] = x[0] + 0.5 * (1 + s) * (x[1] - x[0]) - t * v + signedUnit(random) * normal;
       x[4] = x[3] + v;
       if (random.below(2)) std::swap(x[3], x[4]);
       if (random.below(2))
@@ -133,7 +133,7 @@ Pair pairOf(int kind, Random& random) {
     case 11: {  // a small edge over the middle of a long one
       const Vector3d u = x[1] - x[0], normal = u.cross(x[3]).normalized(),
                      v = std::ldexp(1.0, -5 - random.below(15)) * normal.cross(x[4]);
-      x[3] = x[0] + 0.5 * u + real(random) * normal - 0.4 * v;
+      x[3] = x[0] + 0.5 * u + signedUnit(random) * normal - 0.4 * v;
       x[4] = x[3] + v;
       x[5] = x[3] + v.norm() * x[5];
       break;

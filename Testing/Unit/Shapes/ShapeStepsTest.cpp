@@ -419,13 +419,5 @@ TEST(ShapeSteps, HalfTurnsHaveNoFalseNegatives) {
   EXPECT_NEAR(only(particle({0, 0.75, 0}, {0, 0.25, 0}), can, 0).timeOfImpact, 0.5, 1e-6);
 }
 
-TEST(ShapeSteps, ArcDeviationIsThatOfTheRotation) {
-  Tool rod = moving(Capsule{{1, 0, 0}, {2, 0, 0}, 0.1}, {0, 0, 0}, {0, 0, 0});
-  rod.ends[1].rotation = Eigen::AngleAxisd(EIGEN_PI / 2, Vector3d::UnitZ()).toRotationMatrix();
-  const CollisionData data =
-      answer(settingsOf(Engine::Octree), still(triangleAtZero()), rod, continuous(0));
-  EXPECT_NEAR(data.validity().arcDeviation, 2 * (1 - std::cos(EIGEN_PI / 4)), 1e-9);
-}
-
 }  // namespace
 }  // namespace palpate::testing
