@@ -52,6 +52,8 @@ Row rowOf(const VertexTriangleContact& c) {
   return row;
 }
 
+inline Row rowOf(const VertexTriangleContact& c) { return rowOf<false>(c); }
+
 inline Row rowOf(const EdgeEdgeContact& c) {
   Row row{c.edgeA[0], c.edgeA[1], c.edgeB[0], c.edgeB[1]};
   append(row, c.weightA);
@@ -62,6 +64,15 @@ inline Row rowOf(const EdgeEdgeContact& c) {
   row.push_back(static_cast<std::uint64_t>(c.featureA));
   row.push_back(static_cast<std::uint64_t>(c.featureB));
   return row;
+}
+
+/// Rows of contacts that are in any order.
+template <class List>
+std::vector<Row> sortedRows(const List& contacts) {
+  std::vector<Row> rows;
+  for (const auto& contact : contacts) rows.push_back(rowOf(contact));
+  std::sort(rows.begin(), rows.end());
+  return rows;
 }
 
 /// All contacts of one pair, list by list, in the reported order.

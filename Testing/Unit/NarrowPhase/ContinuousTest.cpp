@@ -4,6 +4,7 @@
 #include "NarrowPhase/Continuous.h"
 #include "NarrowPhase/StepCheck.h"
 
+#include "Common/ContactRows.h"
 #include "Common/RandomMeshes.h"
 #include "Mesh/FloatPositions.h"
 #include "PublishedFrames.h"
@@ -13,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
 namespace palpate {
 namespace {
@@ -48,23 +48,6 @@ std::vector<ElementPair> everyPair(const TriangleMesh& a, const TriangleMesh& b)
   return pairs;
 }
 
-/// A contact without the exact bits of its weights: ids, time, distance and normal.
-std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> sorted(
-    const Buffer<VertexTriangleContact>& contacts) {
-  std::vector<std::tuple<std::uint32_t, std::uint32_t, double, double>> keys;
-  for (const auto& c : contacts)
-    keys.push_back({c.vertex, c.triangle, c.timeOfImpact, c.normal.sum()});
-  std::sort(keys.begin(), keys.end());
-  return keys;
-}
-std::vector<std::tuple<Segment, Segment, double, double>> sorted(
-    const Buffer<EdgeEdgeContact>& contacts) {
-  std::vector<std::tuple<Segment, Segment, double, double>> keys;
-  for (const auto& c : contacts) keys.push_back({c.edgeA, c.edgeB, c.timeOfImpact, c.normal.sum()});
-  std::sort(keys.begin(), keys.end());
-  return keys;
-}
-
 double earliestOf(const ContactBuffers& contacts) {
   double earliest = kUnbounded;
   for (const auto* list : {&contacts.vertexTriangle, &contacts.triangleVertex})
@@ -75,9 +58,12 @@ double earliestOf(const ContactBuffers& contacts) {
 
 void expectSame(const ContactBuffers& found, const ContactBuffers& expected) {
   EXPECT_EQ(found.featurePairs, expected.featurePairs);
-  EXPECT_EQ(sorted(found.vertexTriangle), sorted(expected.vertexTriangle));
-  EXPECT_EQ(sorted(found.triangleVertex), sorted(expected.triangleVertex));
-  EXPECT_EQ(sorted(found.edgeEdge), sorted(expected.edgeEdge));
+  const auto expectSameSet = [](const auto& l, const auto& r) {
+    EXPECT_EQ(testing::firstDifference(testing::sortedRows(l), testing::sortedRows(r)), "");
+  };
+  expectSameSet(found.vertexTriangle, expected.vertexTriangle);
+  expectSameSet(found.triangleVertex, expected.triangleVertex);
+  expectSameSet(found.edgeEdge, expected.edgeEdge);
 }
 
 std::vector<FloatPoint> floatsOf(const Positions& positions) {

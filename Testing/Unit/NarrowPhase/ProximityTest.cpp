@@ -63,20 +63,11 @@ ContactBuffers contactsOf(const MeshPair& pair) {
   return found;
 }
 
-Row sortable(const VertexTriangleContact& c) { return rowOf<false>(c); }
-Row sortable(const EdgeEdgeContact& c) { return rowOf(c); }
-
 /// Expects equal sets with equal bits and without duplicates.
 template <class List>
 void expectSameSet(const List& found, const List& truth) {
-  const auto sorted = [](const List& contacts) {
-    std::vector<Row> rows;
-    for (const auto& contact : contacts) rows.push_back(sortable(contact));
-    std::sort(rows.begin(), rows.end());
-    return rows;
-  };
-  const std::vector<Row> rows = sorted(found);
-  EXPECT_EQ(firstDifference(rows, sorted(truth)), "");
+  const std::vector<Row> rows = sortedRows(found);
+  EXPECT_EQ(firstDifference(rows, sortedRows(truth)), "");
   EXPECT_EQ(std::adjacent_find(rows.begin(), rows.end()), rows.end());
 }
 
