@@ -72,63 +72,48 @@ struct End {
   Vector3d translation = Vector3d::Zero();
 };
 
-class BodyScene {
- public:
-  BodyScene(Kind kind, const Body& body, const End& start, const PairSettings& pair,
-            const Settings& settings, bool isBodyFirst = false)
-      : m_detection(settings) {
-    const Mesh& shape = ball(kind);
-    std::vector<Segment> segments;
-    for (std::uint32_t v = 0; v + 1 < start.other.size(); ++v) segments.push_back({v, v + 1});
-    std::vector<double> radii;
-    for (std::size_t v = 0; v < start.other.size(); ++v) radii.push_back(0.005 * (v % 5));
-    switch (kind) {
-      case Kind::Fine:
-      case Kind::Coarse:
-        other = m_detection.addTriangleMesh(start.other, shape.triangles);
-        break;
-      case Kind::Lines:
-        other = m_detection.addLineMesh(start.other, segments, kRadius);
-        break;
-      case Kind::Particles:
-        other = m_detection.addPointSet(start.other, kRadius);
-        break;
-      case Kind::Radii:
-        other = m_detection.addLineMesh(start.other, segments, radii);
-    }
-    m_body = addMesh(m_detection, body.mesh);
-    m_detection.attachDistanceField(m_body, body.field);
-    m_detection.setTransform(m_body, {start.rotation, start.translation});
-    if (isBodyFirst)
-      m_detection.addCollisionPair(m_body, other, pair);
-    else
-      m_detection.addCollisionPair(other, m_body, pair);
-    m_isBodyFirst = isBodyFirst;
-    m_detection.advance();
+/// A geometry beside a body that has a field or the leaves of a proxy.
+struct AttachedScene {
+  template <class AddOther, class Attach>
+  AttachedScene(const Settings& settings, const Mesh& mesh, const End& start,
+                const PairSettings& pair, AddOther&& addOther, Attach&& attach)
+      : detection(settings), other(addOther(detection)), body(addMesh(detection, mesh)) {
+    attach(detection, body);
+    detection.setTransform(body, {start.rotation, start.translation});
+    detection.addCollisionPair(other, body, pair);
+    detection.advance();
   }
-
   const CollisionData& step(const End& before, const End& now) {
-    m_detection.setPositions(other, before.other, now.other);
-    m_detection.setTransform(m_body, {before.rotation, before.translation},
-                             {now.rotation, now.translation});
-    m_detection.detectCollision();
-    m_detection.advance();
+    detection.setPositions(other, before.other, now.other);
+    detection.setTransform(body, {before.rotation, before.translation},
+                           {now.rotation, now.translation});
+    detection.detectCollision();
+    detection.advance();
     return data();
   }
-  const CollisionData& data() const {
-    return m_isBodyFirst ? m_detection.collisionData(m_body, other)
-                         : m_detection.collisionData(other, m_body);
-  }
-  OctreeBasedCD& detection() { return m_detection; }
-  GeometryId bodyId() const { return m_body; }
+  const CollisionData& data() const { return detection.collisionData(other, body); }
 
-  GeometryId other;
-
- private:
-  OctreeBasedCD m_detection;
-  GeometryId m_body;
-  bool m_isBodyFirst;
+  OctreeBasedCD detection;
+  GeometryId other, body;
 };
+
+AttachedScene sceneWithField(Kind kind, const Body& body, const End& start,
+                             const PairSettings& pair, const Settings& settings) {
+  const auto addOther = [&](OctreeBasedCD& detection) {
+    const Points& at = start.other;
+    std::vector<Segment> segments;
+    for (std::uint32_t v = 0; v + 1 < at.size(); ++v) segments.push_back({v, v + 1});
+    std::vector<double> radii;
+    for (std::size_t v = 0; v < at.size(); ++v) radii.push_back(0.005 * (v % 5));
+    if (isMesh(kind)) return detection.addTriangleMesh(at, ball(kind).triangles);
+    if (kind == Kind::Particles) return detection.addPointSet(at, kRadius);
+    return kind == Kind::Lines ? detection.addLineMesh(at, segments, kRadius)
+                               : detection.addLineMesh(at, segments, radii);
+  };
+  return {settings, body.mesh, start, pair, addOther, [&](OctreeBasedCD& detection, GeometryId id) {
+            detection.attachDistanceField(id, body.field);
+          }};
+}
 
 Matrix3d turnBy(Random& random, double by) {
   const double angle = uniform(random, -by, by);
@@ -194,23 +179,6 @@ class Walk {
   End m_before, m_now;
 };
 
-/// Whether a contact is of these vertices of the other geometry, or of some of them.
-template <class Vertices>
-bool isRepresented(const CollisionData& data, const Vertices& vertices) {
-  return std::any_of(data.shape().begin(), data.shape().end(), [&](const ShapeContact& c) {
-    return std::all_of(c.vertices.begin(), c.vertices.end(), [&](std::uint32_t v) {
-      return std::find(vertices.begin(), vertices.end(), v) != vertices.end();
-    });
-  });
-}
-
-void expectAllRepresented(const CollisionData& data, const CollisionData& truth) {
-  for (const auto& c : truth.vertexTriangle())
-    EXPECT_TRUE(isRepresented(data, std::array{c.vertex}));
-  for (const auto& c : truth.triangleVertex()) EXPECT_TRUE(isRepresented(data, c.vertices));
-  for (const auto& c : truth.edgeEdge()) EXPECT_TRUE(isRepresented(data, c.edgeA));
-}
-
 std::size_t impactsOf(const CollisionData& data) {
   std::size_t impacts = data.intersectingTriangles().size();
   forEachContact(data, [&](const auto& c) { impacts += c.timeOfImpact < 1.0; });
@@ -269,16 +237,13 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
         const Contacts filter = seed % 3 == 2 ? Contacts::All : Contacts::Distinct;
         Walk walk(100 * seed + static_cast<std::uint64_t>(kind), kind);
         const auto sceneOf = [&](const PairSettings& pair) {
-          return BodyScene(kind, body, walk.now(), pair, settingsOf(Engine::Octree));
+          return sceneWithField(kind, body, walk.now(), pair, settingsOf(Engine::Octree));
         };
-        BodyScene allowed = sceneOf(pairOf(kErrorBound, filter)),
-                  exact = sceneOf(pairOf(0, filter));
-        PairSettings touches{Method::Continuous, 0.0, Contacts::All},
-            approaches{Method::Continuous, kThickness - 1.5 * kErrorBound - 1e-6, Contacts::All};
-        const bool hasContinuous = kind != Kind::Radii;
-        if (!hasContinuous) touches.method = approaches.method = Method::Proximity;
-        if (!hasContinuous) touches.thickness = 1e-9;
-        BodyScene touching = sceneOf(touches), approaching = sceneOf(approaches);
+        AttachedScene allowed = sceneOf(pairOf(kErrorBound, filter)),
+                      exact = sceneOf(pairOf(0, filter));
+        PairSettings touches{Method::Continuous, 0.0, Contacts::All};
+        if (kind == Kind::Radii) touches = {Method::Proximity, 1e-9, Contacts::All};
+        AttachedScene touching = sceneOf(touches);
         for (int i = 0; i < casesOf(40); ++i) {
           SCOPED_TRACE("seed " + std::to_string(seed) + ", kind " +
                        std::to_string(static_cast<int>(kind)) + (isOpen ? ", open" : "") +
@@ -287,7 +252,6 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
           const CollisionData& answer = allowed.step(walk.before(), walk.now());
           const CollisionData& truth = exact.step(walk.before(), walk.now());
           const CollisionData& touched = touching.step(walk.before(), walk.now());
-          const CollisionData& approached = approaching.step(walk.before(), walk.now());
           const Validity& validity = answer.validity();
           impacts += impactsOf(truth) > 0;
           if (validity.reason != MethodReason::AllowedError) {
@@ -303,8 +267,7 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
           EXPECT_EQ(validity.displacement, truth.validity().displacement);
           EXPECT_EQ(validity.displacementLimit > 0, true);
           contacts += answer.shape().size();
-          expectWithinError(answer, exact.detection().queries(), exact.bodyId(), walk.now(),
-                            !isOpen);
+          expectWithinError(answer, exact.detection.queries(), exact.body, walk.now(), !isOpen);
           if (validity.displacement == 0.0) continue;
           EXPECT_TRUE(touched.vertexTriangle().empty() && touched.edgeEdge().empty() &&
                       touched.triangleVertex().empty());
@@ -313,7 +276,6 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
             EXPECT_EQ(truth.validity().startedApart, true);
             EXPECT_TRUE(truth.validity().reason != MethodReason::Slow || impactsOf(truth) == 0u);
           }
-          expectAllRepresented(answer, approached);
           if (HasFailure()) return;
         }
       }
@@ -397,61 +359,6 @@ TEST(AllowedError, FieldsDoNotAnswerInsideNorOneSidedGeometries) {
   EXPECT_EQ(reasonAt(5, false), MethodReason::AllowedError);
 }
 
-TEST(AllowedError, SteadyFramesThatAFieldAnswersAllocateNothing) {
-  for (const int threads : {1, 2}) {
-    Walk walk(3, Kind::Fine);
-    const End at = walk.now();
-    BodyScene scene(Kind::Fine, ring(false), at, pairOf(kErrorBound),
-                    settingsOf(Engine::Octree, threads));
-    std::size_t byField = 0, exactly = 0;
-    End before = at, now = at;
-    // The ball comes near enough to touch, and goes away again.
-    const Vector3d towards = (at.translation - at.other[at.other.size() / 2]).normalized();
-    for (int frame = 0; frame < 120; ++frame) {
-      if (frame == 60) FailingAllocation::arm(0);
-      std::swap(before, now);
-      for (std::size_t v = 0; v < now.other.size(); ++v)
-        now.other[v] = at.other[v] + (0.02 * ((frame % 15) - 3)) * towards;
-      const Validity& validity = scene.step(before, now).validity();
-      (validity.reason == MethodReason::AllowedError ? byField : exactly) += 1;
-    }
-    FailingAllocation::disarm();
-#ifndef PALPATE_VALIDATE  // validation itself allocates
-    EXPECT_EQ(FailingAllocation::count(), 0u);
-#endif
-    EXPECT_GT(byField, 8u);
-    EXPECT_GT(exactly, 8u);
-  }
-}
-
-TEST(AllowedError, AFailedAllocationLeavesTheNextDetectionRight) {
-  std::size_t failures = 0;
-  for (std::size_t n = 1; n < 400; n = n + 1 + n / 4) {
-    Walk walk(5, Kind::Fine), same(5, Kind::Fine);
-    BodyScene scene(Kind::Fine, ring(false), walk.now(), pairOf(kErrorBound),
-                    settingsOf(Engine::Octree)),
-        expected(Kind::Fine, ring(false), walk.now(), pairOf(kErrorBound),
-                 settingsOf(Engine::Octree));
-    for (int i = 0; i < 6; ++i) {
-      walk.step();
-      same.step();
-      if (i == 2) {
-        FailingAllocation::arm(n);
-        try {
-          scene.step(walk.before(), walk.now());
-        } catch (const std::bad_alloc&) {
-          ++failures;
-        }
-        FailingAllocation::disarm();
-      }
-      const CollisionData& answer = scene.step(walk.before(), walk.now());
-      EXPECT_EQ(answer.hash(), expected.step(same.before(), same.now()).hash());
-      EXPECT_EQ(answer.validity(), expected.data().validity());
-    }
-  }
-  EXPECT_GT(failures, 2u);
-}
-
 namespace {
 
 constexpr double kParticle = 0.01, kProxyError = 0.01, kNear = 0.04;
@@ -508,38 +415,26 @@ class Cloud {
   End m_before, m_now;
 };
 
-/// A detection of a cloud. Radii: none, for one radius.
-struct CloudScene {
-  CloudScene(const Cloud& cloud, bool isOpen, bool hasRadii, const PairSettings& pair,
-             const Settings& settings)
-      : detection(settings) {
-    const Mesh& mesh = ring(isOpen).mesh;
+/// Particles with one radius, or with radii of their own.
+AttachedScene sceneWithProxy(const Cloud& cloud, bool isOpen, bool hasRadii,
+                             const PairSettings& pair, const Settings& settings) {
+  const auto addOther = [&](OctreeBasedCD& detection) {
     std::vector<double> radii(cloud.now().other.size(), kParticle);
-    if (hasRadii) radii[3] = 0.5 * kParticle;
-    smoke = hasRadii ? detection.addPointSet(cloud.now().other, radii)
-                     : detection.addPointSet(cloud.now().other, kParticle);
-    body = addMesh(detection, mesh);
-    detection.attachSurfaceProxy(
-        body,
-        SurfaceProxySettings{.reach = 0.1, .errorBound = kProxyError, .widestNormalCone = 0.6});
-    detection.setTransform(body, {cloud.now().rotation, cloud.now().translation});
-    detection.addCollisionPair(smoke, body, pair);
-    detection.advance();
-  }
-  const CollisionData& step(const Cloud& cloud) {
-    const End &before = cloud.before(), &now = cloud.now();
-    detection.setPositions(smoke, before.other, now.other);
-    detection.setTransform(body, {before.rotation, before.translation},
-                           {now.rotation, now.translation});
-    detection.detectCollision();
-    detection.advance();
-    return data();
-  }
-  const CollisionData& data() const { return detection.collisionData(smoke, body); }
-
-  OctreeBasedCD detection;
-  GeometryId smoke, body;
-};
+    radii[3] = 0.5 * kParticle;
+    return hasRadii ? detection.addPointSet(cloud.now().other, radii)
+                    : detection.addPointSet(cloud.now().other, kParticle);
+  };
+  return {settings,
+          ring(isOpen).mesh,
+          cloud.now(),
+          pair,
+          addOther,
+          [](OctreeBasedCD& detection, GeometryId id) {
+            detection.attachSurfaceProxy(
+                id, SurfaceProxySettings{
+                        .reach = 0.1, .errorBound = kProxyError, .widestNormalCone = 0.6});
+          }};
+}
 
 PairSettings pairOfCloud(double allowedError) {
   PairSettings pair{.thickness = kNear};
@@ -553,22 +448,22 @@ PairSettings pairOfCloud(double allowedError) {
 /// within the thickness is a contact. Contacts at the step's end are within the error.
 TEST(AllowedError, ProxiesMissNoImpact) {
   std::size_t byProxy = 0, exactly = 0, touched = 0;
-  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(8)); ++seed) {
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(4)); ++seed) {
     const bool isOpen = seed % 2 == 1, hasRadii = seed % 4 > 1;
     Cloud cloud(seed, isOpen);
     const auto sceneOf = [&](const PairSettings& pair, bool withRadii) {
-      return CloudScene(cloud, isOpen, withRadii, pair, settingsOf(Engine::Octree));
+      return sceneWithProxy(cloud, isOpen, withRadii, pair, settingsOf(Engine::Octree));
     };
-    CloudScene allowed = sceneOf(pairOfCloud(kProxyError), hasRadii),
-               exact = sceneOf(pairOfCloud(0), hasRadii),
-               touching = sceneOf({Method::Continuous, 0.0, Contacts::All}, false),
-               approaching =
-                   sceneOf({Method::Continuous, kNear - 1.1 * kProxyError, Contacts::All}, false);
+    AttachedScene allowed = sceneOf(pairOfCloud(kProxyError), hasRadii),
+                  exact = sceneOf(pairOfCloud(0), hasRadii),
+                  touching = sceneOf({Method::Continuous, 0.0, Contacts::All}, false),
+                  approaching = sceneOf(
+                      {Method::Continuous, kNear - 1.1 * kProxyError, Contacts::All}, false);
     for (int i = 0; i < casesOf(30); ++i) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", step " + std::to_string(i));
       cloud.step();
-      const CollisionData& answer = allowed.step(cloud);
-      const CollisionData& truth = exact.step(cloud);
+      const CollisionData& answer = allowed.step(cloud.before(), cloud.now());
+      const CollisionData& truth = exact.step(cloud.before(), cloud.now());
       const Validity& validity = answer.validity();
       ASSERT_EQ(validity.reason, MethodReason::AllowedError);
       EXPECT_EQ(validity.method, Method::Proxy);
@@ -614,7 +509,8 @@ TEST(AllowedError, ProxiesMissNoImpact) {
         EXPECT_LT((c.point - c.pointOnShape - (c.distance + radius) * c.normal).norm(), 1e-12);
       }
       if (validity.displacement == 0.0) continue;
-      for (const VertexTriangleContact& c : touching.step(cloud).vertexTriangle()) {
+      for (const VertexTriangleContact& c :
+           touching.step(cloud.before(), cloud.now()).vertexTriangle()) {
         ++touched;
         const std::uint32_t v = c.vertex;
         if (hasRadii) continue;
@@ -624,64 +520,62 @@ TEST(AllowedError, ProxiesMissNoImpact) {
           EXPECT_EQ(found[v][k].id, v);
         }
       }
-      for (const VertexTriangleContact& c : approaching.step(cloud).vertexTriangle())
+      for (const VertexTriangleContact& c :
+           approaching.step(cloud.before(), cloud.now()).vertexTriangle())
         EXPECT_TRUE(hasRadii || !found[c.vertex].empty()) << c.vertex;
       if (HasFailure()) return;
     }
   }
-  EXPECT_GE(byProxy, leastOf(20000));
-  EXPECT_GE(exactly, leastOf(2000));
-  EXPECT_GE(touched, leastOf(1000));
+  EXPECT_GE(byProxy, leastOf(10000));
+  EXPECT_GE(exactly, leastOf(1000));
+  EXPECT_GE(touched, leastOf(500));
 }
 
-TEST(AllowedError, ProxiesGiveTheSameBitsByBruteForceAndByThreads) {
-  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(casesOf(4)); ++seed) {
-    const bool isOpen = seed % 2 == 1, hasRadii = seed % 4 > 1;
-    Cloud cloud(30 + seed, isOpen);
-    const auto sceneOf = [&](const Settings& settings) {
-      return CloudScene(cloud, isOpen, hasRadii, pairOfCloud(kProxyError), settings);
-    };
-    Settings audited = settingsOf(Engine::Octree);
-    audited.audit.features = 20;
-    CloudScene octree = sceneOf(audited), brute = sceneOf(settingsOf(Engine::BruteForce)),
-               threads = sceneOf(settingsOf(Engine::Octree, 3));
-    for (int i = 0; i < 8; ++i) {
-      cloud.step();
-      const CollisionData& answer = octree.step(cloud);
-      EXPECT_GT(answer.shape().size(), 20u);
-      EXPECT_TRUE(octree.detection.auditFailures().empty());
-      for (CloudScene* other : {&brute, &threads}) {
-        EXPECT_EQ(other->step(cloud).hash(), answer.hash());
-        EXPECT_EQ(other->data().validity(), answer.validity());
-        EXPECT_EQ(other->data().errorBound(), answer.errorBound());
-      }
-      if (HasFailure()) FAIL() << "seed " << seed << ", step " << i;
-    }
-  }
-}
-
-TEST(AllowedError, SteadyFramesThatAProxyAnswersAllocateNothing) {
-  for (const int threads : {1, 2}) {
-    Cloud cloud(5, false);
-    CloudScene scene(cloud, false, false, pairOfCloud(kProxyError),
-                     settingsOf(Engine::Octree, threads));
-    std::vector<Cloud> steps;
-    for (int i = 0; i < 6; ++i) cloud.step(), steps.push_back(cloud);
-    for (int frame = 0; frame < 24; ++frame) {
-      if (frame == 12) FailingAllocation::arm(0);
-      const CollisionData& data = scene.step(steps[frame % 6]);
-      EXPECT_GT(data.shape().size(), 0u);
+TEST(AllowedError, SteadyFramesAllocateNothing) {
+  const auto expectNone = [](int frames, auto&& step) {
+    for (int frame = 0; frame < 2 * frames; ++frame) {
+      if (frame == frames) FailingAllocation::arm(0);
+      step(frame);
     }
     FailingAllocation::disarm();
 #ifndef PALPATE_VALIDATE  // validation itself allocates
     EXPECT_EQ(FailingAllocation::count(), 0u);
 #endif
+  };
+  const Cloud start(5, false);
+  std::vector<Cloud> steps(6, start);
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t k = 0; k <= i; ++k) steps[i].step();
+  for (const int threads : {1, 2}) {
+    const End at = Walk(3, Kind::Fine).now();
+    AttachedScene scene = sceneWithField(Kind::Fine, ring(false), at, pairOf(kErrorBound),
+                                         settingsOf(Engine::Octree, threads));
+    std::size_t byField = 0, exactly = 0;
+    End before = at, now = at;
+    // The ball comes near enough to touch, and goes away again.
+    const Vector3d towards = (at.translation - at.other[at.other.size() / 2]).normalized();
+    expectNone(60, [&](int frame) {
+      std::swap(before, now);
+      for (std::size_t v = 0; v < now.other.size(); ++v)
+        now.other[v] = at.other[v] + (0.02 * ((frame % 15) - 3)) * towards;
+      const Validity& validity = scene.step(before, now).validity();
+      (validity.reason == MethodReason::AllowedError ? byField : exactly) += 1;
+    });
+    EXPECT_GT(std::min(byField, exactly), 8u);
+
+    AttachedScene smoke = sceneWithProxy(start, false, false, pairOfCloud(kProxyError),
+                                         settingsOf(Engine::Octree, threads));
+    expectNone(12, [&](int frame) {
+      const Cloud& cloud = steps[static_cast<std::size_t>(frame) % 6];
+      EXPECT_GT(smoke.step(cloud.before(), cloud.now()).shape().size(), 0u);
+    });
   }
 }
 
 TEST(AllowedError, ProxiesAnswerWhereTheyAreAttachedAndAllowed) {
   Cloud cloud(6, false);
-  CloudScene scene(cloud, false, false, pairOfCloud(kProxyError), settingsOf(Engine::Octree));
+  AttachedScene scene =
+      sceneWithProxy(cloud, false, false, pairOfCloud(kProxyError), settingsOf(Engine::Octree));
   OctreeBasedCD& detection = scene.detection;
   const auto methodNow = [&] {
     detection.detectCollision();
@@ -694,22 +588,22 @@ TEST(AllowedError, ProxiesAnswerWhereTheyAreAttachedAndAllowed) {
   EXPECT_EQ(again.collisionData(GeometryId{0}, GeometryId{1}).hash(), hash);
   expectRefused(ErrorCode::NotAvailable, "has the leaves of a proxy, which a capture cannot hold",
                 [&] { capture(detection, "proxy.capture"); });
-  detection.setPairSettings(scene.smoke, scene.body, pairOfCloud(0.5 * kProxyError));
-  EXPECT_EQ(methodNow(), Method::Proximity);
   PairSettings wide = pairOfCloud(kProxyError);
   wide.thickness = 0.1;  // with the radius, more than the leaves reach
-  detection.setPairSettings(scene.smoke, scene.body, wide);
-  EXPECT_EQ(methodNow(), Method::Proximity);
-  detection.setPairSettings(scene.smoke, scene.body, pairOfCloud(kProxyError));
-  EXPECT_EQ(methodNow(), Method::Proxy);
+  for (const auto& [pair, method] :
+       {std::pair(pairOfCloud(0.5 * kProxyError), Method::Proximity),
+        std::pair(wide, Method::Proximity), std::pair(pairOfCloud(kProxyError), Method::Proxy)}) {
+    detection.setPairSettings(scene.other, scene.body, pair);
+    EXPECT_EQ(methodNow(), method);
+  }
   EXPECT_EQ(scene.data().hash(), hash);
   const Mesh& mesh = ring(false).mesh;
   expectRefused(ErrorCode::UnsupportedMethod, "has the leaves of a proxy attached",
                 [&] { detection.setPositions(scene.body, mesh.positions); });
-  detection.setContactPredicate(scene.smoke, scene.body,
+  detection.setContactPredicate(scene.other, scene.body,
                                 [](const ContactFeatures&) { return true; });
   EXPECT_EQ(methodNow(), Method::Proximity);
-  detection.setContactPredicate(scene.smoke, scene.body, nullptr);
+  detection.setContactPredicate(scene.other, scene.body, nullptr);
   detection.attachSurfaceProxy(scene.body, std::nullopt);
   EXPECT_EQ(methodNow(), Method::Proximity);
   detection.setPositions(scene.body, mesh.positions);
@@ -717,7 +611,7 @@ TEST(AllowedError, ProxiesAnswerWhereTheyAreAttachedAndAllowed) {
                           const char* words) {
     expectRefused(code, words, [&] { detection.attachSurfaceProxy(id, settings); });
   };
-  refuse(scene.smoke, {0.1, 0.01}, ErrorCode::UnsupportedMethod, "is a point set");
+  refuse(scene.other, {0.1, 0.01}, ErrorCode::UnsupportedMethod, "is a point set");
   refuse(scene.body, {0.0, 0.01}, ErrorCode::InvalidSettings, "reach is 0");
   refuse(scene.body, {0.1, -1.0}, ErrorCode::InvalidSettings, "errorBound is -1");
   refuse(scene.body, {0.1, 0.01, 2.0}, ErrorCode::InvalidSettings, "widestNormalCone is 2");

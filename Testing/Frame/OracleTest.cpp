@@ -8,7 +8,7 @@
 #include <filesystem>
 
 // Whole sets of contacts of published meshes, octrees against brute force, by every method, frame
-// after frame. DegenerateCasesTest.cpp has touching, folded and flat ones, and
+// after frame. ContactLawTest.cpp has touching, folded and flat ones, and
 // SupportedPairsTest.cpp soups and sheets.
 
 namespace palpate {

@@ -13,6 +13,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace palpate::testing {
 
@@ -22,7 +23,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Points = std::vector<Vector3d>;
 
-struct Scene {
+struct ParticleScene {
   std::string name;
   Mesh body;
   bool isClosed;
@@ -41,9 +42,9 @@ Mesh organ(Random& random) {
   return mesh;
 }
 
-std::vector<Scene> scenes() {
+std::vector<ParticleScene> scenes() {
   Random random(5);
-  std::vector<Scene> all{
+  std::vector<ParticleScene> all{
       {"sphere", sphere(24, 36, {0.1, 0.2, 0.3}, 1.0), true, 0.05, 0.02},
       {"torus", torusMesh(40, 20), true, 0.04, 0.02},
       {"box", boxMesh({-1, -0.5, -0.25}, {1, 0.5, 0.25}), true, 0.03, 1e-3},
@@ -57,7 +58,7 @@ std::vector<Scene> scenes() {
   };
   const std::size_t unplaced = all.size();
   for (std::size_t i = 0; i < unplaced; i += 2) {
-    Scene scene = all[i];
+    ParticleScene scene = all[i];
     scene.name += ", placed";
     scene.isPlaced = true;
     const double angle = uniform(random, 0, 6);
@@ -71,16 +72,10 @@ std::vector<Scene> scenes() {
   return all;
 }
 
-Points worldOf(const Scene& scene) {
-  Points world = scene.body.positions;
-  for (Vector3d& p : world) p = scene.rotation * p + scene.translation;
-  return world;
-}
-
 /// Points on the body, near it, far from it, and in its bounding box.
-Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
-  const Points world = worldOf(scene);
-  Points points;
+Points particlesAround(Random& random, const ParticleScene& scene, std::size_t count) {
+  Points world = scene.body.positions, points;
+  for (Vector3d& p : world) p = scene.rotation * p + scene.translation;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [a, b, c] = scene.body.triangles[random() % scene.body.triangles.size()];
     const double s = random() % 5 ? uniform(random, 0, 1) : 0.0,
@@ -93,16 +88,16 @@ Points particlesAround(Random& random, const Scene& scene, std::size_t count) {
   return points;
 }
 
-PairSettings pairOf(const Scene& scene) {
+PairSettings pairOf(const ParticleScene& scene) {
   PairSettings pair{.method = Method::Proxy, .thickness = scene.thickness};
   pair.allowedError = scene.allowedError;
   pair.proxy.widestNormalCone = 0.6;  // the meshes are coarse
   return pair;
 }
 
-struct Detection {
-  Detection(const Scene& scene, const Points& points, std::span<const double> radii,
-            const Settings& settings)
+struct ParticleRun {
+  ParticleRun(const ParticleScene& scene, const Points& points, std::span<const double> radii,
+              const Settings& settings)
       : detection(settings) {
     smoke = detection.addPointSet(points, radii);
     body = addMesh(detection, scene.body);
@@ -116,15 +111,9 @@ struct Detection {
   GeometryId smoke, body;
 };
 
-/// The exact distance of a point from triangles; negative inside the body.
-double exactDistance(const SpatialQueries& queries, GeometryId body, const Vector3d& p,
-                     bool isClosed) {
-  if (isClosed) return queries.signedDistance(body, p).distance;
-  return queries.closestPoint(body, p)->distance;
-}
-
-void expectWithinError(const Scene& scene, const Points& points, std::span<const double> radii,
-                       const Detection& run, std::size_t& contacts) {
+void expectWithinError(const ParticleScene& scene, const Points& points,
+                       std::span<const double> radii, const ParticleRun& run,
+                       std::size_t& contacts) {
   const Validity& validity = run.data().validity();
   EXPECT_EQ(validity.method, Method::Proxy);
   EXPECT_FALSE(validity.trusted);
@@ -136,7 +125,8 @@ void expectWithinError(const Scene& scene, const Points& points, std::span<const
   auto next = run.data().shape().begin();
   const auto end = run.data().shape().end();
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const double exact = exactDistance(queries, run.body, points[i], scene.isClosed),
+    const double exact = scene.isClosed ? queries.signedDistance(run.body, points[i]).distance
+                                        : queries.closestPoint(run.body, points[i])->distance,
                  limit = scene.thickness + radii[i];
     if (next == end || next->id != i) {
       EXPECT_FALSE(exact < limit - error && exact > error - validity.proxyDepth)
@@ -170,12 +160,12 @@ std::vector<double> radiiOf(Random& random, std::size_t count, double most) {
 TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
   Random random(1);
   std::size_t number = 0;
-  for (const Scene& scene : scenes()) {
+  for (const ParticleScene& scene : scenes()) {
     SCOPED_TRACE(scene.name);
     if (isLeftOut(number++)) continue;
     const Points points = particlesAround(random, scene, 1500);
     const std::vector<double> radii = radiiOf(random, points.size(), 0.3 * scene.thickness);
-    const Detection run(scene, points, radii, settingsOf(Engine::Octree, 2));
+    const ParticleRun run(scene, points, radii, settingsOf(Engine::Octree, 2));
     std::size_t contacts = 0;
     expectWithinError(scene, points, radii, run, contacts);
     EXPECT_GT(contacts, 200u);
@@ -190,14 +180,14 @@ TEST(Proxy, EachContactIsWithinTheStatedErrorAndNoneIsMissing) {
 /// SupportedPairsTest.cpp compares engines and threads.
 TEST(Proxy, SimdPathsGiveTheSameBits) {
   Random random(2);
-  const std::vector<Scene> all = scenes();
+  const std::vector<ParticleScene> all = scenes();
   for (std::size_t i = 2; i<all.size(); i += kShareOfCases> 1 ? 12 : 3) {
-    const Scene& scene = all[i];
+    const ParticleScene& scene = all[i];
     SCOPED_TRACE(scene.name);
     const Points points = particlesAround(random, scene, 301);
     const std::vector<double> radii = radiiOf(random, points.size(), 0.3 * scene.thickness);
-    const Detection expected(scene, points, radii, settingsOf(Engine::BruteForce));
-    Detection run(scene, points, radii, settingsOf(Engine::Octree, 3));
+    const ParticleRun expected(scene, points, radii, settingsOf(Engine::BruteForce));
+    ParticleRun run(scene, points, radii, settingsOf(Engine::Octree, 3));
     const Points elsewhere(points.size(), scene.translation);
     for (const std::string& path : simdPaths()) {
       useSimdPath(path);
@@ -215,51 +205,43 @@ TEST(Proxy, SimdPathsGiveTheSameBits) {
 
 TEST(Proxy, ParticlesMayBePlacedOrDisabled) {
   Random random(3);
-  const Scene scene = scenes()[0];
+  const ParticleScene scene = scenes()[0];
   const Points points = particlesAround(random, scene, 1000);
-  const Matrix3d turn = Eigen::AngleAxisd(1, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  const Vector3d shift(3, 4, 5);
-  OctreeBasedCD detection(settingsOf(Engine::Octree));
-  const GeometryId smoke = detection.addPointSet(points, 0.01),
-                   body = addMesh(detection, scene.body);
-  const PairSettings pair{.method = Method::Proxy, .thickness = 0.05, .allowedError = 0.01};
-  detection.addCollisionPair(smoke, body, pair);
-  detection.detectCollision();
-  const std::vector<ShapeContact> before(detection.collisionData(smoke, body).shape().begin(),
-                                         detection.collisionData(smoke, body).shape().end());
+  ParticleRun run(scene, points, std::vector<double>(points.size(), 0.01),
+                  settingsOf(Engine::Octree));
+  OctreeBasedCD& detection = run.detection;
+  const std::vector<ShapeContact> before(run.data().shape().begin(), run.data().shape().end());
   ASSERT_GT(before.size(), 100u);
-  detection.setTransform(smoke, {turn, shift});
-  detection.setTransform(body, {turn, shift});
+  const Pose pose{Eigen::AngleAxisd(1, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
+                  {3, 4, 5}};
+  for (const GeometryId id : {run.smoke, run.body}) detection.setTransform(id, pose);
   detection.detectCollision();
-  const auto after = detection.collisionData(smoke, body).shape();
-  const double error = detection.collisionData(smoke, body).errorBound();
+  const auto after = run.data().shape();
   ASSERT_EQ(after.size(), before.size());
   std::size_t same = 0;
   for (std::size_t i = 0; i < after.size(); ++i) {
     // On the border of two leaves, rounding decides which of them answers.
     EXPECT_EQ(after[i].id, before[i].id);
-    EXPECT_NEAR(after[i].distance, before[i].distance, 2 * error);
+    EXPECT_NEAR(after[i].distance, before[i].distance, 2 * run.data().errorBound());
     same += std::abs(after[i].distance - before[i].distance) < 1e-13 &&
-            (after[i].normal - turn * before[i].normal).norm() < 1e-13;
+            (after[i].normal - pose.rotation * before[i].normal).norm() < 1e-13;
   }
   EXPECT_GT(same, after.size() - after.size() / 50);
-  const std::vector<std::uint32_t> disabled{before[0].id, before[3].id};
-  detection.setDisabledElements(smoke, disabled);
+  detection.setDisabledElements(run.smoke, std::vector<std::uint32_t>{before[0].id, before[3].id});
   detection.detectCollision();
-  const auto fewer = detection.collisionData(smoke, body).shape();
-  ASSERT_EQ(fewer.size(), before.size() - 2);
-  EXPECT_EQ(fewer[0].id, before[1].id);
+  ASSERT_EQ(run.data().shape().size(), before.size() - 2);
+  EXPECT_EQ(run.data().shape()[0].id, before[1].id);
   // Without its elements the body has no surface.
   std::vector<std::uint32_t> all(scene.body.triangles.size());
-  for (std::uint32_t t = 0; t < all.size(); ++t) all[t] = t;
-  detection.setDisabledElements(body, all);
+  std::iota(all.begin(), all.end(), 0u);
+  detection.setDisabledElements(run.body, all);
   detection.detectCollision();
-  EXPECT_TRUE(detection.collisionData(smoke, body).shape().empty());
+  EXPECT_TRUE(run.data().shape().empty());
 }
 
 TEST(Proxy, AnOpenMeshWithAnOuterSideHasContactsInFrontOnly) {
   Random random(4);
-  const Scene scene = scenes()[5];
+  const ParticleScene scene = scenes()[5];
   const Points points = particlesAround(random, scene, 1000);
   OctreeBasedCD detection(settingsOf(Engine::Octree));
   const GeometryId smoke = detection.addPointSet(points), body = addMesh(detection, scene.body);
@@ -282,63 +264,52 @@ TEST(Proxy, AnOpenMeshWithAnOuterSideHasContactsInFrontOnly) {
 
 TEST(Proxy, SetTrianglesAndSettingsBuildNewLeaves) {
   Random random(6);
-  const std::vector<Scene> all = scenes();
+  const std::vector<ParticleScene> all = scenes();
   const Points points = particlesAround(random, all[1], 800);
   const std::vector<double> radii(points.size(), 0.0);
-  Detection run(all[0], points, radii, settingsOf(Engine::Octree));
+  ParticleRun run(all[0], points, radii, settingsOf(Engine::Octree));
   run.detection.setTriangles(run.body, all[1].body.positions, all[1].body.triangles);
+  const auto detect = [&](const PairSettings& pair) {
+    run.detection.setPairSettings(run.smoke, run.body, pair);
+    run.detection.detectCollision();
+    return run.data().errorBound();
+  };
   PairSettings pair = pairOf(all[1]);
-  run.detection.setPairSettings(run.smoke, run.body, pair);
-  run.detection.detectCollision();
-  const Detection fresh(all[1], points, radii, settingsOf(Engine::Octree));
+  EXPECT_GT(detect(pair), 1e-3);
+  const ParticleRun fresh(all[1], points, radii, settingsOf(Engine::Octree));
   EXPECT_EQ(run.data().hash(), fresh.data().hash());
   // A smaller error, and then exact answers by triangles where cones are narrow.
-  double before = run.data().errorBound();
-  EXPECT_GT(before, 1e-3);
   pair.allowedError = 1e-3;
-  run.detection.setPairSettings(run.smoke, run.body, pair);
-  run.detection.detectCollision();
-  EXPECT_LT(run.data().errorBound(), 1.001e-3);
+  EXPECT_LT(detect(pair), 1.001e-3);
   pair.allowedError = 1;
   pair.proxy.widestNormalCone = 1e-6;
-  run.detection.setPairSettings(run.smoke, run.body, pair);
-  run.detection.detectCollision();
-  EXPECT_LT(run.data().errorBound(), 1e-12);
+  EXPECT_LT(detect(pair), 1e-12);
   // Another method, and this one again.
-  run.detection.setPairSettings(run.smoke, run.body, {Method::Proximity, 0.04});
-  run.detection.detectCollision();
-  EXPECT_EQ(run.data().errorBound(), 0.0);
+  EXPECT_EQ(detect({Method::Proximity, 0.04}), 0.0);
   EXPECT_TRUE(run.data().shape().empty());
   EXPECT_FALSE(run.data().vertexTriangle().empty());
-  run.detection.setPairSettings(run.smoke, run.body, pairOf(all[1]));
-  run.detection.detectCollision();
+  detect(pairOf(all[1]));
   EXPECT_EQ(run.data().hash(), fresh.data().hash());
 }
 
 TEST(Proxy, FailedAllocationLeavesTheNextDetectionRight) {
   Random random(9);
-  const Scene scene = scenes()[0];
+  const ParticleScene scene = scenes()[0];
   const Points points = particlesAround(random, scene, 300);
   const std::vector<double> radii(points.size(), 0.0);
-  const std::uint64_t expected =
-      Detection(scene, points, radii, settingsOf(Engine::Octree)).data().hash();
-  Detection run(scene, points, radii, settingsOf(Engine::Octree));
+  ParticleRun run(scene, points, radii, settingsOf(Engine::Octree));
+  const std::uint64_t expected = run.data().hash();
+  const auto detect = [&] { run.detection.detectCollision(); };
   std::size_t failures = 0;
   for (std::size_t n = 1; n < 4000; n = 2 * n + 1) {
     // Another thickness and back: the leaves are built anew.
     PairSettings other = pairOf(scene);
     other.thickness *= 1.5;
     run.detection.setPairSettings(run.smoke, run.body, other);
-    run.detection.detectCollision();
+    detect();
     run.detection.setPairSettings(run.smoke, run.body, pairOf(scene));
-    FailingAllocation::arm(n);
-    try {
-      run.detection.detectCollision();
-    } catch (const std::bad_alloc&) {
-      ++failures;
-    }
-    FailingAllocation::disarm();
-    run.detection.detectCollision();
+    failures += FailingAllocation::throwsAt(n, detect);
+    detect();
     EXPECT_EQ(run.data().hash(), expected) << "allocation " << n;
   }
   EXPECT_GT(failures, 2u);
@@ -346,10 +317,10 @@ TEST(Proxy, FailedAllocationLeavesTheNextDetectionRight) {
 
 TEST(Proxy, QueriesFindParticlesAfterADetectionWithoutTheirOctree) {
   Random random(8);
-  const Scene scene = scenes()[0];
+  const ParticleScene scene = scenes()[0];
   Points points = particlesAround(random, scene, 500);
   const std::vector<double> radii(points.size(), 0.0);
-  Detection run(scene, points, radii, settingsOf(Engine::Octree));
+  ParticleRun run(scene, points, radii, settingsOf(Engine::Octree));
   for (Vector3d& p : points) p += Vector3d(0.01, 0, 0);
   run.detection.setPositions(run.smoke, points);
   run.detection.detectCollision();
@@ -367,10 +338,10 @@ TEST(Proxy, QueriesFindParticlesAfterADetectionWithoutTheirOctree) {
 
 TEST(Proxy, PairsOfOneBodyShareLeaves) {
   Random random(9);
-  const Scene scene = scenes()[6];
+  const ParticleScene scene = scenes()[6];
   const Points first = particlesAround(random, scene, 300), second = {first[5], first[7]};
   const std::vector<double> radii(first.size(), 0.0);
-  Detection run(scene, first, radii, settingsOf(Engine::Octree));
+  ParticleRun run(scene, first, radii, settingsOf(Engine::Octree));
   const GeometryId debris = run.detection.addPointSet(second);
   run.detection.addCollisionPair(debris, run.body, pairOf(scene));
   FailingAllocation::arm(0);

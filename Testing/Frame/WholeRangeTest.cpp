@@ -17,9 +17,9 @@ constexpr double kLeastExponent = -1074, kMostExponent = 996.5;
 
 using Positions = std::vector<Eigen::Vector3d>;
 
-class Scene {
+class RangeScene {
  public:
-  explicit Scene(std::uint64_t seed) : m_random(seed), m_base(length()) {}
+  explicit RangeScene(std::uint64_t seed) : m_random(seed), m_base(length()) {}
 
   /// Random geometries, motion and pairs. The same for each engine.
   void addTo(OctreeBasedCD& collisions) {
@@ -124,7 +124,7 @@ void expectGoodNumbers(const CollisionData& data) {
 std::size_t compare(std::uint64_t seed) {
   OctreeBasedCD octree(settingsOf(Engine::Octree)), oracle(settingsOf(Engine::BruteForce));
   for (OctreeBasedCD* each : {&octree, &oracle}) {
-    Scene(seed).addTo(*each);
+    RangeScene(seed).addTo(*each);
     each->detectCollision();
   }
   EXPECT_EQ(octree.octree().validate(), std::vector<std::string>{});

@@ -18,7 +18,7 @@
 #include <vector>
 
 // Candidates of boxes in batches against brute force. Frame/OracleTest.cpp and
-// Frame/DegenerateCasesTest.cpp compare whole frames with it.
+// Frame/ContactLawTest.cpp compare whole frames with it.
 
 namespace palpate::testing {
 namespace {
