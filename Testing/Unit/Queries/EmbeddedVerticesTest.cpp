@@ -56,8 +56,7 @@ std::vector<EmbeddedVertex> embedded(const Settings& settings, const TestGeometr
   OctreeBasedCD detection(settings);
   const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
                    other = probes.addTo(detection);
-  const auto span = testing::embeddedVertices(detection, other, body);
-  const std::vector<EmbeddedVertex> found(span.begin(), span.end());
+  const auto found = testing::embeddedVertices(detection, other, body);
   for (const EmbeddedVertex& v : found)
     EXPECT_EQ(detection.queries().findTetrahedron(body, probes.positions[v.vertex]), v.at);
   return found;
@@ -103,81 +102,6 @@ TEST(EmbeddedVertices, MatchExactVolumesOnAGrid) {
   EXPECT_GT(inverted, 100u);
 }
 
-/// Histories of deforming solids: moved, inverted, cut, placed; any threads, rebuilt or refitted.
-TEST(EmbeddedVertices, MatchBruteForceForAnyNumberOfThreads) {
-  const auto resultsOf = [](const Settings& settings, double scale, double far) {
-    Random random(2);
-    OctreeBasedCD detection(settings);
-    Solid solid = cells(4, random);
-    const auto place = [&](Positions positions) {
-      for (Vector3d& p : positions) p = scale * (p + Vector3d(far, -far, 0));
-      return positions;
-    };
-    const GeometryId body = detection.addTetrahedralMesh(place(solid.positions), solid.tetrahedra);
-    Positions probes = solid.positions;  // corners are exactly in several
-    for (int i = 0; i < 600; ++i) probes.push_back(randomPoint(random, -1, 5));
-    const GeometryId points = detection.addPointSet(place(probes));
-    std::vector<std::vector<EmbeddedVertex>> all;
-    for (int frame = 0; frame < 8; ++frame) {
-      if (frame == 4) {
-        std::erase_if(solid.tetrahedra, [&](const auto&) { return random() % 4 == 0; });
-        detection.setTetrahedra(body, place(solid.positions), solid.tetrahedra);
-      } else {
-        detection.setPositions(body, place(moved(random, solid.positions, 0.4 * frame)));
-      }
-      if (frame == 6)
-        detection.setTransform(
-            body, {Eigen::AngleAxisd(0.3, Vector3d(1, 2, 3).normalized()).toRotationMatrix(),
-                   {0.1 * scale, 0, 0}});
-      if (frame == 7)
-        detection.setTransform(
-            points,
-            {Eigen::AngleAxisd(0.1, Vector3d::UnitZ()).toRotationMatrix(), Vector3d::Zero()});
-      const auto found = testing::embeddedVertices(detection, points, body);
-      all.emplace_back(found.begin(), found.end());
-      if (frame % 2) detection.detectCollision();
-      detection.advance();
-    }
-    return all;
-  };
-  for (const auto& [scale, far] :
-       {std::pair{1.0, 0.0}, std::pair{1.0, 1e6}, std::pair{0x1p-40, 0.0}, std::pair{1e9, 3.0}}) {
-    const auto truth = resultsOf(settingsOf(Engine::BruteForce), scale, far);
-    for (std::size_t frame = 0; frame < truth.size(); ++frame)
-      EXPECT_TRUE(truth[frame].size() > 40 || (far > 1 && frame >= 6)) << frame;
-    for (const Settings& settings : octreeSettings())
-      EXPECT_EQ(resultsOf(settings, scale, far), truth);
-  }
-}
-
-/// One vertex moves at a time, so that nothing else shows that positions are new.
-TEST(EmbeddedVertices, UseTheLastPositions) {
-  Random random(8);
-  const Solid solid = cells(4, random);
-  const TestGeometry probes = particles(random, 150, 0);
-  Positions places = probes.positions;
-  for (Vector3d& p : places) p *= 4;
-  std::set<std::size_t> sizes;
-  std::vector<std::vector<EmbeddedVertex>> answers[2];
-  for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
-    OctreeBasedCD detection(settingsOf(engine));
-    const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
-                     points = detection.addPointSet(places);
-    for (std::size_t v = 0; v < solid.positions.size(); ++v) {
-      Positions now = solid.positions;
-      now[v] = Vector3d(2, 2, 2) + 0.6 * (now[v] - Vector3d(2, 2, 2));
-      detection.setPositions(body, now);
-      const auto found = testing::embeddedVertices(detection, points, body);
-      answers[engine == Engine::Octree].emplace_back(found.begin(), found.end());
-      sizes.insert(found.size());
-    }
-  }
-  EXPECT_EQ(answers[0], answers[1]);
-  EXPECT_GT(sizes.size(), 4u);
-}
-
-// ---- Inside, by tetrahedra ----
-
 /// Where the surface is not closed and oriented, and where it is turned inside out.
 TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
   Random random(6);
@@ -189,8 +113,7 @@ TEST(EmbeddedVertices, InsideMeansInATetrahedronAndNotOnTheSurface) {
       for (int k = 0; k < 3; ++k)
         p[k] = run % 2 ? 2 * p[k] : static_cast<double>(random() % (2 * n + 1));
     const TestGeometry probes = lattices(2 * n)[0];
-    Settings settings = settingsOf(Engine::Octree);
-    OctreeBasedCD detection(settings);
+    OctreeBasedCD detection(settingsOf(Engine::Octree));
     const GeometryId body = detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
                      points = probes.addTo(detection);
     detection.addCollisionPair(points, body, {Method::Proximity, 100.0});

@@ -2,13 +2,14 @@
 
 #include "Unit/Queries/QueryTruth.h"
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
-/// Every query of one geometry.
+/// Every query of one geometry, and a scene of geometries of all types.
 namespace palpate::testing {
 
 /// The last answer of each query. Vectors keep their memory from call to call.
@@ -92,6 +93,92 @@ inline std::vector<QueryCall> queryCalls() {
       {"contacts", Elements, [](Q q, Id id, P p, R, A a) {
          q.contacts(id, Cylinder{p, {0.5, 0.5, 0.5}, 0.1}, Pose{}, 0.01, a.contacts);
        }}};
+}
+
+/// A ball, tetrahedra, a placed ball, an open sheet, lines, points and a shape.
+struct QueryScene {
+  explicit QueryScene(const Settings& settings = settingsOf(Engine::Octree), int probeCount = 10)
+      : collisions(settings) {
+    Random random(801);
+    const Mesh ballMesh = sphere(12, 16, {0.5, 0.5, 0.5}, 0.4);
+    rest = ballMesh.positions;
+    triangles = ballMesh.triangles;
+    Solid cube = cells(2, random);
+    for (Vector3d& p : cube.positions) p *= 0.4;
+    solidRest = cube.positions;
+    for (int i = 0; i < probeCount; ++i) probes.push_back(randomPoint(random, 0, 1));
+    for (const Vector3d& p : probes) rays.push_back({p, randomPoint(random, -1, 1)});
+    ball = addTo(collisions, ballMesh);
+    solid = addTo(collisions, cube);
+    body = addTo(collisions, ballMesh);
+    open = addTo(collisions, sheet(8, 0.5, 0));
+    line = thread(random, 100, 0.1, 0.02, false).addTo(collisions);
+    points = tapered(random, particles(random, 200, 0.0), 0.05).addTo(collisions);
+    shape = collisions.addAnalyticalGeometry(Capsule{{0, 0, 0}, {0, 0, 0.3}, 0.1});
+    removed = collisions.addPointSet(probes);
+    collisions.removeGeometry(removed);
+    collisions.addCollisionPair(ball, open, {Method::Continuous, 0.01});
+    collisions.advance();
+  }
+  /// Deforms the ball and, in every third step, the tetrahedra; moves the placed ball and the
+  /// shape; detects.
+  void step(int i) {
+    Positions moved = rest, solidNow = solidRest;
+    for (Vector3d& p : moved) p += 0.05 * std::sin(0.3 * i + 4 * p.x()) * (p - rest[0]);
+    collisions.setPositions(ball, moved);
+    for (Vector3d& p : solidNow) p *= 1 + 0.01 * (i % 7);
+    if (i % 3 == 0) collisions.setPositions(solid, solidNow);
+    const Matrix3d turn = Eigen::AngleAxisd(0.1 * i, Vector3d(1, 2, 2) / 3).toRotationMatrix();
+    collisions.setTransform(body, {turn, {0.1, 0.01 * i, 0}});
+    collisions.setTransform(shape, {turn, {0.2, 0.3, 0.01 * i}});
+    collisions.detectCollision();
+  }
+  /// Calls f for each query and each geometry that has what it needs.
+  template <class F>
+  void forEachCall(F&& f) const {
+    for (const QueryCall& call : queryCalls())
+      for (const GeometryId id : {ball, solid, body, open, line, points, shape}) {
+        const Needs has = id == shape  ? Needs::Nothing
+                          : id < open  ? Needs::Inside
+                          : id == open ? Needs::Triangles
+                                       : Needs::Elements;
+        if (has >= call.needs) f(call, id);
+      }
+  }
+
+  OctreeBasedCD collisions;
+  GeometryId ball, solid, body, open, line, points, shape, removed;
+  Positions rest, solidRest, probes;
+  std::vector<Triangle> triangles;
+  std::vector<Ray> rays;
+};
+
+/// The answers of every query about every geometry of a scene.
+inline std::vector<QueryAnswers> ask(const QueryScene& scene, const SpatialQueries& queries) {
+  std::vector<QueryAnswers> all;
+  for (std::size_t i = 0; i < scene.probes.size(); ++i) {
+    const Ray& ray = scene.rays[i];
+    scene.forEachCall([&](const QueryCall& call, GeometryId id) {
+      call.ask(queries, id, scene.probes[i], ray, all.emplace_back());
+    });
+    all.back().firstOfAll = queries.firstHit(ray);
+    all.back().pick = queries.pick(ray);
+    all.back().pickOfFrontFaces = queries.pick(ray, true);
+  }
+  QueryAnswers& last = all.emplace_back();
+  last.closestOfBatch.resize(scene.probes.size());
+  last.signedOfBatch.resize(scene.probes.size());
+  last.firstOfBatch.resize(scene.rays.size());
+  queries.closestPoints(scene.ball, scene.probes, last.closestOfBatch);
+  queries.signedDistances(scene.solid, scene.probes, last.signedOfBatch);
+  queries.firstHits(scene.ball, scene.rays, last.firstOfBatch);
+  queries.findInsideVertices(scene.points, scene.ball, last.inside);
+  queries.findInsideVertices(scene.points, scene.open, last.insideByNumber,
+                             {.rule = InsideRule::WindingNumber});
+  queries.findEmbeddedVertices(scene.points, scene.solid, last.embedded);
+  EXPECT_GT(last.inside.size(), 10u);
+  EXPECT_GT(last.embedded.size(), 10u);
+  return all;
 }
 
 }  // namespace palpate::testing

@@ -19,6 +19,8 @@
 namespace palpate::testing {
 namespace {
 
+using Strings = std::vector<std::string>;
+
 /// Two geometries searched by octrees, and by brute force.
 struct TwoBodies : Both {
   template <class A, class B>
@@ -57,8 +59,7 @@ GeometryDistance expectSameAnswers(const TwoBodies& both, double radii, double s
       EXPECT_NEAR(point.weights.sum(), 1.0, 1e-15);
       EXPECT_GE(point.weights.minCoeff(), 0.0);
     }
-  const GeometryDistance exchanged = queries.distance(both.b, both.a);
-  EXPECT_EQ(exchanged.distance, found.distance);
+  EXPECT_EQ(queries.distance(both.b, both.a).distance, found.distance);
   return found;
 }
 
@@ -129,58 +130,51 @@ TEST(GeometryDistances, AreThoseOfBruteForceAndOfPointsForEveryPairOfTypes) {
   EXPECT_GE(touching, leastOf(150));
 }
 
-/// No coordinate is exact after a body was placed, or far from the origin.
-TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesAndFarFromTheOrigin) {
+/// No coordinate is exact after a body was placed, or far from the origin. Large meshes have more
+/// elements than subtrees whose elements' heights are compared; their nearest points are often
+/// vertices, which several triangles share. Every SIMD path gives the same answer.
+TEST(GeometryDistances, OctreesAnswerAsBruteForceForPlacedBodiesLargeMeshesAndFarAway) {
   Random random(202);
-  const TestGeometry a = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
-                     b = tapered(random, thread(random, 150, 0.1, 0.01, false), 0.05);
-  for (const double far : {0.0, 1.0, 1e3, 1e9, 1e14})
-    for (int placed = 0; placed < 4; ++placed) {
-      TwoBodies both(a, b);
-      const Vector3d away = far * Vector3d(1, -2, 0.3);
-      for (const double most : {2.0, 1.5, 1.2, 1.0, 0.5, 0.0}) {
-        const Matrix3d turn = randomTurn(random);
-        both.put(both.a, a, turn, away + randomPoint(random, -most, most), placed & 1);
-        const Matrix3d turnOfB = randomTurn(random);
-        both.put(both.b, b, turnOfB, away + randomPoint(random, -most, most), placed & 2);
-        expectSameAnswers(both, 0.05, 5.0 + 10 * far);
-        ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << placed;
-      }
-    }
-}
-
-/// Each mesh has more elements than subtrees whose elements' heights are compared. The nearest
-/// points are often vertices, which several triangles share. Every SIMD path gives the same answer.
-TEST(GeometryDistances, OctreesAnswerAsBruteForceForMeshesOfManyElements) {
-  Random random(212);
   const auto bumpy = [](std::uint32_t rings, double height) {
     Mesh mesh = sphere(rings, 24, Vector3d::Zero(), 1.0);
     for (Vector3d& p : mesh.positions)
       p *= 1 + height * std::sin(5 * p[0]) * std::cos(4 * p[1]) * std::sin(3 * p[2] + 1);
     return testGeometry(std::move(mesh));
   };
-  const TestGeometry a = bumpy(22, 0.15), b = bumpy(18, 0.2);
+  const struct {
+    TestGeometry a, b;
+    std::vector<double> away, shifts;
+    double radius;
+  } cases[] = {
+      {testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4)),
+       tapered(random, thread(random, 150, 0.1, 0.01, false), 0.05),
+       {0.0, 1.0, 1e3, 1e9, 1e14},
+       {2.0, 1.5, 1.2, 1.0, 0.5, 0.0},
+       0.05},
+      {bumpy(22, 0.15), bumpy(18, 0.2), {3.0}, {3.0, 2.6, 2.3, 2.2, 2.1, 2.0, 1.9, 1.8, 0.2}, 0.0}};
   std::size_t apart = 0, touching = 0;
-  for (int placed = 0; placed < 4; ++placed) {
-    if (kShareOfCases > 1 && placed < 3) continue;
-    TwoBodies both(a, b);
-    for (const double most : {3.0, 2.6, 2.3, 2.2, 2.1, 2.0, 1.9, 1.8, 0.2}) {
-      const Vector3d aside = most * randomPoint(random, -1, 1).normalized();
-      const Vector3d at(0.3, -5, 7);
-      both.put(both.a, a, randomTurn(random), at, placed & 1);
-      both.put(both.b, b, randomTurn(random), at + aside, placed & 2);
-      const GeometryDistance found = expectSameAnswers(both, 0.0, 10.0);
-      (found.distance > 0 ? apart : touching) += 1;
-      for (const std::string& path : simdPaths()) {
-        useSimdPath(path);
-        EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
+  for (const auto& [a, b, away, shifts, radius] : cases)
+    for (const double far : away)
+      for (int placed = kShareOfCases > 1 && away.size() == 1 ? 3 : 0; placed < 4; ++placed) {
+        TwoBodies both(a, b);
+        const Vector3d at = far * Vector3d(1, -2, 0.3);
+        for (const double shift : shifts) {
+          const Matrix3d turn = randomTurn(random), turnOfB = randomTurn(random);
+          const Vector3d aside = shift * randomPoint(random, -1, 1).normalized();
+          both.put(both.a, a, turn, at, placed & 1);
+          both.put(both.b, b, turnOfB, at + aside, placed & 2);
+          const GeometryDistance found = expectSameAnswers(both, radius, 5.0 + 10 * far);
+          (found.distance > 0 ? apart : touching) += 1;
+          for (const std::string& path : away.size() == 1 ? simdPaths() : Strings{}) {
+            useSimdPath(path);
+            EXPECT_TRUE(isSame(both.octree.queries().distance(both.a, both.b), found)) << path;
+          }
+          useSimdPath("");
+          ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << placed << ' ' << shift;
+        }
       }
-      useSimdPath("");
-      ASSERT_FALSE(::testing::Test::HasFailure()) << most << ' ' << placed;
-    }
-  }
-  EXPECT_GE(apart, leastOf(16));
-  EXPECT_GE(touching, leastOf(5));
+  EXPECT_GE(apart, leastOf(100));
+  EXPECT_GE(touching, leastOf(9));
 }
 
 TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
@@ -197,19 +191,19 @@ TEST(GeometryDistances, SurfacesOfTetrahedralMeshesAreMeshes) {
   }
 }
 
-/// Positions beyond the floats' range are clamped there.
-TEST(GeometryDistances, VerticesBeyondFloatsDoNotHideOthers) {
-  Random random(204);
-  for (const double far : {1e20, 1e36, 1e45, 1e200}) {
-    TestGeometry a = testGeometry(soup(random, 60, 0.1)), b = testGeometry(soup(random, 60, 0.1));
-    for (const std::uint32_t corner : a.triangles[7]) a.positions[corner] *= far;
-    Positions now = b.positions;
-    for (Vector3d& p : now) p += a.positions[a.triangles[7][0]] + Vector3d(0, 3, 0);
-    TwoBodies both(a, b);
-    expectSameAnswers(both, 0.0, far);
-    both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
-    const GeometryDistance found = expectSameAnswers(both, 0.0, far);
-    EXPECT_EQ(found.a.element, 7u);
+TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
+  Random random(208);
+  for (int round = 0; round < 40; ++round) {
+    const TestGeometry a = testGeometry(soup(random, 40, 0.1));
+    TestGeometry b = testGeometry(soup(random, 40, 0.1));
+    if (round % 2 == 0) b = thread(random, 40, 0.1, 0.001, false);
+    for (Vector3d& p : b.positions) p[0] += 1.5;
+    const TwoBodies both(a, b);
+    const SpatialQueries queries = both.octree.queries();
+    const GeometryDistance one = queries.distance(both.a, both.b),
+                           two = queries.distance(both.b, both.a);
+    EXPECT_GT(one.distance, 0.0);
+    EXPECT_TRUE(isSame(one, GeometryDistance{two.b, two.a, two.distance}));
   }
 }
 
@@ -327,26 +321,21 @@ TEST(GeometryDistances, AgreeWithRationalArithmeticWhereTrianglesNearlyTouch) {
   EXPECT_GT(apart, 100u);
 }
 
-/// A long edge in the plane of a small triangle meets it far from the edge's middle.
-TEST(GeometryDistances, WitnessesLieOnBothWherePlanesCoincide) {
+TEST(GeometryDistances, WitnessesMeet) {
+  // A long edge in the plane of a small triangle meets it far from the edge's middle.
   TestGeometry a, b;
   a.positions = {{0, 0, 0}, {100, 0, 0}, {100, 50, 0}};
   b.positions = {{1, -1, 0}, {2, -1, 0}, {1.5, 1, 0}};
   a.triangles = b.triangles = {{0, 1, 2}};
-  const GeometryDistance found = expectSameAnswers(TwoBodies(a, b), 0.0, 100.0);
-  EXPECT_EQ(found.distance, 0.0);
-  EXPECT_LE(found.a.position[0], 2.0);
-}
-
-TEST(GeometryDistances, WitnessesMeetAtAnyScale) {
+  const GeometryDistance flat = expectSameAnswers(TwoBodies(a, b), 0.0, 100.0);
+  EXPECT_EQ(flat.distance, 0.0);
+  EXPECT_LE(flat.a.position[0], 2.0);
   for (const double scale : {1e-305, 1e-200, 1e-163, 1.0, 1e150, 1e299}) {
-    OctreeBasedCD collisions({.threads = 1});
-    const Triangle triangle{0, 1, 2};
-    const std::vector<Vector3d> a{{0, 0, 0}, {4 * scale, 0, 0}, {0, 4 * scale, 0}},
-        b{{scale, scale, -scale}, {scale, scale, 2 * scale}, {3 * scale, 3 * scale, 2 * scale}};
-    const GeometryId first = collisions.addTriangleMesh(a, {&triangle, 1}),
-                     second = collisions.addTriangleMesh(b, {&triangle, 1});
-    const GeometryDistance found = collisions.queries().distance(first, second);
+    a.positions = {{0, 0, 0}, {4 * scale, 0, 0}, {0, 4 * scale, 0}};
+    b.positions = {
+        {scale, scale, -scale}, {scale, scale, 2 * scale}, {3 * scale, 3 * scale, 2 * scale}};
+    const TwoBodies both(a, b);
+    const GeometryDistance found = both.octree.queries().distance(both.a, both.b);
     EXPECT_EQ(found.distance, 0.0) << scale;
     EXPECT_LT((found.a.position - found.b.position).cwiseAbs().maxCoeff(), 1e-12 * scale) << scale;
   }
@@ -367,86 +356,6 @@ TEST(GeometryDistances, TiesGoToTheLowestElements) {
   const GeometryDistance found = expectSameAnswers(both, 0.0, 6.0);
   EXPECT_EQ(found.distance, 0.25);
   EXPECT_EQ(found.a.element, 0u);
-  for (std::uint32_t e = 0; e < found.b.element; ++e) {
-    // No lower element of b touches the prism over element 0 of a, (0, 0), (1, 0), (1, 1).
-    TestGeometry one = above, zero = below;
-    one.triangles = {above.triangles[e]};
-    zero.triangles = {below.triangles[0]};
-    EXPECT_GT(TwoBodies(zero, one).octree.queries().distance(GeometryId{0}, GeometryId{1}).distance,
-              0.25);
-  }
-}
-
-TEST(GeometryDistances, ExchangedGeometriesGiveExchangedAnswers) {
-  Random random(208);
-  for (int round = 0; round < 40; ++round) {
-    const TestGeometry a = testGeometry(soup(random, 40, 0.1)),
-                       b = round % 2 ? testGeometry(soup(random, 40, 0.1))
-                                     : thread(random, 40, 0.1, 0.001, false);
-    TwoBodies both(a, b);
-    Positions now = b.positions;
-    for (Vector3d& p : now) p[0] += 1.5;
-    both.change([&](OctreeBasedCD& each) { each.setPositions(both.b, now); });
-    const SpatialQueries queries = both.octree.queries();
-    const GeometryDistance one = queries.distance(both.a, both.b),
-                           two = queries.distance(both.b, both.a);
-    EXPECT_GT(one.distance, 0.0);
-    EXPECT_TRUE(isSame(one, GeometryDistance{two.b, two.a, two.distance}));
-  }
-}
-
-/// Many triangles with the same corners, in any order, are equally near: the lowest ones count, and
-/// the cost does not follow the number of pairs.
-TEST(GeometryDistances, CoincidentTrianglesAnswerAsBruteForce) {
-  Random random(213);
-  for (const double apart : {0.0, 0.5})
-    for (int round = 0; round < 4; ++round) {
-      const Mesh single = soup(random, 3, 0.5);
-      Mesh a, b;
-      for (int i = 0; i < 60; ++i)
-        for (Mesh* mesh : {&a, &b}) {
-          const auto first = static_cast<std::uint32_t>(mesh->positions.size());
-          for (Vector3d p : single.positions) {
-            if (mesh == &b) p[2] += apart;
-            mesh->positions.push_back(p);
-          }
-          for (std::size_t t = single.triangles.size(); t-- > 0;) {
-            Triangle corners = single.triangles[t];
-            std::rotate(corners.begin(), corners.begin() + random() % 3, corners.end());
-            if (random() % 2) std::swap(corners[0], corners[1]);
-            for (std::uint32_t& corner : corners) corner += first;
-            mesh->triangles.push_back(corners);
-          }
-        }
-      TwoBodies both(testGeometry(a), testGeometry(b));
-      expectSameAnswers(both, 0.0, 5.0);
-      ASSERT_FALSE(::testing::Test::HasFailure()) << apart << ' ' << round;
-    }
-}
-
-/// So are all pairs of triangles of two fans whose tips are nearest.
-TEST(GeometryDistances, FansAnswerAsBruteForce) {
-  Random random(214);
-  for (int round = 0; round < 12; ++round) {
-    std::array<Mesh, 2> fans;
-    for (int side = 0; side < 2; ++side) {
-      Mesh& fan = fans[static_cast<std::size_t>(side)];
-      const double up = side == 0 ? 1.0 : -1.0, open = round % 3 == 0 ? 0.02 : 1.0;
-      fan.positions.emplace_back(0.02 * side, 0.01 * side, side == 0 ? 0.0 : 0.3);
-      for (std::uint32_t i = 0; i < 90; ++i) {
-        const double angle = 0.07 * i, radius = uniform(random, 0.5, 1.0);
-        fan.positions.emplace_back(radius * std::cos(angle), radius * std::sin(angle),
-                                   fan.positions[0][2] - up * open * uniform(random, 0.5, 1.0));
-      }
-      for (std::uint32_t i = 1; i < 90; ++i) fan.triangles.push_back({0, i, i + 1});
-      std::shuffle(fan.triangles.begin(), fan.triangles.end(), random);
-      for (Triangle& corners : fan.triangles)
-        std::rotate(corners.begin(), corners.begin() + random() % 3, corners.end());
-    }
-    TwoBodies both(testGeometry(fans[0]), testGeometry(fans[1]));
-    expectSameAnswers(both, 0.0, 5.0);
-    ASSERT_FALSE(::testing::Test::HasFailure()) << round;
-  }
 }
 
 /// Triangles around one edge, each with vertices of its own, are all equally near to a point above

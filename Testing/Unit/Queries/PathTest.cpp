@@ -66,28 +66,11 @@ class Line {
   std::vector<double> m_starts{0.0};
 };
 
-/// Geometries of one scene searched by octrees, and by brute force.
-struct PathScene : Both {
-  template <class Geometry>
-  GeometryId add(const Geometry& geometry) {
-    bodies.push_back(Both::add(geometry));
-    return bodies.back();
-  }
-  GeometryId add(const TestGeometry& geometry) {
-    meshes.resize(bodies.size());
-    meshes.push_back(geometry);
-    return add<TestGeometry>(geometry);
-  }
-  GeometryId add(const Mesh& mesh) { return add(testGeometry(mesh)); }
-
-  std::vector<GeometryId> bodies;
-  std::vector<TestGeometry> meshes;  ///< of the first bodies, where added as such
-};
-
 /// Expects the answers of brute force, and those of points along the path. isBody: whether
 /// contains() answers. size: L, of all coordinates.
-Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const Positions& path,
-                     double radius, double size = 5.0) {
+Answer expectSamples(const Both& scene, bool isBody, const Positions& path, double radius,
+                     double size = 5.0) {
+  const GeometryId body = scene.id;
   const SpatialQueries queries = scene.octree.queries(), truth = scene.bruteForce.queries();
   const Answer found = follow(queries, path, radius, {body}),
                expected = follow(truth, path, radius, {body});
@@ -130,15 +113,6 @@ Answer expectSamples(const PathScene& scene, GeometryId body, bool isBody, const
     const double there = queries.closestPoint(body, line(clearance.at))->distance;
     EXPECT_GE(least, clearance.distance - 1e-13 * size);
     EXPECT_NEAR(std::max(0.0, there - radius), clearance.distance, 1e-13 * size);
-    // The path as a line mesh.
-    OctreeBasedCD other;
-    if (body != scene.bodies.front() || scene.meshes.size() != 1) continue;
-    std::vector<Segment> segments;
-    for (std::uint32_t i = 0; i + 1 < path.size(); ++i) segments.push_back({i, i + 1});
-    const GeometryId mesh = scene.meshes[0].addTo(other),
-                     needle = other.addLineMesh(path, segments, 0.0);
-    EXPECT_NEAR(other.queries().distance(mesh, needle).distance - radius, clearance.distance,
-                1e-14 * size);
   }
   return found;
 }
@@ -183,14 +157,32 @@ Positions randomPath(Random& random, double most, int points) {
   return path;
 }
 
+struct SampledPaths {
+  std::size_t intervals = 0, clearances = 0;
+
+  /// Paths to one body. touched: whose elements are met at the ends of intervals, or null.
+  void test(Random& random, const Both& scene, bool isBody, int round,
+            const TestGeometry* touched = nullptr) {
+    const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.15);
+    const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
+    const Answer found = expectSamples(scene, isBody, path, radius);
+    if (touched) expectEndsOnElements(*touched, touched->positions, found, path, radius);
+    ASSERT_FALSE(::testing::Test::HasFailure()) << "round " << round;
+    intervals += found.inside.size();
+    clearances += found.outside.size();
+    for (const PathInterval& interval : found.inside) {
+      if (isBody || touched) continue;
+      EXPECT_EQ(interval.entryElement, kNoElement);
+      EXPECT_EQ(interval.exitElement, kNoElement);
+    }
+  }
+};
+
 TEST(Path, AgreesWithSamplesForEveryGeometryType) {
   Random random(301);
   const Mesh ball = sphere(10, 14, {0.5, 0.5, 0.5}, 0.4);
-  struct Case {
-    TestGeometry geometry;
-    bool isBody;
-  };
-  const Case cases[] = {
+  const std::pair<TestGeometry, bool> cases[] = {
+      // whether it is a body
       {testGeometry(ball), true},
       {testGeometry(joined(ball, insideOut(sphere(7, 9, {0.5, 0.5, 0.5}, 0.2)))), true},
       {testGeometry(joined(ball, sphere(7, 9, {0.9, 0.5, 0.5}, 0.3))), true},
@@ -203,36 +195,41 @@ TEST(Path, AgreesWithSamplesForEveryGeometryType) {
       {particles(random, 60, 0.0), false},
       {particles(random, 60, 0.05), false},
       {tapered(random, particles(random, 60, 0.02), 0.1), false}};
-  std::size_t intervals = 0, clearances = 0, index = 0;
-  for (const auto& [geometry, isBody] : cases) {
+  SampledPaths paths;
+  for (const auto& [geometry, isBody] : cases)
     for (int round = 0; round < casesOf(40); ++round) {
-      PathScene scene;
-      const GeometryId body = scene.add(geometry);
-      const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.15);
-      const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
-      const Answer found = expectSamples(scene, body, isBody, path, radius);
-      expectEndsOnElements(geometry, geometry.positions, found, path, radius);
-      ASSERT_FALSE(::testing::Test::HasFailure()) << "case " << index << ", round " << round;
-      intervals += found.inside.size();
-      clearances += found.outside.size();
+      SCOPED_TRACE(&geometry - &cases[0].first);
+      paths.test(random, Both(geometry), isBody, round, &geometry);
+      if (HasFatalFailure()) return;
     }
-    ++index;
-  }
-  EXPECT_GE(intervals, leastOf(200));
-  EXPECT_GE(clearances, leastOf(100));
+  EXPECT_GE(paths.intervals, leastOf(200));
+  EXPECT_GE(paths.clearances, leastOf(100));
+}
+
+TEST(Path, AgreesWithSamplesForEveryShape) {
+  Random random(304);
+  SampledPaths paths;
+  for (const AnalyticalGeometry& shape : shapesOfEveryKind(random))
+    for (int round = 0; round < 40; ++round) {
+      SCOPED_TRACE(shape.index());
+      Both scene(shape);
+      const Matrix3d turn = randomTurn(random);
+      const Vector3d shift = randomPoint(random, 0, 1);
+      scene.change([&](OctreeBasedCD& each) { each.setTransform(scene.id, {turn, shift}); });
+      paths.test(random, scene, false, round);
+      if (HasFatalFailure()) return;
+    }
+  EXPECT_GT(paths.intervals, 100u);
+  EXPECT_GT(paths.clearances, 50u);
 }
 
 TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
   Random random(302);
-  const Solid solid = cells(3, random, [](const auto& at) { return at[0] + at[1] + at[2] != 3; });
-  PathScene scene;
-  const GeometryId body = scene.add([&](OctreeBasedCD& each) {
-    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  });
+  const Both scene(cells(3, random, [](const auto& at) { return at[0] + at[1] + at[2] != 3; }));
   for (int round = 0; round < 60; ++round) {
     Positions path;
     for (int i = 0; i < 2 + round % 3; ++i) path.push_back(randomPoint(random, -1, 4));
-    expectSamples(scene, body, true, path, round % 2 ? 0.0 : uniform(random, 0, 0.4));
+    expectSamples(scene, true, path, round % 2 ? 0.0 : uniform(random, 0, 0.4));
     ASSERT_FALSE(::testing::Test::HasFailure()) << round;
   }
 }
@@ -240,22 +237,18 @@ TEST(Path, AgreesWithSamplesForTetrahedralMeshes) {
 /// Inverted tetrahedra, where bodies also end at faces within the mesh.
 TEST(Path, AgreesWithSamplesForFoldedTetrahedralMeshes) {
   Random random(303);
-  const Solid solid = cells(2, random, [](const auto&) { return true; });
+  const Solid solid = cells(2, random);
   std::size_t withoutElement = 0;
   for (int round = 0; round < 60; ++round) {
-    PathScene scene;
-    const GeometryId body = scene.add([&](OctreeBasedCD& each) {
-      return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-    });
+    Both scene(solid);
     Positions folded = solid.positions;
     for (Vector3d& p : folded)
       if (uniform(random, 0, 1) < 0.4) p += randomPoint(random, -1.5, 1.5);
-    scene.change([&](OctreeBasedCD& each) { each.setPositions(body, folded); });
+    scene.change([&](OctreeBasedCD& each) { each.setPositions(scene.id, folded); });
     for (int i = 0; i < 4; ++i) {
       const Positions path{randomPoint(random, -2, 4), randomPoint(random, 0, 2),
                            randomPoint(random, -2, 4)};
-      const Answer found =
-          expectSamples(scene, body, true, path, i % 2 ? 0.0 : uniform(random, 0, 0.05));
+      const Answer found = expectSamples(scene, true, path, i % 2 ? 0.0 : uniform(random, 0, 0.05));
       for (const PathInterval& interval : found.inside)
         withoutElement += interval.enter > 0 && interval.entryElement == kNoElement;
     }
@@ -269,52 +262,22 @@ TEST(Path, AgreesWithSamplesForPlacedBodiesAndFarFromTheOrigin) {
   const TestGeometry ball = testGeometry(sphere(10, 14, {0.5, 0.5, 0.5}, 0.4));
   for (const double far : {0.0, 1e3, 1e7})
     for (int round = 0; round < 30; ++round) {
-      PathScene scene;
-      const GeometryId body = scene.add(ball);
+      Both scene(ball);
       const Matrix3d turn = randomTurn(random);
       const Vector3d shift = far * Vector3d(1, -2, 0.3) + randomPoint(random, -1, 1);
-      Positions now = ball.positions, path = randomPath(random, 0.7, 2 + round % 4);
-      for (Vector3d& p : now) p = turn * p + shift;
-      for (Vector3d& p : path) p = turn * p + shift;
-      scene.meshes[0].positions = now;
-      const bool isPlaced = round % 2;
+      const Positions now = placed(ball.positions, turn, shift),
+                      path = placed(randomPath(random, 0.7, 2 + round % 4), turn, shift);
       scene.change([&](OctreeBasedCD& each) {
-        if (isPlaced)
-          each.setTransform(body, {turn, shift});
+        if (round % 2)
+          each.setTransform(scene.id, {turn, shift});
         else
-          each.setPositions(body, now);
+          each.setPositions(scene.id, now);
       });
       const double radius = round % 3 ? uniform(random, 0, 0.1) : 0.0, size = 5.0 + 10 * far;
-      const Answer found = expectSamples(scene, body, true, path, radius, size);
+      const Answer found = expectSamples(scene, true, path, radius, size);
       expectEndsOnElements(ball, now, found, path, radius, size);
       ASSERT_FALSE(::testing::Test::HasFailure()) << far << ' ' << round;
     }
-}
-
-TEST(Path, AgreesWithSamplesForEveryShape) {
-  Random random(304);
-  std::size_t intervals = 0, clearances = 0;
-  for (const AnalyticalGeometry& shape : shapesOfEveryKind(random))
-    for (int round = 0; round < 40; ++round) {
-      PathScene scene;
-      const GeometryId body =
-          scene.add([&](OctreeBasedCD& each) { return each.addAnalyticalGeometry(shape); });
-      const Matrix3d turn = randomTurn(random);
-      const Vector3d shift = randomPoint(random, 0, 1);
-      scene.change([&](OctreeBasedCD& each) { each.setTransform(body, {turn, shift}); });
-      const double radius = round % 4 == 0 ? 0.0 : uniform(random, 0, 0.2);
-      const Positions path = randomPath(random, round % 3 ? 0.7 : 2.0, 2 + round % 4);
-      const Answer found = expectSamples(scene, body, false, path, radius);
-      for (const PathInterval& interval : found.inside) {
-        EXPECT_EQ(interval.entryElement, kNoElement);
-        EXPECT_EQ(interval.exitElement, kNoElement);
-      }
-      intervals += found.inside.size();
-      clearances += found.outside.size();
-      ASSERT_FALSE(::testing::Test::HasFailure()) << shape.index() << ", round " << round;
-    }
-  EXPECT_GT(intervals, 100u);
-  EXPECT_GT(clearances, 50u);
 }
 
 /// A case with an exact answer.
@@ -395,22 +358,26 @@ TEST(Path, EntryAndExitElementsAreThoseThatThePathMeets) {
   OctreeBasedCD collisions;
   const Mesh mesh = cube(0, 2);
   const GeometryId body = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
-  const SpatialQueries queries = collisions.queries();
-  const auto elements = [&](const Positions& path, double radius) {
-    const Answer found = follow(queries, path, radius, {body});
-    EXPECT_EQ(found.inside.size(), 1u);
-    return std::pair(found.inside[0].entryElement, found.inside[0].exitElement);
-  };
-  const auto none = kNoElement;
-  EXPECT_EQ(elements({{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0), std::pair(0u, 3u));
-  EXPECT_EQ(elements({{-1, 1, 1}, {3, 1, 1}}, 0.0), std::pair(0u, 2u));  // lowest of two
-  EXPECT_EQ(elements({{1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0), std::pair(none, 3u));
-  EXPECT_EQ(elements({{-1, 0.5, 1}, {1, 0.5, 1}}, 0.0), std::pair(0u, none));
-  EXPECT_EQ(elements({{1, 1, 1}, {1.5, 1, 1}}, 0.0), std::pair(none, none));
-  EXPECT_EQ(elements({{0, 0.5, 1}, {1, 0.5, 1}}, 0.0), std::pair(0u, none));
-  EXPECT_EQ(elements({{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.125), std::pair(0u, 3u));
-  EXPECT_EQ(elements({{1, 1, 1}, {1.5, 1, 1}}, 0.25), std::pair(none, none));
-  EXPECT_EQ(elements({{-0.125, 0.5, 1}, {1, 0.5, 1}}, 0.25), std::pair(none, none));
+  constexpr std::uint32_t none = kNoElement;
+  const struct {
+    Positions path;
+    double radius;
+    std::uint32_t entry, exit;
+  } cases[] = {{{{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0, 0, 3},
+               {{{-1, 1, 1}, {3, 1, 1}}, 0.0, 0, 2},  // lowest of two
+               {{{1, 0.5, 1}, {3, 0.5, 1.25}}, 0.0, none, 3},
+               {{{-1, 0.5, 1}, {1, 0.5, 1}}, 0.0, 0, none},
+               {{{1, 1, 1}, {1.5, 1, 1}}, 0.0, none, none},
+               {{{0, 0.5, 1}, {1, 0.5, 1}}, 0.0, 0, none},
+               {{{-1, 0.5, 1}, {3, 0.5, 1.25}}, 0.125, 0, 3},
+               {{{1, 1, 1}, {1.5, 1, 1}}, 0.25, none, none},
+               {{{-0.125, 0.5, 1}, {1, 0.5, 1}}, 0.25, none, none}};
+  for (const auto& [path, radius, entry, exit] : cases) {
+    const Answer found = follow(collisions.queries(), path, radius, {body});
+    ASSERT_EQ(found.inside.size(), 1u);
+    EXPECT_EQ(found.inside[0].entryElement, entry);
+    EXPECT_EQ(found.inside[0].exitElement, exit);
+  }
 }
 
 TEST(Path, KnownPathsThroughNestedAndOverlappingBodies) {
@@ -464,7 +431,7 @@ TEST(Path, PathsThatTurnOnTheSurfaceEnterThere) {
   const Mesh ball = sphere(10, 14, {0.5, 0.5, 0.5}, 0.4);
   TestGeometry open = testGeometry(ball);
   open.triangles.erase(open.triangles.begin());
-  PathScene scene;
+  Both scene;
   const GeometryId closed = scene.add(ball), holed = scene.add(open);
   const SpatialQueries queries = scene.octree.queries();
   for (int round = 0; round < 500; ++round) {
@@ -516,23 +483,6 @@ TEST(Path, OrdersIntervalsByEntryAndClearancesByBody) {
   EXPECT_EQ(found.outside[2].nearest.element, kNoElement);
   const Answer again = follow(queries, {{-1, 1.5, 1.5}, {4, 1.5, 1.5}}, 0.0, {same, left});
   EXPECT_EQ(again.inside[0].body, same);
-}
-
-TEST(Path, LongPathsAgreeWithBruteForce) {
-  Random random(307);
-  PathScene scene;
-  for (const TestGeometry& geometry :
-       {testGeometry(sphere(14, 20, {0.5, 0.5, 0.5}, 0.4)), testGeometry(sheet(10, 0.5, 0.0)),
-        tapered(random, thread(random, 80, 0.1, 0.01, false), 0.03)})
-    scene.add(geometry);
-  for (const double radius : {0.0, 0.001, 0.05}) {
-    Positions path{{0.5, 0.5, 0.5}};
-    for (int i = 0; i < 300; ++i) path.push_back(randomPoint(random, 0, 1));
-    const Answer found = follow(scene.octree.queries(), path, radius, scene.bodies),
-                 truth = follow(scene.bruteForce.queries(), path, radius, scene.bodies);
-    EXPECT_GT(found.inside.size(), 5u);
-    EXPECT_TRUE(areEqual(found, truth));
-  }
 }
 
 TEST(Path, BadCallsThrowErrorsThatNameThemAndChangeNothing) {

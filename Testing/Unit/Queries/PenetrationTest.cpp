@@ -141,23 +141,38 @@ TEST(Penetration, TheTranslationSeparatesBodiesOfAllKinds) {
   EXPECT_GE(intersecting, leastOf(60));
 }
 
-TEST(Penetration, APlacedBodyIsSeparatedByItsTranslation) {
+/// A power of two scales the answer. A body far from the origin, or placed there, is separated up
+/// to rounding.
+TEST(Penetration, BodiesOfAnySizePlacedAnywhereAreSeparated) {
+  const Mesh a = torusMesh(12, 6), b = moved(sphere(6, 8, {0, 0, 0}, 1.0), {0.6, 0.3, 0.2});
+  const Penetration one = Bodies(a, b).penetration();
+  for (const double factor : {0x1p-300, 0x1p40, 0x1p300}) {
+    const Penetration p = Bodies(scaledBy(a, factor), scaledBy(b, factor)).penetration();
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_NEAR(p.depth / factor, one.depth, 1e-9);
+    EXPECT_EQ(p.minimal, one.minimal);
+  }
   Random random(2);
   for (int i = 0; i < 20; ++i) {
-    const Mesh a = torusMesh(12, 6), b = sphere(6, 8, {0, 0, 0}, 1.0);
-    const Matrix3d turn = randomTurn(random);
-    const Vector3d shift = randomPoint(random, 100, 101), place = shift + Vector3d(0.6, 0.3, 0.2);
-    Bodies bodies(a, b);
-    bodies.collisions.setTransform(bodies.a, {turn, shift});
-    bodies.collisions.setTransform(bodies.b, {Matrix3d::Identity(), place});
+    const Pose pose{randomTurn(random), Vector3d::Constant(100)};
+    const auto placedMesh = [&](const Mesh& mesh) {
+      return Mesh{placed(mesh.positions, pose.rotation, pose.translation), mesh.triangles};
+    };
+    const Mesh placedA = placedMesh(a), placedB = placedMesh(b);
+    Bodies bodies(a, i % 2 ? b : placedB);
+    bodies.collisions.setTransform(bodies.a, pose);
+    if (i % 2) bodies.collisions.setTransform(bodies.b, pose);
     const Penetration p = bodies.penetration();
     ASSERT_TRUE(p.intersecting);
-    const auto at = [](const Mesh& mesh, const Matrix3d& r, const Vector3d& t) {
-      return Mesh{placed(mesh.positions, r, t), mesh.triangles};
-    };
-    const Mesh fixed = at(b, Matrix3d::Identity(), place);
-    EXPECT_FALSE(areApart(at(a, turn, shift), fixed));
-    EXPECT_TRUE(areApart(at(a, turn, shift + p.depth * p.direction), fixed));
+    EXPECT_FALSE(areApart(placedA, placedB));
+    EXPECT_TRUE(areApart(moved(placedA, p.depth * p.direction), placedB));
+  }
+  for (const double far : {1e6, -1e9}) {
+    const Mesh p = moved(cube(0, 1), Vector3d::Constant(far)), q = moved(p, {0.75, 0, 0});
+    const Penetration found = Bodies(p, q).penetration();
+    ASSERT_TRUE(found.intersecting);
+    EXPECT_NEAR(found.depth, 0.25, 1e-11 * std::abs(far));
+    EXPECT_TRUE(areApart(moved(p, found.depth * found.direction), q));
   }
 }
 
@@ -251,6 +266,7 @@ TEST(Penetration, BodiesThatOnlyTouchDoNotIntersect) {
   expectApart(unit, moved(unit, {1, 1, 1}));            // a corner
   expectApart(unit, moved(unit, {1 + 1e-12, 0, 0}));    // apart
   expectApart(unit, boxMesh({-1, -1, -1}, {2, 2, 0}));  // on a larger face
+  expectApart(unit, Mesh{});
   Random random(5);
   const Solid solid = bracket(random);
   OctreeBasedCD collisions;
@@ -283,17 +299,6 @@ TEST(Penetration, ABodyInsideAnotherIntersectsItUnlessItIsInAHollow) {
   expectApart(hollow, inner);
 }
 
-/// Of a ball among many plates, which fits between none, the way along the stack is shortest.
-TEST(Penetration, LayersAreLeftByTheShortWay) {
-  Mesh plates;
-  for (int i = 0; i < 300; ++i) append(plates, boxMesh({-600, -600, i - 0.3}, {600, 600, i + 0.3}));
-  const Mesh ball = moved(sphere(8, 10, {0, 0, 0}, 0.9), {0, 0, 150.2});
-  const Penetration p = Bodies(ball, plates).penetration();
-  ASSERT_TRUE(p.intersecting);
-  EXPECT_LE(p.depth, 1.5 * 150);
-  EXPECT_FALSE(Bodies(moved(ball, p.depth * p.direction), plates).penetration().intersecting);
-}
-
 /// How often a search asks for the time, which it does in proportion to its work.
 std::size_t workOf(const Mesh& first, const Mesh& second) {
   const Threads thread(1);
@@ -315,16 +320,20 @@ std::size_t workOf(const Mesh& first, const Mesh& second) {
   return asked;
 }
 
-/// The search along directions that cannot become better ends after a share of the triangles.
-TEST(Penetration, LayersCostInProportionToTheirTriangles) {
-  const Mesh ball = sphere(8, 10, {0, 0, 0}, 0.9);
+/// Of a ball among many plates, which fits between none, the way along the stack is shortest. The
+/// search along directions that cannot become better ends after a share of the triangles.
+TEST(Penetration, LayersAreLeftByTheShortWayAtACostInProportionToTheirTriangles) {
   for (const int count : {100, 300}) {
     Mesh plates;
+    const double half = 2.0 * count;
     for (int i = 0; i < count; ++i)
-      append(plates,
-             boxMesh({-2.0 * count, -2.0 * count, i - 0.3}, {2.0 * count, 2.0 * count, i + 0.3}));
-    EXPECT_LE(workOf(moved(ball, {0, 0, count / 2 + 0.2}), plates),
-              40000 + 25 * plates.triangles.size());
+      append(plates, boxMesh({-half, -half, i - 0.3}, {half, half, i + 0.3}));
+    const Mesh ball = moved(sphere(8, 10, {0, 0, 0}, 0.9), {0, 0, count / 2 + 0.2});
+    const Penetration p = Bodies(ball, plates).penetration();
+    ASSERT_TRUE(p.intersecting);
+    EXPECT_LE(p.depth, 0.75 * count);
+    EXPECT_FALSE(Bodies(moved(ball, p.depth * p.direction), plates).penetration().intersecting);
+    EXPECT_LE(workOf(ball, plates), 40000 + 25 * plates.triangles.size());
   }
 }
 
@@ -437,28 +446,6 @@ TEST(Penetration, WhatHasNoVolumeIntersectsNothing) {
   }
 }
 
-TEST(Penetration, ScalesWithTheBodies) {
-  const Mesh a = cube(0, 1), b = moved(sphere(6, 8, {0, 0, 0}, 1.0), {1.4, 0.6, 0.5});
-  const Penetration one = Bodies(a, b).penetration();
-  for (const double factor : {0x1p-300, 0x1p40, 0x1p300}) {
-    const Penetration p = Bodies(scaledBy(a, factor), scaledBy(b, factor)).penetration();
-    ASSERT_TRUE(p.intersecting);
-    EXPECT_NEAR(p.depth / factor, one.depth, 1e-9);
-    EXPECT_EQ(p.minimal, one.minimal);
-  }
-}
-
-TEST(Penetration, AFarOriginCostsRoundingOnly) {
-  const Mesh a = cube(0, 1);
-  for (const double far : {1e6, -1e9}) {
-    const Mesh p = moved(a, Vector3d::Constant(far)), q = moved(p, {0.75, 0, 0});
-    const Penetration found = Bodies(p, q).penetration();
-    ASSERT_TRUE(found.intersecting);
-    EXPECT_NEAR(found.depth, 0.25, 1e-11 * std::abs(far));
-    EXPECT_TRUE(areApart(moved(p, found.depth * found.direction), q));
-  }
-}
-
 /// A shape and a mesh in either order: the same answer, reversed.
 Penetration withShape(const Mesh& mesh, const AnalyticalGeometry& shape) {
   OctreeBasedCD collisions;
@@ -551,11 +538,6 @@ TEST(Penetration, RefusesWhatHasNoInside) {
   expect(ErrorCode::NotClosed, "two-sided", bodies.a, sheet, sheet);
   expect(ErrorCode::UnsupportedMethod, "both planes", plane, other, plane);
   expect(ErrorCode::InvalidSettings, "twice", bodies.a, bodies.a, bodies.a);
-}
-
-TEST(Penetration, AnEmptyMeshIntersectsNothing) {
-  Bodies bodies(cube(0, 1), Mesh{});
-  EXPECT_FALSE(bodies.penetration().intersecting);
 }
 
 }  // namespace

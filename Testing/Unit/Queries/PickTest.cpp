@@ -106,17 +106,6 @@ TEST(Pick, IsTheFirstHitOfAllGeometries) {
     }
 }
 
-TEST(Pick, LinesAndPointsWithoutRadius) {
-  const PickScene scene(Engine::Octree);
-  const SpatialQueries queries = scene.collisions.queries();
-  const TestGeometry& line = scene.geometries[4];
-  const auto& [p, q] = line.segments[7];
-  const Vector3d at = 0.75 * line.positions[p] + 0.25 * line.positions[q];
-  const auto found = queries.pick({line.positions[p], at - line.positions[p], 0.0, 1e-9});
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->hit.t, 0.0);
-}
-
 /// Of equally early hits that on the lowest geometry counts.
 TEST(Pick, TiesGoToTheLowestGeometry) {
   OctreeBasedCD collisions;

@@ -1,5 +1,7 @@
+#include "Common/FieldMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Queries/PointDistances.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <gtest/gtest.h>
@@ -12,32 +14,6 @@
 // by bit, and both as rational arithmetic.
 namespace palpate::testing {
 namespace {
-
-/// Points near the geometry, around it and far away, and its own vertices and middles of edges.
-Positions pointsAround(Random& random, const Positions& vertices, std::size_t count) {
-  Positions points;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vector3d &p = vertices[random() % vertices.size()],
-                   &q = vertices[random() % vertices.size()];
-    switch (i % 5) {
-      case 0:
-        points.push_back(p + randomPoint(random, -0.01, 0.01));
-        break;
-      case 1:
-        points.push_back(randomPoint(random, -1, 2));
-        break;
-      case 2:
-        points.push_back(p);
-        break;
-      case 3:
-        points.push_back(0.5 * (p + q));
-        break;
-      default:
-        points.push_back(randomPoint(random, -1e6, 1e6));
-    }
-  }
-  return points;
-}
 
 /// Expects that all queries about the points agree with each other and with brute force.
 void expectSameAnswers(const Both& both, std::span<const Vector3d> points) {
@@ -176,39 +152,42 @@ void expectTrueAnswers(const Both& both, const TestGeometry& geometry, const Pos
   }
 }
 
-TEST(PointDistances, OctreesAnswerAsBruteForceForEveryGeometryType) {
+/// At rest; deformed, over a whole step; and placed near and far.
+TEST(PointDistances, AreThoseOfBruteForceAndExactForEveryGeometryType) {
   Random random(101);
-  for (const TestGeometry& geometry : geometriesOfEveryType(random)) {
+  std::vector<TestGeometry> geometries = geometriesOfEveryType(random);
+  geometries.push_back(testGeometry(soup(random, 40, 0.2)));
+  for (std::size_t i = 0; i < 120; i += 3) {  // without area
+    Positions& p = geometries.back().positions;
+    if (i % 4 == 0) p[i + 1] = p[i];
+    if (i % 4 == 1) p[i + 2] = p[i + 1] = p[i];
+    if (i % 4 == 2) p[i + 2] = p[i] + 0.5 * (p[i + 1] - p[i]);
+    if (i % 4 == 3) p[i + 2] = p[i] + 3 * (p[i + 1] - p[i]);
+  }
+  geometries.back().triangles.push_back({0, 0, 5});  // repeated vertices
+  geometries.back().triangles.push_back({7, 7, 7});
+  std::size_t number = 0;
+  for (const TestGeometry& geometry : geometries) {
     Both both(geometry);
-    expectSameAnswers(both, pointsAround(random, geometry.positions, casesOf(80)));
-    expectTrueAnswers(both, geometry, geometry.positions,
-                      pointsAround(random, geometry.positions, casesOf(10)));
-    // Deformed: refitted trees; and over a whole step.
+    const std::vector<Triangle> elements = geometry.elements();
+    const auto test = [&](const Positions& now) {
+      expectSameAnswers(both, hardPoints(random, now, elements, casesOf(48)));
+      expectTrueAnswers(both, geometry, now, hardPoints(random, now, elements, casesOf(8)));
+    };
+    test(geometry.positions);
     const Positions now = moved(random, geometry.positions, 0.05);
     both.change([&](OctreeBasedCD& each) {
       each.addCollisionPair(both.id, both.id, {.thickness = 0.01});
       each.setPositions(both.id, geometry.positions, now);
     });
-    expectSameAnswers(both, pointsAround(random, now, casesOf(80)));
-    expectTrueAnswers(both, geometry, now, pointsAround(random, now, casesOf(5)));
-  }
-}
-
-TEST(PointDistances, PlacedBodiesNearAndFar) {
-  Random random(102);
-  TestGeometry ball = testGeometry(sphere(8, 12, {0.5, 0.5, 0.5}, 0.4));
-  for (const double far : {0.0, 1e3, 1e12}) {
-    Both both(ball);
+    test(now);
     const Matrix3d turn = randomTurn(random);
-    const Vector3d shift(far, -2 * far, 0.3);
-    both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, shift}); });
-    const Positions world = placed(ball.positions, turn, shift);
-    Positions points = pointsAround(random, world, casesOf(100));
-    for (Vector3d& p : points)
-      if (p.cwiseAbs().maxCoeff() < 3) p += shift;
-    expectSameAnswers(both, points);
-    points.resize(static_cast<std::size_t>(casesOf(100) / 5));
-    expectTrueAnswers(both, ball, world, points);
+    const double far = std::array{0.0, 1e3, 1e12}[number++ % 3];
+    both.change([&](OctreeBasedCD& each) {
+      each.removeCollisionPair(both.id, both.id);
+      each.setTransform(both.id, {turn, {far, -2 * far, 0.3}});
+    });
+    test(placed(now, turn, {far, -2 * far, 0.3}));
   }
 }
 
@@ -229,7 +208,7 @@ TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
     const Matrix3d turn = randomTurn(random) * stretch;
     both.change([&](OctreeBasedCD& each) { each.setTransform(both.id, {turn, -(turn * far)}); });
     const Positions world = placed(farAway.positions, turn, -(turn * far));
-    expectSameAnswers(both, pointsAround(random, world, casesOf(300, 60)));
+    expectSameAnswers(both, hardPoints(random, world, farAway.triangles, casesOf(300, 60)));
     std::size_t hits = 0, overlaps = 0;
     std::vector<std::uint32_t> found, truth;
     for (int i = 0; i < casesOf(700, 150); ++i) {
@@ -248,26 +227,6 @@ TEST(PointDistances, InexactRotationsFarFromTheBodysOrigin) {
     EXPECT_GE(hits, leastOf(200, 40));
     EXPECT_GE(overlaps, leastOf(500, 100));
   }
-}
-
-TEST(PointDistances, SurfacesOfTetrahedralMeshes) {
-  Random random(105);
-  Solid solid = cells(3, random, [](const auto& c) { return c[0] != 1 || c[1] == 0; });
-  Both both([&](OctreeBasedCD& each) {
-    return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-  });
-  const auto surface = both.octree.surface(both.id).triangles;
-  const TestGeometry triangles{
-      GeometryType::Triangles, solid.positions, {surface.begin(), surface.end()}, {}};
-  Positions points;
-  for (int i = 0; i < casesOf(60); ++i) points.push_back(0.5 * onLattice(random, 9));  // many ties
-  expectSameAnswers(both, points);
-  expectTrueAnswers(both, triangles, solid.positions, points);
-  const Positions now = moved(random, solid.positions, 0.2);
-  both.change([&](OctreeBasedCD& each) { each.setPositions(both.id, now); });
-  points = pointsAround(random, now, casesOf(60));
-  expectSameAnswers(both, points);
-  expectTrueAnswers(both, triangles, now, points);
 }
 
 /// Every coordinate is a small integer, so that many elements are equally near.
@@ -345,24 +304,6 @@ TEST(PointDistances, NearlyEqualDistancesAreDecidedExactly) {
   }
 }
 
-TEST(PointDistances, TrianglesWithoutAreaAreWhatTheyAre) {
-  Random random(107);
-  TestGeometry geometry = testGeometry(soup(random, 40, 0.2));
-  for (std::size_t i = 0; i < 120; i += 3) {
-    Positions& p = geometry.positions;
-    if (i % 4 == 0) p[i + 1] = p[i];
-    if (i % 4 == 1) p[i + 2] = p[i + 1] = p[i];
-    if (i % 4 == 2) p[i + 2] = p[i] + 0.5 * (p[i + 1] - p[i]);
-    if (i % 4 == 3) p[i + 2] = p[i] + 3 * (p[i + 1] - p[i]);
-  }
-  geometry.triangles.push_back({0, 0, 5});  // repeated vertices
-  geometry.triangles.push_back({7, 7, 7});
-  const Both both(geometry);
-  const Positions points = pointsAround(random, geometry.positions, casesOf(60));
-  expectSameAnswers(both, points);
-  expectTrueAnswers(both, geometry, geometry.positions, points);
-}
-
 /// A segment without length is a ball of its larger radius, in every query.
 TEST(PointDistances, SegmentsWithoutLengthHaveTheirLargerRadius) {
   for (const Segment& segment : {Segment{0, 1}, Segment{1, 0}}) {
@@ -396,10 +337,9 @@ TEST(PointDistances, ShapesHaveTheirClosestPoints) {
   Random random(108);
   for (const AnalyticalGeometry& geometry : shapesOfEveryKind(random)) {
     const MeasuredShape shape{geometry, randomTurn(random), randomPoint(random, -1, 1)};
-    const Both both([&](OctreeBasedCD& each) {
-      const GeometryId id = each.addAnalyticalGeometry(geometry);
-      each.setTransform(id, {shape.rotation, shape.translation});
-      return id;
+    Both both(geometry);
+    both.change([&](OctreeBasedCD& each) {
+      each.setTransform(both.id, {shape.rotation, shape.translation});
     });
     const SpatialQueries queries = both.octree.queries();
     Positions points;
@@ -423,6 +363,41 @@ TEST(PointDistances, ShapesHaveTheirClosestPoints) {
       if (most > 0) {
         EXPECT_FALSE(queries.closestPoint(both.id, points[i], std::nextafter(most, 0)));
       }
+    }
+  }
+}
+
+TEST(PointDistances, ARoughlyNearestTriangleIsWithinItsTolerance) {
+  Random random(2);
+  for (const auto& [name, mesh] : fieldMeshes(random)) {
+    SCOPED_TRACE(name);
+    OctreeBasedCD collisions;
+    const GeometryId id = collisions.addTriangleMesh(mesh.positions, mesh.triangles);
+    Body geometry(id);
+    geometry.mesh.now = Positions(mesh.positions);
+    geometry.mesh.before = geometry.mesh.now;
+    geometry.mesh.topology.vertexCount = mesh.positions.size();
+    geometry.mesh.topology.elements.assign(mesh.triangles.begin(), mesh.triangles.end());
+    geometry.revisions.elements.topology = geometry.revisions.counter.next();
+    const Threads threads(1);
+    const double spread =
+        geometry.tree.sampleFrame(geometry.mesh, geometry.revisions.elements.topology);
+    geometry.tree.update(geometry.mesh, geometry.revisions.elements.topology, frameScale(spread),
+                         {}, threads);
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& p : mesh.positions) box.extend(p);
+    const double size = box.diagonal().norm();
+    for (int i = 0; i < casesOf(1000); ++i) {
+      Vector3d p = box.center() + randomPoint(random, -1, 1) * size;
+      if (i % 4 == 0) p = mesh.positions[random() % mesh.positions.size()];
+      std::array<std::uint32_t, 8> likely;
+      for (std::uint32_t& place : likely)
+        place = static_cast<std::uint32_t>(random() % mesh.triangles.size());
+      const auto near = PointDistances(geometry, p, false)
+                            .roughlyNearest(1e-9 * size, std::span(likely).first(random() % 9));
+      const double exact = collisions.queries().closestPoint(id, p)->distance;
+      ASSERT_NEAR(near.distance, exact, 1e-9 * size);
+      ASSERT_LT(near.place, mesh.triangles.size());
     }
   }
 }

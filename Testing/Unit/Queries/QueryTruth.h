@@ -8,9 +8,12 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 /// What the tests of queries share: one geometry in both engines, and what queries answer in
@@ -158,6 +161,91 @@ inline TestGeometry latticeSoup(Random& random, std::uint32_t triangles, unsigne
   for (std::uint32_t t = 0; t < triangles; ++t)
     soup.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
   return soup;
+}
+
+/// Triangles in general position, on a lattice, without area, far away and twice; lines and points.
+inline std::vector<TestGeometry> hardGeometries(Random& random) {
+  std::vector<TestGeometry> all{testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4)),
+                                testGeometry(soup(random, 100, 0.2)),
+                                latticeSoup(random, 60, 4),
+                                testGeometry(sheet(8, 0.5, 0.0)),
+                                thread(random, 80, 0.1, 0.0, true),
+                                particles(random, 60, 0.0)};
+  all.push_back(all[0]);
+  for (Vector3d& p : all.back().positions) p += Vector3d(1e3, -2e3, 5e2);
+  all.push_back(all[1]);
+  for (std::size_t i = 0; i < 300; i += 9) {
+    Positions& p = all.back().positions;
+    p[i + 2] = i % 2 ? p[i] : Vector3d(2 * p[i + 1] - p[i]);
+  }
+  all.push_back(all[0]);
+  all.back().triangles.insert(all.back().triangles.end(), all[0].triangles.begin(),
+                              all[0].triangles.end());
+  return all;
+}
+
+/// Rays through vertices, middles of edges, along edges, in planes of triangles, parallel to axes,
+/// from far away, and others.
+inline Ray hardRay(Random& random, const Positions& positions, std::span<const Triangle> elements) {
+  const auto corner = [&] { return positions[elements[random() % elements.size()][random() % 3]]; };
+  const Triangle& t = elements[random() % elements.size()];
+  const Vector3d p = positions[t[0]], q = positions[t[1]], r = positions[t[2]];
+  Ray ray{p + randomPoint(random, -2, 2), randomPoint(random, -1, 1)};
+  switch (random() % 8) {
+    case 0:
+      ray.direction = corner() - ray.origin;
+      break;
+    case 1:
+      ray.direction = 0.5 * (p + q) - ray.origin;
+      break;
+    case 2:  // along an edge
+      ray = {p - 2 * (q - p), q - p};
+      break;
+    case 3:  // in the plane of a triangle
+      ray = {p + (p - q) + 0.5 * (p - r), (q - p) + 0.5 * (r - q)};
+      break;
+    case 4:  // from one vertex to another
+      ray.origin = corner();
+      ray.direction = corner() - ray.origin;
+      break;
+    case 5:
+      ray.direction = Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
+      ray.origin = 0.5 * corner();
+      ray.origin += 0.5 * corner();
+      break;
+    case 6:
+      ray.origin += 500 * randomPoint(random, -1, 1);
+      ray.direction = corner() - ray.origin;
+      break;
+    default:
+      break;
+  }
+  if (ray.direction == Vector3d::Zero()) ray.direction = {1, 0, 0};
+  return ray;
+}
+
+/// Points on vertices, edges and faces, near them, around the geometry and far away.
+inline Positions hardPoints(Random& random, const Positions& positions,
+                            std::span<const Triangle> elements, int count) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& p : positions) box.extend(p);
+  const double size = box.sizes().maxCoeff();
+  Positions points;
+  for (int i = 0; i < count; ++i) {
+    const Triangle& t = elements[random() % elements.size()];
+    const Vector3d a = positions[t[0]], b = positions[t[1]], c = positions[t[2]],
+                   aside = size * randomPoint(random, -1, 1);
+    const Vector3d all[] = {a,
+                            0.5 * (a + b),
+                            0.25 * a + 0.25 * b + 0.5 * c,
+                            0.3 * a + 0.5 * b + 0.2 * c + 1e-3 * aside,
+                            a + 0.025 * aside,
+                            box.center() + 0.6 * aside,
+                            box.center() + aside,
+                            box.center() + 1e6 * aside};
+    points.push_back(all[i % 8]);
+  }
+  return points;
 }
 
 /// The squared distance of a point from an element.

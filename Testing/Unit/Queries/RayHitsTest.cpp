@@ -50,7 +50,7 @@ std::size_t expectExact(const Both& both, const Positions& positions,
   return hits.size();
 }
 
-/// The same ray with its range cut at hits, between them and beyond.
+/// A ray with its range cut at hits, between them and beyond.
 std::vector<Ray> withRanges(const Both& both, Ray ray) {
   std::vector<Ray> rays{ray};
   ray.tMin = -kInfinity;
@@ -76,41 +76,6 @@ std::vector<Ray> withRanges(const Both& both, Ray ray) {
   return rays;
 }
 
-/// Rays through vertices, middles of edges, along edges, in planes of triangles, and others.
-Ray hardRay(Random& random, const Positions& positions, std::span<const Triangle> elements) {
-  const auto corner = [&] { return positions[elements[random() % elements.size()][random() % 3]]; };
-  const Triangle& t = elements[random() % elements.size()];
-  const Vector3d p = positions[t[0]], q = positions[t[1]], r = positions[t[2]];
-  Ray ray{randomPoint(random, -1, 2), randomPoint(random, -1, 1)};
-  switch (random() % 7) {
-    case 0:
-      ray.direction = corner() - ray.origin;
-      break;
-    case 1:
-      ray.direction = 0.5 * (p + q) - ray.origin;
-      break;
-    case 2:  // along an edge
-      ray = {p - 2 * (q - p), q - p};
-      break;
-    case 3:  // in the plane of a triangle
-      ray = {p + (p - q) + 0.5 * (p - r), (q - p) + 0.5 * (r - q)};
-      break;
-    case 4:  // from one vertex to another
-      ray.origin = corner();
-      ray.direction = corner() - ray.origin;
-      break;
-    case 5:  // parallel to an axis
-      ray.direction = Vector3d::Unit(static_cast<Eigen::Index>(random() % 3));
-      ray.origin = 0.5 * corner();
-      ray.origin += 0.5 * corner();
-      break;
-    default:
-      break;
-  }
-  if (ray.direction == Vector3d::Zero()) ray.direction = {1, 0, 0};
-  return ray;
-}
-
 TEST(RayHits, AreThoseOfRationalArithmeticOnALattice) {
   Random random(201);
   std::size_t hits = 0;
@@ -133,28 +98,13 @@ TEST(RayHits, AreThoseOfRationalArithmeticOnALattice) {
 
 TEST(RayHits, AreThoseOfRationalArithmeticForEveryGeometryType) {
   Random random(202);
-  std::vector<TestGeometry> geometries{
-      testGeometry(sphere(8, 10, {0.5, 0.5, 0.5}, 0.4)), testGeometry(soup(random, 100, 0.2)),
-      testGeometry(sheet(8, 0.5, 0.0)), thread(random, 80, 0.1, 0.0, true),
-      particles(random, 60, 0.0)};
-  geometries.push_back(geometries[0]);  // far from the origin
-  for (Vector3d& p : geometries.back().positions) p += Vector3d(1e3, -2e3, 5e2);
-  geometries.push_back(geometries[1]);  // with triangles without area
-  for (std::size_t i = 0; i < 300; i += 9) {
-    Positions& p = geometries.back().positions;
-    p[i + 2] = i % 2 ? p[i] : Vector3d(2 * p[i + 1] - p[i]);
-  }
-  for (const TestGeometry& geometry : geometries) {
-    const Vector3d shift =
-        &geometry == &geometries[5] ? Vector3d(1e3, -2e3, 5e2) : Vector3d(0, 0, 0);
+  for (const TestGeometry& geometry : hardGeometries(random)) {
     Both both(geometry);
     const std::vector<Triangle> elements = geometry.elements();
     std::size_t hits = 0;
     const auto test = [&](const Positions& now, int count) {
       for (int i = 0; i < count; ++i) {
-        Ray ray = hardRay(random, now, elements);
-        if (ray.origin.norm() < 10) ray.origin += shift;
-        for (const Ray& each : withRanges(both, ray))
+        for (const Ray& each : withRanges(both, hardRay(random, now, elements)))
           hits += expectExact(both, now, elements, each);
         ASSERT_FALSE(HasFailure()) << i;
       }
@@ -217,9 +167,7 @@ TEST(RayHits, CrossWhereTheRayChangesSide) {
       if (filled) full.insert(c);
       return filled;
     });
-    const Both both([&](OctreeBasedCD& each) {
-      return each.addTetrahedralMesh(solid.positions, solid.tetrahedra);
-    });
+    const Both both(solid);
     const auto surface = both.octree.surface(both.id);
     const std::vector<Triangle> triangles(surface.triangles.begin(), surface.triangles.end());
     const auto isInside = [&](const oracle::Vector& p) {  // p is not on the surface
