@@ -105,26 +105,21 @@ TEST_F(AuditFiles, FaultIsListedAndWrittenToAFileThatReplaysIt) {
   EXPECT_TRUE(faulty.auditFailures().empty());
 }
 
-TEST_F(AuditFiles, ExistingFilesAreKept) {
+TEST_F(AuditFiles, ExistingFilesAreKeptAndNoneIsWrittenWithoutAFolder) {
   const fs::path first = m_folder / "frame1-pair0-1.capture",
                  second = m_folder / "frame1-pair0-1-2.capture";
   std::ofstream(first) << "precious";
-  OctreeBasedCD faulty = detection(everything());
-  faultyFrame(faulty);
-  ASSERT_FALSE(faulty.auditFailures().empty());
-  EXPECT_EQ(faulty.auditFailures().front().file, second);
+  for (const bool hasFolder : {true, false}) {
+    OctreeBasedCD faulty = detection(hasFolder ? everything() : AuditSettings{.features = 1 << 20});
+    faultyFrame(faulty);
+    ASSERT_FALSE(faulty.auditFailures().empty());
+    for (const AuditFailure& failure : faulty.auditFailures()) {
+      EXPECT_EQ(failure.file, hasFolder ? second : fs::path());
+      EXPECT_EQ(failure.fileError, "");
+    }
+  }
   EXPECT_EQ(fs::file_size(first), 8u);
   EXPECT_NO_THROW(readCapture(second));
-}
-
-TEST_F(AuditFiles, WithoutAFolderNoFileIsWritten) {
-  OctreeBasedCD faulty = detection({.features = 1 << 20});
-  faultyFrame(faulty);
-  ASSERT_FALSE(faulty.auditFailures().empty());
-  for (const AuditFailure& failure : faulty.auditFailures()) {
-    EXPECT_TRUE(failure.file.empty());
-    EXPECT_EQ(failure.fileError, "");
-  }
 }
 
 TEST_F(AuditFiles, AtMostMaxFilesAreWrittenAndARemovedFolderIsNamed) {
@@ -155,6 +150,8 @@ TEST_F(AuditFiles, MissingFolderThrowsAnErrorThatNamesIt) {
   for (const fs::path& folder : {m_folder / "missing", fs::path("/dev/null")})
     testing::expectRefused(ErrorCode::InvalidSettings, folder.string(),
                            [&] { detection({.features = 1, .folder = folder}); });
+  testing::expectRefused(ErrorCode::InvalidSettings, "audit.features is -1",
+                         [&] { detection({.features = -1}); });
   EXPECT_THROW(detection({.features = 1, .maxFiles = -1}), Error);
 }
 

@@ -3,7 +3,6 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/PairTable.h"
-#include "Common/ExpectRefused.h"
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
@@ -64,7 +63,7 @@ struct AuditedPair {
 
 /// Two meshes in contact, their contacts, and the internal function that audits other contacts than
 /// these.
-struct Scene {
+struct AuditedScene {
   Mesh first, second;
   PairSettings settings;
   bool self;
@@ -72,7 +71,7 @@ struct Scene {
   AuditedPair audited{pair, PairKind::Meshes};
   OctreeBasedCD detection{Settings{.threads = 1}};
 
-  Scene(Random& random, const PairSettings& pairSettings, bool withItself)
+  AuditedScene(Random& random, const PairSettings& pairSettings, bool withItself)
       : first(testing::soup(random, 30, 0.3)),
         second(testing::soup(random, 30, 0.3)),
         settings(pairSettings),
@@ -107,12 +106,12 @@ void forEachScene(F&& f) {
   for (const PairSettings& settings : kPairSettings)
     for (const bool self : {false, true}) {
       SCOPED_TRACE(static_cast<int>(settings.method) * 10 + self);
-      Scene scene(random, settings, self);
+      AuditedScene scene(random, settings, self);
       f(scene);
     }
 }
 
-void expectOne(const std::vector<AuditFailure>& failures, const Scene& scene, Fault fault,
+void expectOne(const std::vector<AuditFailure>& failures, const AuditedScene& scene, Fault fault,
                List list, const AuditFailure::Contact& expected,
                const AuditFailure::Contact& found) {
   ASSERT_EQ(failures.size(), 1u);
@@ -136,7 +135,7 @@ void rename(ElementPair& pair) { pair = {28, 29}; }
 /// Removes each contact of a list in turn, or changes it, or adds another one beside it. It must be
 /// the only failure.
 template <class Contact>
-void expectEachFault(const Scene& scene, List list,
+void expectEachFault(const AuditedScene& scene, List list,
                      CountedVector<Contact> CollisionData::Contents::*member) {
   const CollisionData::Contents good = scene.found();
   for (std::size_t i = 0; i < (good.*member).size(); ++i) {
@@ -197,7 +196,7 @@ TEST(Audit, FindsFaultsBetweenTwoShapes) {
 
 TEST(Audit, FindsEachRemovedAddedOrChangedContact) {
   std::size_t contacts = 0, ofTriangles = 0;
-  forEachScene([&](const Scene& scene) {
+  forEachScene([&](const AuditedScene& scene) {
     EXPECT_TRUE(scene.failures(scene.found()).empty());
     expectEachFault(scene, List::VertexTriangle, &CollisionData::Contents::vertexTriangle);
     expectEachFault(scene, List::TriangleVertex, &CollisionData::Contents::triangleVertex);
@@ -219,7 +218,7 @@ TEST(Audit, FindsEachRemovedAddedOrChangedContact) {
 
 TEST(Audit, FindsAnImpactBeforeTheEarliest) {
   Random random(4);
-  const Scene scene(
+  const AuditedScene scene(
       random,
       {.method = Method::Continuous, .thickness = 0.001, .continuous = {.earliestTimeOnly = true}},
       false);
@@ -244,7 +243,7 @@ TEST(Audit, FindsAnImpactBeforeTheEarliest) {
 }
 
 TEST(Audit, SmallSamplesFindAFaultWithinSomeFrames) {
-  forEachScene([&](const Scene& scene) {
+  forEachScene([&](const AuditedScene& scene) {
     CollisionData::Contents faulty = scene.found();
     const bool byTriangles = scene.settings.method == Method::Intersection;
     if (byTriangles)
@@ -264,7 +263,7 @@ TEST(Audit, SmallSamplesFindAFaultWithinSomeFrames) {
 }
 
 /// The vertices of triangles that intersect the other mesh, at the start or at the end.
-std::array<std::set<std::uint32_t>, 2> intersectingVertices(const Scene& scene) {
+std::array<std::set<std::uint32_t>, 2> intersectingVertices(const AuditedScene& scene) {
   std::array<std::set<std::uint32_t>, 2> vertices;
   for (const bool atStart : {true, false}) {
     OctreeBasedCD detection{Settings{.threads = 1}};
@@ -286,7 +285,7 @@ std::array<std::set<std::uint32_t>, 2> intersectingVertices(const Scene& scene) 
 /// knows.
 TEST(Audit, ComparesWithAutoWhatKnownSidesDoNotConcern) {
   Random random(7);
-  Scene scene(random, {.method = Method::Proximity, .thickness = 0.05}, false);
+  AuditedScene scene(random, {.method = Method::Proximity, .thickness = 0.05}, false);
   PairRecord& record = scene.audited.record;
   record.pair.settings.method = Method::Auto;
   const auto missing = [&](bool sidesAreKnown) {
@@ -325,7 +324,7 @@ std::vector<std::size_t> sizesOf(const FeatureLists& lists) {
 }
 
 TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
-  forEachScene([&](Scene& scene) {
+  forEachScene([&](AuditedScene& scene) {
     const FeatureLists every = everyFeature(*scene.audited.record.question);
     std::size_t all = 0;
     for (const std::size_t size : sizesOf(every)) all += size;
@@ -369,11 +368,6 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
     EXPECT_NE(draw(1, 1, 1), draw(1, 2, 1));
     EXPECT_NE(draw(1, 1, 1), draw(1, 1, 2));
   });
-}
-
-TEST(Audit, RefusesANegativeSample) {
-  testing::expectRefused(ErrorCode::InvalidSettings, "audit.features is -1",
-                         [] { OctreeBasedCD({.audit = {.features = -1}}); });
 }
 
 /// Several triangle pairs may find the same contact of Intersection. One of them is in the sample,
