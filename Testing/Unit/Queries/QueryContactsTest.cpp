@@ -4,7 +4,7 @@
 #include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
-#include "Unit/Queries/QueryTruth.h"
+#include "Unit/Queries/EveryQuery.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -129,29 +129,12 @@ TEST(QueryContacts, RigidMeshesAtThicknessZeroTouch) {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-bool sameContacts(const CollisionData& a, const CollisionData& b) { return a.hash() == b.hash(); }
-
-/// A ball, a sheet, the surface of a placed body, lines and points.
-struct ToolScene {
-  explicit ToolScene(Engine engine = Engine::Octree)
-      : collisions({.engine = engine, .threads = 1}), tool(toolMesh.positions, toolMesh.triangles) {
-    const Mesh ball = sphere(10, 12, {0.5, 0.5, 0.5}, 0.3), plain = sheet(10, 0.5, 0);
-    bodies.push_back(collisions.addTriangleMesh(ball.positions, ball.triangles));
-    bodies.push_back(collisions.addTriangleMesh(plain.positions, plain.triangles));
-    bodies.push_back(collisions.addTriangleMesh(plain.positions, plain.triangles));
-    collisions.setTransform(
-        bodies[2],
-        {Eigen::AngleAxisd(0.5, Vector3d::UnitX()).toRotationMatrix(), {0.1, 0.2, -0.1}});
-    std::vector<Segment> segments;
-    for (std::uint32_t i = 0; i < 40; ++i) segments.push_back({i, i + 1});
-    bodies.push_back(collisions.addLineMesh(plain.positions, segments, 0.02));
-    bodies.push_back(collisions.addPointSet(ball.positions, 0.01));
-  }
+struct ToolScene : QueryScene {
+  explicit ToolScene(Engine engine) : QueryScene(settingsOf(engine)) {}
 
   const Mesh toolMesh = sphere(5, 6, {0, 0, 0}, 0.1);
-  OctreeBasedCD collisions;
-  RigidMesh tool;
-  std::vector<GeometryId> bodies;
+  RigidMesh rigid{toolMesh.positions, toolMesh.triangles};
+  const std::vector<GeometryId> bodies{ball, solid, body, open, line, points};
 };
 
 TEST(RigidMesh, HasTheContactsOfAPair) {
@@ -159,10 +142,9 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
   for (const Engine engine : {Engine::Octree, Engine::BruteForce}) {
     ToolScene scene(engine);
     OctreeBasedCD& collisions = scene.collisions;
-    collisions.setDisabledElements(scene.bodies[1], std::vector<std::uint32_t>{3, 4, 90, 91, 92});
-    collisions.setCollisionFilter(scene.bodies[0], {.sidedness = Sidedness::Outer});
-    const GeometryId tool =
-        collisions.addTriangleMesh(scene.toolMesh.positions, scene.toolMesh.triangles);
+    collisions.setDisabledElements(scene.open, std::vector<std::uint32_t>{3, 4, 90, 91, 92});
+    collisions.setCollisionFilter(scene.ball, {.sidedness = Sidedness::Outer});
+    const GeometryId tool = addTo(collisions, scene.toolMesh);
     for (const GeometryId body : scene.bodies)
       collisions.addCollisionPair(body, tool, {Method::Proximity, kThickness});
     Random random(5);
@@ -170,20 +152,18 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
     CollisionData contacts;
     for (int i = 0; i < (engine == Engine::Octree ? 100 : 20); ++i) {
       const Matrix3d rotation = randomTurn(random);
-      const Vector3d translation = randomPoint(random, 0.1, 0.9);
-      collisions.setTransform(tool, {rotation, translation});
+      const Pose pose{rotation, randomPoint(random, 0.1, 0.9)};
+      collisions.setTransform(tool, pose);
       collisions.detectCollision();
       collisions.publish();
       const auto snapshot = collisions.latestSnapshot();
       for (const GeometryId body : scene.bodies) {
         const CollisionData& expected = collisions.collisionData(body, tool);
-        collisions.queries().contacts(body, scene.tool, {rotation, translation}, kThickness,
-                                      contacts);
-        EXPECT_TRUE(sameContacts(contacts, expected));
-        EXPECT_EQ(contacts.validity().atEnd, expected.validity().atEnd);
-        snapshot->queries().contacts(body, scene.tool, {rotation, translation}, kThickness,
-                                     contacts);
-        EXPECT_TRUE(sameContacts(contacts, expected));
+        for (const SpatialQueries& queries : {collisions.queries(), snapshot->queries()}) {
+          queries.contacts(body, scene.rigid, pose, kThickness, contacts);
+          EXPECT_EQ(contacts.hash(), expected.hash());
+          EXPECT_EQ(contacts.validity().atEnd, expected.validity().atEnd);
+        }
         found += contacts.validity().atEnd;
       }
       collisions.advance();
@@ -193,40 +173,36 @@ TEST(RigidMesh, HasTheContactsOfAPair) {
 }
 
 TEST(RigidMesh, MayBeEmptyOrFarAwayAndRefusesInvalidInput) {
-  ToolScene scene;
+  ToolScene scene(Engine::Octree);
   const SpatialQueries queries = scene.collisions.queries();
   CollisionData out;
   RigidMesh empty({}, {});
-  for (RigidMesh* mesh : {&empty, &scene.tool})
-    for (const GeometryId body : scene.bodies) {
-      queries.contacts(body, *mesh, {Matrix3d::Identity(), {1e9, 0, 0}}, 0.1, out);
-      EXPECT_EQ(out.validity().atEnd, 0u);
-      queries.contacts(body, empty, {Matrix3d::Identity(), {0.5, 0.5, 0.5}}, 0.1, out);
+  for (const GeometryId body : scene.bodies) {
+    queries.contacts(body, scene.rigid, {.translation = {1e9, 0, 0}}, 0.1, out);
+    EXPECT_EQ(out.validity().atEnd, 0u);
+    for (const double x : {0.5, 1e9}) {
+      queries.contacts(body, empty, {.translation = {x, 0.5, 0.5}}, 0.1, out);
       EXPECT_EQ(out.validity().atEnd, 0u);
     }
-  const auto contacts = [&](GeometryId id, const Matrix3d& rotation, double thickness) {
-    queries.contacts(id, scene.tool, {rotation, {0, 0, 0}}, thickness, out);
+  }
+  using enum ErrorCode;
+  const auto refused = [&](ErrorCode code, const char* words, GeometryId id, double scale,
+                           double thickness) {
+    const Matrix3d rotation = scale * Matrix3d::Identity();
+    expectRefused(code, words, [&] {
+      queries.contacts(id, scene.rigid, {rotation, {0, 0, 0}}, thickness, out);
+    });
   };
-  const Matrix3d unit = Matrix3d::Identity();
-  expectRefused(ErrorCode::InvalidTransform, "the query's mesh",
-                [&] { contacts(scene.bodies[0], 2 * unit, 0.1); });
-  expectRefused(ErrorCode::InvalidSettings, "thickness",
-                [&] { contacts(scene.bodies[0], unit, -1); });
-  expectRefused(ErrorCode::InvalidSettings, "thickness",
-                [&] { contacts(scene.bodies[0], unit, kInfinity); });
-  expectRefused(ErrorCode::UnknownGeometry, "geometry 77",
-                [&] { contacts(GeometryId{77}, unit, 0.1); });
+  refused(InvalidTransform, "the query's mesh", scene.ball, 2, 0.1);
+  refused(InvalidSettings, "thickness", scene.ball, 1, -1);
+  refused(InvalidSettings, "thickness", scene.ball, 1, kInfinity);
+  refused(UnknownGeometry, "geometry 77", GeometryId{77}, 1, 0.1);
+  refused(UnsupportedMethod, "is a shape", scene.shape, 1, 0.1);
   const std::vector<Triangle> wrong{{0, 1, 99}};
-  expectRefused(ErrorCode::IndexOutOfRange, "vertex index 99",
+  expectRefused(IndexOutOfRange, "vertex index 99",
                 [&] { RigidMesh(scene.toolMesh.positions, wrong); });
-  const RigidMesh taken = std::move(scene.tool);
-  expectRefused(ErrorCode::InvalidCall, "moved from",
-                [&] { contacts(scene.bodies[0], unit, 0.1); });
-  const GeometryId shape = scene.collisions.addAnalyticalGeometry(Sphere{});
-  scene.tool = RigidMesh(scene.toolMesh.positions, scene.toolMesh.triangles);
-  expectRefused(ErrorCode::UnsupportedMethod, "is a shape", [&] {
-    scene.collisions.queries().contacts(shape, scene.tool, {unit, {0, 0, 0}}, 0.1, out);
-  });
+  const RigidMesh taken = std::move(scene.rigid);
+  refused(InvalidCall, "moved from", scene.ball, 1, 0.1);
 }
 
 }  // namespace
