@@ -6,7 +6,6 @@
 #include "Common/ExpectRefused.h"
 #include "Common/FailingAllocation.h"
 #include "Common/PairRun.h"
-#include "DistanceField/FieldContacts.h"
 #include "Common/FieldMeshes.h"
 
 #include <Eigen/Geometry>
@@ -289,51 +288,6 @@ TEST(AllowedError, FieldsMissNoImpactAndTrianglesAnswerTheOtherSteps) {
   EXPECT_GE(contacts, leastOf(5000, 1000));
   EXPECT_GE(impacts, leastOf(300, 60));
   EXPECT_GE(nearby, leastOf(100, 20));
-}
-
-/// A triangle that slides at a height over a box, by a distance of about that height.
-TEST(AllowedError, FieldsAnswerFromTheDistanceThatIsNeeded) {
-  const Body box = bodyOf(boxMesh({-1, -1, -1}, {1, 1, 1}));
-  const double tolerance = depthToleranceOf(*box.field);
-  for (const double turn : {0.0, 0.7}) {
-    const Matrix3d rotation = AngleAxisd(turn, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-    for (const double motion : {1e-6, 0.01, 0.05})
-      for (const double beyond : {-1e-3, -1e-9, 1e-9, kErrorBound + tolerance - 1e-3,
-                                  2 * kErrorBound + tolerance + 1e-3}) {
-        const double height = 1 + motion + beyond;
-        if (height <= 1) continue;
-        const auto endAt = [&](double x) {
-          return End{
-              {rotation * Vector3d(x - 0.3, -0.2, height),
-               rotation * Vector3d(x + 0.3, -0.2, height), rotation * Vector3d(x, 0.4, height)},
-              rotation,
-              Vector3d::Zero()};
-        };
-        const End before = endAt(-0.5 * motion), now = endAt(0.5 * motion);
-        OctreeBasedCD detection(settingsOf(Engine::Octree));
-        const GeometryId triangle =
-                             detection.addTriangleMesh(now.other, std::vector<Triangle>{{0, 1, 2}}),
-                         body = addMesh(detection, box.mesh);
-        detection.attachDistanceField(body, box.field);
-        PairSettings pair = pairOf(kErrorBound);
-        pair.automatic.motionTolerance = 0.06;
-        detection.addCollisionPair(triangle, body, pair);
-        detection.setTransform(body, {rotation, Vector3d::Zero()}, {rotation, Vector3d::Zero()});
-        detection.setPositions(triangle, before.other, now.other);
-        detection.detectCollision();
-        const Validity& validity = detection.collisionData(triangle, body).validity();
-        const bool byField = validity.reason == MethodReason::AllowedError;
-        if (beyond < 0) {
-          EXPECT_FALSE(byField) << motion << " " << beyond;
-        }
-        if (beyond > 2 * kErrorBound + tolerance) {
-          EXPECT_TRUE(byField) << motion << " " << beyond;
-        }
-        if (!byField) {
-          EXPECT_EQ(validity.reason, MethodReason::Slow);
-        }
-      }
-  }
 }
 
 /// Exact methods answer what a field does not know: filters by side, and inside.

@@ -441,31 +441,5 @@ TEST(ContactLaw, DegenerateCasesMatchTheDefinition) {
   EXPECT_EQ(found, definitions.size());
 }
 
-/// The tip of a spike below a face: a solver that corrects it to a gap of 0.05 brings it above.
-TEST(ContactLaw, ATipBehindAFaceHasANegativeDistance) {
-  const Positions ground{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
-  const Mesh tip = spike({1, 1, -0.1}, 0.5);
-  const std::vector<Triangle> one{{0, 1, 2}};
-  for (const PairSettings& settings :
-       {PairSettings{Method::Intersection}, PairSettings{Method::Auto}}) {
-    const CollisionData contacts =
-        detectCollision({tip.positions, tip.triangles}, {ground, one}, settings);
-    ASSERT_EQ(contacts.vertexTriangle().size(), 1u);
-    const VertexTriangleContact& contact = contacts.vertexTriangle()[0];
-    EXPECT_EQ(contact.vertex, 0u);
-    EXPECT_NEAR(contact.distance, -0.1, 1e-15);
-    EXPECT_EQ(contact.normal, Vector3d::UnitZ());
-    EXPECT_EQ(contact.timeOfImpact, 1.0);
-    EXPECT_EQ(contacts.earliestTimeOfImpact(), 1.0);
-    std::vector<ConstraintRow> rows;
-    appendRows(contacts, {0, tip.positions, tip.positions}, {4, ground, ground}, rows);
-    Positions all = tip.positions;
-    all.insert(all.end(), ground.begin(), ground.end());
-    EXPECT_NEAR(rows[0].gap(all), -0.1, 1e-15);
-    all[0] += (0.05 - rows[0].gap(all)) * rows[0].normal;
-    EXPECT_NEAR(all[0].z(), 0.05, 1e-15);
-  }
-}
-
 }  // namespace
 }  // namespace palpate::testing

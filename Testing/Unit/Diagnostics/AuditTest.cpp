@@ -370,29 +370,5 @@ TEST(Audit, DrawsFeaturesUniformlyBySeedFrameAndPair) {
   });
 }
 
-/// Several triangle pairs may find the same contact of Intersection. One of them is in the sample,
-/// and others are not.
-TEST(Audit, FindsNoFaultInCorrectFrames) {
-  std::size_t number = 0;
-  for (const PairSettings& settings : kPairSettings) {
-    constexpr std::array kFeatures{30, 1 << 20, 1, 0};
-    OctreeBasedCD detection(
-        {.threads = 2, .audit = {.features = kFeatures[number++ % 4], .seed = 1}});
-    const Mesh a = testing::sphere(12, 16, {0, 0, 0}, 1), b = testing::sphere(9, 14, {1, 0, 0}, 1);
-    const GeometryId first = detection.addTriangleMesh(a.positions, a.triangles),
-                     second = detection.addTriangleMesh(b.positions, b.triangles);
-    detection.addCollisionPair(first, second, settings);
-    std::vector<Eigen::Vector3d> now = b.positions;
-    for (int frame = 0; frame < testing::casesOf(20); ++frame) {
-      for (Eigen::Vector3d& p : now) p.y() += 0.01;
-      detection.setPositions(second, now);
-      detection.detectCollision();
-      detection.advance();
-      EXPECT_TRUE(detection.auditFailures().empty());
-      EXPECT_GT(detection.statistics().contacts, 0u);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace palpate

@@ -121,36 +121,6 @@ TEST(RayHits, AreThoseOfRationalArithmeticForEveryGeometryType) {
   }
 }
 
-/// A ray along an edge, or in the plane of triangles, has one hit where it enters them.
-TEST(RayHits, OneHitAlongEdgesAndInPlanes) {
-  const TestGeometry quad{GeometryType::Triangles,
-                          {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
-                          {{0, 1, 2}, {0, 2, 3}},
-                          {}};
-  const Both both(quad);
-  for (const auto& [ray, t, element] : {
-           std::tuple{Ray{{-1, 0, 0}, {1, 0, 0}}, 1.0, 0u},          // along an edge
-           std::tuple{Ray{{-1, -1, 0}, {1, 1, 0}}, 1.0, 0u},         // along the common edge
-           std::tuple{Ray{{2, 2, 0}, {-1, -1, 0}}, 1.0, 0u},         // backwards
-           std::tuple{Ray{{-1, 0.75, 0}, {1, 0, 0}}, 1.0, 1u},       // in the plane of both
-           std::tuple{Ray{{0.25, 0.5, 0}, {1, 0, 0}}, 0.0, 1u},      // from within
-           std::tuple{Ray{{0.5, 0.5, 1}, {0, 0, -2}}, 0.5, 0u},      // through the common edge
-           std::tuple{Ray{{1, 1, 1}, {0, 0, -1}}, 1.0, 0u},          // through a common corner
-           std::tuple{Ray{{0, 2.5, 0}, {1, -1, 0}}, kInfinity, 0u},  // past a corner, in the plane
-       }) {
-    const std::vector<RayHit> hits = consistentHits(both, ray);
-    if (t == kInfinity) {
-      EXPECT_EQ(hits.size(), 0u);
-      continue;
-    }
-    ASSERT_EQ(hits.size(), 1u);
-    EXPECT_EQ(hits[0].t, t);
-    EXPECT_EQ(hits[0].element, element);
-    EXPECT_EQ(hits[0].crosses, ray.direction.z() != 0 && ray.origin.x() < 1);
-    EXPECT_EQ(hits[0].frontFace, ray.direction.z() < 0);
-  }
-}
-
 // ---- Closed meshes ----
 
 /// Bodies of unit cells: points inside are known without a ray. Rays go along faces, through edges
