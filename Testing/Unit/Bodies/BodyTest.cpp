@@ -24,8 +24,9 @@ namespace {
 /// A soup with an octree: in the world, or placed at both ends of a step.
 class Searched {
  public:
-  Searched(Random& random, const Vector3d& offset, double size, bool isPlaced,
-           double elementSize = 0.1) {
+  Searched(Random& random, const Vector3d& at, double sizeOfAll, bool isPlaced,
+           double elementSize = 0.1)
+      : offset(at), size(sizeOfAll) {
     const Mesh mesh = soup(random, 60, elementSize);
     geometry.mesh.topology = MeshTopology(mesh.positions.size(), mesh.triangles);
     geometry.revisions.elements.topology = geometry.revisions.counter.next();
@@ -59,6 +60,8 @@ class Searched {
   }
 
   Body geometry{GeometryId{0}};
+  const Vector3d offset;
+  const double size;
 
  private:
   Revision::Counter m_revisions;
@@ -67,9 +70,9 @@ class Searched {
 
 /// Far away, coordinates are coarser than floats of the geometry's own frame. Boxes of the smallest
 /// elements leave no room for errors.
-Searched anySearched(Random& random, int round, double& size, Vector3d& offset) {
-  size = std::exp2(uniform(random, -3, 3));
-  offset = randomPoint(random, -1, 1);
+Searched anySearched(Random& random, int round) {
+  const double size = std::exp2(uniform(random, -3, 3));
+  Vector3d offset = randomPoint(random, -1, 1);
   if (round % 3 != 0) offset *= std::exp2(uniform(random, 20, 44));
   return {random, offset, size, round % 2 == 1, random() % 2 ? 0.1 : 1e-9};
 }
@@ -89,13 +92,11 @@ std::size_t expectFound(const Searched& searched, Buffer<std::uint32_t>& found, 
 
 TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
   Random random(21);
-  PointQueryStack stack;
   Buffer<std::uint32_t> found;
   std::size_t touching = 0, left = 0;
   for (int round = 0; round < 600; ++round) {
-    double size;
-    Vector3d offset;
-    const Searched searched = anySearched(random, round, size, offset);
+    const Searched searched = anySearched(random, round);
+    const double size = searched.size;
     const double shapeSize = size * (random() % 2 ? 1.0 : std::exp2(uniform(random, 0, 45)));
     const AnalyticalGeometry geometries[] = {
         Sphere{{0, 0, 0}, 0.05 * shapeSize},
@@ -108,7 +109,7 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
     const auto pose = [&] {
       Vector3d by = away * randomPoint(random, -0.3, 1.3);
       if (round % 8 == 0) by = away * Vector3d::Unit(static_cast<int>(random() % 3));
-      return Pose{randomTurn(random), offset + by};
+      return Pose{randomTurn(random), searched.offset + by};
     };
     const Shape now(geometry, pose()), start(geometry, pose());
     const bool wholeStep = random() % 2;
@@ -138,13 +139,11 @@ TEST(ElementsNearShape, HoldAllElementsWithinTheDistance) {
 
 TEST(ElementsNearShape, HoldAllElementsThatTouchABox) {
   Random random(22);
-  PointQueryStack stack;
   Buffer<std::uint32_t> found;
   std::size_t touching = 0, left = 0;
   for (int round = 0; round < 1200; ++round) {
-    double size;
-    Vector3d offset;
-    const Searched searched = anySearched(random, round, size, offset);
+    const Searched searched = anySearched(random, round);
+    const double size = searched.size;
     const bool wholeStep = random() % 2;
     // A box with a corner of an element on its border.
     const Triangle& corners =
@@ -175,11 +174,9 @@ TEST(TreesOf, HaveAllPairsOfBoxesWithinTheThickness) {
   Random random(24);
   std::size_t touching = 0, left = 0;
   for (int round = 0; round < 600; ++round) {
-    double size;
-    Vector3d offset;
-    const Searched a = anySearched(random, round, size, offset);
-    const Searched b{random, offset + size * randomPoint(random, -1, 1),
-                     size * std::exp2(uniform(random, -2, 2)), random() % 2 != 0,
+    const Searched a = anySearched(random, round);
+    const Searched b{random, a.offset + a.size * randomPoint(random, -1, 1),
+                     a.size * std::exp2(uniform(random, -2, 2)), random() % 2 != 0,
                      random() % 2 ? 0.1 : 1e-9};
     if (a.geometry.tree.frame().scale != b.geometry.tree.frame().scale) continue;
     const bool wholeStep = random() % 2;
