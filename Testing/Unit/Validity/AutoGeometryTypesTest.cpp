@@ -1,11 +1,4 @@
-#include <palpate/OctreeBasedCD.h>
-
-#include "Common/Sanitized.h"
 #include "Common/StepBodies.h"
-
-#include <gtest/gtest.h>
-
-#include <vector>
 
 // Method::Auto, the default, for every pair of geometry types. Its contacts are those of
 // Method::Continuous where features move, and of Method::Proximity where they rest.

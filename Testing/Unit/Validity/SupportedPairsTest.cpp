@@ -1,13 +1,6 @@
 #include "Validity/Support.h"
 
-#include "Common/Sanitized.h"
-#include "Common/StepBodies.h"
 #include "Common/SupportedMethods.h"
-
-#include <gtest/gtest.h>
-
-#include <string>
-#include <vector>
 
 // The table of support: what it has is accepted, and every row answers as brute force does, with
 // any number of threads. A new row gets these tests.
