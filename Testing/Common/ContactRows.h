@@ -31,6 +31,15 @@ inline double leastDistance(const CollisionData& data,
   return least;
 }
 
+/// The contacts over time of all lists, list by list.
+inline std::vector<TrackedContact> allTracked(const CollisionData& data) {
+  std::vector<TrackedContact> all;
+  for (const auto list : {data.trackedVertexTriangle(), data.trackedTriangleVertex(),
+                          data.trackedEdgeEdge(), data.trackedShape(), data.trackedShapeShape()})
+    all.insert(all.end(), list.begin(), list.end());
+  return all;
+}
+
 /// A contact as words: its ids, then the bits of every number.
 using Row = std::vector<std::uint64_t>;
 

@@ -40,6 +40,16 @@ Arrays arraysOf(const TestGeometry& geometry) {
   return arrays;
 }
 
+/// The cells of both sides of a pair.
+std::array<std::vector<CellElement>, 2> cellsOf(const CollisionData& contacts) {
+  std::array<std::vector<CellElement>, 2> cells;
+  appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
+              cells[0], cells[1]);
+  EXPECT_GT(cells[0].size(), 10u);
+  EXPECT_EQ(cells[0].size(), cells[1].size());
+  return cells;
+}
+
 TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   Random random(81);
   const TestGeometry first = testGeometry(sheet(6, 0.5, 0.3)),
@@ -59,12 +69,8 @@ TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   const CollisionData& contacts = collisions.collisionData(idA, idB);
   EXPECT_EQ(contacts.hash(), truth.hash());
 
-  std::vector<CellElement> cellsA, cellsB;
-  appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
-              cellsA, cellsB);
-  ASSERT_EQ(cellsA.size(), truth.vertexTriangle().size() + truth.triangleVertex().size() +
-                               truth.edgeEdge().size());
-  ASSERT_EQ(cellsB.size(), cellsA.size());
+  const auto [cellsA, cellsB] = cellsOf(contacts);
+  ASSERT_EQ(cellsA.size(), Rows(truth).contacts());
   EXPECT_GT(truth.vertexTriangle().size() * truth.triangleVertex().size() * truth.edgeEdge().size(),
             0u);
   const auto expectCell = [](const CellElement& cell, CellKind kind,
@@ -89,30 +95,6 @@ TEST(ArrayAdapter, GivesTheSameContactsAsSpans) {
   }
 }
 
-TEST(ArrayAdapter, CellsOfIntersectionHaveAllPairsThatIntersect) {
-  Random random(83);
-  const TestGeometry first = testGeometry(sheet(6, 0.5, 0.3)),
-                     second = testGeometry(soup(random, 60, 0.1));
-  for (const Method method : {Method::Intersection, Method::Auto}) {
-    const CollisionData contacts = answer(first, second, {.method = method, .thickness = 0});
-    const std::span<const ElementPair> pairs = contacts.intersectingTriangles();
-    EXPECT_GT(pairs.size(), 10u);
-    std::vector<CellElement> a, b;
-    appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
-                a, b);
-    const std::size_t ofContacts = contacts.vertexTriangle().size() +
-                                   contacts.triangleVertex().size() + contacts.edgeEdge().size();
-    ASSERT_EQ(a.size(), ofContacts + (method == Method::Intersection ? pairs.size() : 0));
-    ASSERT_EQ(b.size(), a.size());
-    for (std::size_t i = ofContacts; i < a.size(); ++i) {
-      EXPECT_EQ(a[i].cellType, CellKind::Triangle);
-      EXPECT_EQ(b[i].cellType, CellKind::Triangle);
-      EXPECT_EQ(a[i].ids[0], static_cast<int>(pairs[i - ofContacts].a));
-      EXPECT_EQ(b[i].ids[0], static_cast<int>(pairs[i - ofContacts].b));
-    }
-  }
-}
-
 TEST(ArrayAdapter, FlatArraysAreTriplesAndElements) {
   const std::vector<double> coordinates{0, 1, 2, 3, 4, 5};
   const std::span<const Vector3d> positions = positionsOf(coordinates);
@@ -128,29 +110,40 @@ TEST(ArrayAdapter, FlatArraysAreTriplesAndElements) {
                 [] { positionsOf(std::vector<double>(7)); });
 }
 
-/// A segment is a cell of two vertices, a point a vertex.
-TEST(ArrayAdapter, CellsOfSegmentsAndPointsAreNotTriangles) {
+/// A segment is a cell of two vertices, a point a vertex. Intersection adds the pairs that
+/// intersect.
+TEST(ArrayAdapter, CellsAreOfEveryTypeAndMethod) {
   Random random(82);
   const TestGeometry points = particles(random, 200, 0.02),
-                     line = thread(random, 60, 0.1, 0.02, false);
-  const PairSettings settings{Method::Proximity, 0.1, Contacts::All};
-  const auto cells = [&](const CollisionData& contacts) {
-    std::vector<CellElement> a, b;
-    appendCells(contacts, CellTypes<CellKind>{CellKind::Vertex, CellKind::Edge, CellKind::Triangle},
-                a, b);
-    EXPECT_GT(b.size(), 10u);
-    return b;
-  };
-  for (const CellElement& cell : cells(answer(points, line, settings))) {
+                     line = thread(random, 60, 0.1, 0.02, false),
+                     sheets = testGeometry(sheet(6, 0.5, 0.3)),
+                     triangles = testGeometry(soup(random, 60, 0.1));
+  const PairSettings near{Method::Proximity, 0.1, Contacts::All};
+  const auto ofLine = cellsOf(answer(points, line, near))[1];
+  for (const CellElement& cell : ofLine) {
     EXPECT_EQ(cell.cellType, CellKind::Edge);
     EXPECT_EQ(cell.idCount, 2);
     EXPECT_EQ(std::abs(cell.ids[1] - cell.ids[0]), 1);  // consecutive vertices of the thread
   }
-  const CollisionData contacts = answer(points, points, settings);
-  const auto all = cells(contacts);
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    EXPECT_EQ(all[i].cellType, CellKind::Vertex);
-    EXPECT_EQ(all[i].ids[0], static_cast<int>(contacts.vertexTriangle()[i].triangle));
+  const CollisionData contacts = answer(points, points, near);
+  const auto ofPoints = cellsOf(contacts)[1];
+  for (std::size_t i = 0; i < ofPoints.size(); ++i) {
+    EXPECT_EQ(ofPoints[i].cellType, CellKind::Vertex);
+    EXPECT_EQ(ofPoints[i].ids[0], static_cast<int>(contacts.vertexTriangle()[i].triangle));
+  }
+  for (const Method method : {Method::Intersection, Method::Auto}) {
+    const CollisionData data = answer(sheets, triangles, {.method = method});
+    const std::span<const ElementPair> pairs = data.intersectingTriangles();
+    EXPECT_GT(pairs.size(), 10u);
+    const auto cells = cellsOf(data);
+    const std::size_t first = Rows(data).contacts();
+    ASSERT_EQ(cells[0].size(), first + (method == Method::Intersection ? pairs.size() : 0));
+    for (std::size_t i = first; i < cells[0].size(); ++i)
+      for (const std::size_t side : {0, 1}) {
+        const ElementPair& pair = pairs[i - first];
+        EXPECT_EQ(cells[side][i].cellType, CellKind::Triangle);
+        EXPECT_EQ(cells[side][i].ids[0], static_cast<int>(side == 0 ? pair.a : pair.b));
+      }
   }
 }
 
@@ -189,14 +182,9 @@ TEST(ArrayAdapter, RefusesNegativeIndices) {
   VecArray<int, 2> segments;
   segments.push_back({0, 1});
   segments.push_back({1, -1});
-  try {
-    elementsOf<2>(segments);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::IndexOutOfRange);
-    EXPECT_EQ(error.element(), 1u);
-    EXPECT_STREQ(error.what(), "Element 1 has the index -1.");
-  }
+  expectRefused(
+      ErrorCode::IndexOutOfRange, "Element 1 has the index -1.", [&] { elementsOf<2>(segments); },
+      {}, 1);
 }
 
 }  // namespace

@@ -3,26 +3,12 @@
 #include "Common/ExpectRefused.h"
 #include "Common/TestGeometry.h"
 
-#include <Eigen/Geometry>
-
-#include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace palpate::testing {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-
-std::vector<double> distancesOf(const CollisionData& contacts) {
-  std::vector<double> distances;
-  const auto add = [&](const auto& list) {
-    for (const auto& contact : list) distances.push_back(contact.distance);
-  };
-  add(contacts.vertexTriangle()), add(contacts.triangleVertex()), add(contacts.edgeEdge());
-  add(contacts.shape()), add(contacts.shapeShape());
-  return distances;
-}
 
 /// One pair: its step from the positions before to the positions now, with its rows and motions.
 struct Moved {
@@ -64,7 +50,8 @@ TEST(ContactMotions, PointsMatchDistancesAndDisplacementsMatchGapChanges) {
       const Moved found = step(random, *a, *b, {method, 0.1, Contacts::All}, 0.05);
       ASSERT_EQ(found.motions.size(), found.rows.size());
       EXPECT_GT(found.motions.size(), 10u);
-      const std::vector<double> distances = distancesOf(found.contacts);
+      std::vector<double> distances;
+      forEachContact(found.contacts, [&](const auto& c) { distances.push_back(c.distance); });
       for (std::size_t i = 0; i < found.motions.size(); ++i) {
         const auto& [point, opposite, relative] = found.motions[i];
         const ConstraintRow& row = found.rows[i];
@@ -73,16 +60,6 @@ TEST(ContactMotions, PointsMatchDistancesAndDisplacementsMatchGapChanges) {
       }
     }
   }
-}
-
-TEST(ContactMotions, TouchingFeaturesOfAStepWithoutThicknessMeetAtOnePoint) {
-  Random random(192);
-  const TestGeometry sheets = testGeometry(sheet(6, 0.5, 0.3)),
-                     triangles = testGeometry(soup(random, 80, 0.1));
-  const Moved found = step(random, triangles, sheets, {Method::Continuous, 0.0}, 0.2);
-  EXPECT_GT(found.motions.size(), 20u);
-  for (const ContactMotion& motion : found.motions)
-    EXPECT_LT((motion.point - motion.opposite).norm(), 1e-6) << "the time's tolerance of the way";
 }
 
 TEST(ContactMotions, AreExactForADropOverATriangle) {
@@ -257,18 +234,22 @@ TEST(ContactMotions, BadVerticesThrowAndNothingIsAdded) {
       other{0, sheets.positions, sheets.positions};
   const std::span<const Vector3d> one(line.positions.data(), 1);
   const std::vector<double> two(2, 0.01);
-  const auto refuse = [&](ErrorCode code, const CollisionData& data, const ContactSide& a,
-                          const ContactSide& b) {
-    expectRefused(code, "", [&] { appendMotions(data, a, b, motions); });
-    EXPECT_EQ(motions.size(), 3u);
+  using enum ErrorCode;
+  struct Bad {
+    ErrorCode code;
+    const CollisionData& data;
+    ContactSide a, b;
   };
-  refuse(ErrorCode::WrongPositionCount, contacts, {{0, one, line.positions}}, {other});
-  refuse(ErrorCode::WrongPositionCount, contacts, {{0, line.positions, one}}, {other});
-  refuse(ErrorCode::WrongPositionCount, contacts, {all}, {});
-  refuse(ErrorCode::WrongPositionCount, ofShape, {{0, one, one}}, {});
-  refuse(ErrorCode::WrongPositionCount, ofShape, {}, {});
-  refuse(ErrorCode::InvalidRadius, contacts, {all, two}, {other});
-  refuse(ErrorCode::InvalidRadius, contacts, {all}, {other, two});
+  for (const Bad& bad :
+       {Bad{WrongPositionCount, contacts, {{0, one, line.positions}}, {other}},
+        Bad{WrongPositionCount, contacts, {{0, line.positions, one}}, {other}},
+        Bad{WrongPositionCount, contacts, {all}, {}},
+        Bad{WrongPositionCount, ofShape, {{0, one, one}}, {}},
+        Bad{WrongPositionCount, ofShape, {}, {}}, Bad{InvalidRadius, contacts, {all, two}, {other}},
+        Bad{InvalidRadius, contacts, {all}, {other, two}}}) {
+    expectRefused(bad.code, "", [&] { appendMotions(bad.data, bad.a, bad.b, motions); });
+    EXPECT_EQ(motions.size(), 3u);
+  }
   appendMotions(contacts, {all}, {other}, motions);
   EXPECT_GT(motions.size(), 3u);
 }

@@ -1,24 +1,11 @@
 #include "Common/DegenerateCases.h"
 #include "Common/ExpectRefused.h"
-#include "Common/PairRun.h"
-#include "Common/Sanitized.h"
+#include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 #include "Unit/Math/ImpactOracle.h"
 
-#include <palpate/Error.h>
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <functional>
 #include <iterator>
-#include <map>
-#include <set>
 #include <tuple>
-#include <utility>
-#include <vector>
 
 // PairSettings::reportCrossings: exactly the passages that rational arithmetic finds for every two
 // features. What touches at borders is decided for all features around them.
@@ -29,7 +16,6 @@ namespace {
 using namespace testing;
 
 using CrossingRow = std::tuple<ContactKind, std::array<std::uint32_t, 4>, bool>;
-using KeyFilter = std::function<bool(const ContactKey&)>;  ///< null: all
 
 struct CrossingStep {
   const TestGeometry &a, &b;
@@ -38,11 +24,10 @@ struct CrossingStep {
 };
 
 /// In the order of CollisionData::crossings().
-std::vector<CrossingRow> crossingTruth(const CrossingStep& step, const KeyFilter& filter) {
+std::vector<CrossingRow> crossingTruth(const CrossingStep& step) {
   std::vector<CrossingRow> all;
   const auto add = [&](const ContactKey& key, bool edges, const auto& first, const auto& second,
                        bool swapped) {
-    if (filter && !filter(key)) return;
     impact::Positions p;
     std::size_t i = 0;
     const auto put = [&](const auto& vertices, bool ofB) {
@@ -87,38 +72,19 @@ std::vector<CrossingRow> crossingTruth(const CrossingStep& step, const KeyFilter
 
 /// Returns how many there are.
 std::size_t expectCrossings(const CrossingStep& step, double thickness,
-                            const KeyFilter& filter = {}) {
-  const std::vector<CrossingRow> truth = crossingTruth(step, filter);
-  std::vector<Settings> all = octreeSettings();
-  all.push_back(testing::settingsOf(Engine::BruteForce));
-  std::vector<Crossing> first;
-  for (const Settings& settings : all) {
-    OctreeBasedCD collisions(settings);
-    const GeometryId a = step.a.addTo(collisions), b = step.self() ? a : step.b.addTo(collisions);
-    collisions.addCollisionPair(
-        a, b, {.method = Method::Continuous, .thickness = thickness, .reportCrossings = true});
-    if (filter)
-      collisions.setContactPredicate(a, b, [&](const ContactFeatures& f) {
-        switch (f.kind) {
-          case ContactFeatures::Kind::VertexTriangle:
-            return filter({ContactKind::VertexTriangle, {f.a[0], f.b[0], kNoElement, kNoElement}});
-          case ContactFeatures::Kind::TriangleVertex:
-            return filter({ContactKind::TriangleVertex, {f.a[0], f.b[0], kNoElement, kNoElement}});
-          case ContactFeatures::Kind::EdgeEdge:
-            break;
-        }
-        return filter({ContactKind::EdgeEdge, {f.a[0], f.a[1], f.b[0], f.b[1]}});
-      });
-    collisions.setPositions(a, step.a.positions, step.nowA);
-    if (!step.self()) collisions.setPositions(b, step.b.positions, step.nowB);
-    collisions.detectCollision();
-    const auto crossings = collisions.collisionData(a, b).crossings();
-    std::vector<CrossingRow> found;
-    for (const Crossing& c : crossings) found.push_back({c.kind, c.ids, c.forward});
-    EXPECT_EQ(found, truth) << nameOf(settings);
-    if (first.empty()) first.assign(crossings.begin(), crossings.end());
-    EXPECT_TRUE(std::ranges::equal(first, crossings)) << nameOf(settings);
-  }
+                            Method method = Method::Continuous) {
+  OctreeBasedCD collisions;
+  const GeometryId a = step.a.addTo(collisions), b = step.self() ? a : step.b.addTo(collisions);
+  collisions.addCollisionPair(a, b,
+                              {.method = method, .thickness = thickness, .reportCrossings = true});
+  collisions.setPositions(a, step.a.positions, step.nowA);
+  if (!step.self()) collisions.setPositions(b, step.b.positions, step.nowB);
+  collisions.detectCollision();
+  std::vector<CrossingRow> found;
+  for (const Crossing& c : collisions.collisionData(a, b).crossings())
+    found.push_back({c.kind, c.ids, c.forward});
+  const std::vector<CrossingRow> truth = crossingTruth(step);
+  EXPECT_EQ(found, truth);
   return truth.size();
 }
 
@@ -138,10 +104,7 @@ TEST(Crossings, AreThoseOfRationalArithmetic) {
         const CrossingStep step{*a, *b, moved(random, a->positions, motion),
                                 moved(random, b->positions, motion)};
         passages += expectCrossings(step, thickness);
-        const auto everyThird = [](const ContactKey& key) {
-          return (key.ids[0] + key.ids[1] + key.ids[2] + key.ids[3]) % 3 == 0;
-        };
-        expectCrossings(step, thickness, everyThird);
+        expectCrossings(step, thickness, Method::Auto);
       }
   EXPECT_GE(passages, leastOf(500, 80));
 }
@@ -204,7 +167,7 @@ struct CubeSolid {
   }
 };
 
-/// A random path of cubes: stairs, saddles, L shapes and holes, in random diagonals and order.
+/// A random path of cubes: stairs, saddles, L shapes and holes.
 CubeSolid cubeSolid(Random& random) {
   CubeSolid solid;
   std::array<int, 3> at{2, 2, 2};
@@ -214,34 +177,8 @@ CubeSolid cubeSolid(Random& random) {
     int& x = at[random() % 3];
     x = std::clamp(x + (random() % 2 != 0 ? 1 : -1), 0, CubeSolid::kSize - 1);
   }
-  std::map<std::array<int, 3>, std::uint32_t> ids;
-  Positions& positions = solid.surface.positions;
-  std::vector<Triangle>& triangles = solid.surface.triangles;
-  const auto idOf = [&](const std::array<int, 3>& p) {
-    const auto [place, isNew] = ids.try_emplace(p, static_cast<std::uint32_t>(positions.size()));
-    if (isNew) positions.push_back(Vector3d(p[0], p[1], p[2]));
-    return place->second;
-  };
-  for (int cell = 0; cell < CubeSolid::kSize * CubeSolid::kSize * CubeSolid::kSize; ++cell)
-    for (std::size_t side = 0; side < 6; ++side) {
-      const std::array<int, 3> cube{cell / 25, cell / 5 % 5, cell % 5};
-      const std::size_t k = side / 2;
-      std::array<int, 3> next = cube, corner = cube;
-      next[k] += side % 2 != 0 ? 1 : -1;
-      corner[k] += side % 2 != 0 ? 1 : 0;
-      if (!solid.contains(cube) || solid.contains(next)) continue;
-      std::array<std::uint32_t, 4> quad;
-      for (std::size_t i = 0; i < 4; ++i) {
-        std::array<int, 3> p = corner;
-        p[(k + 1) % 3] += i == 1 || i == 2;
-        p[(k + 2) % 3] += i > 1;
-        quad[side % 2 != 0 ? i : 3 - i] = idOf(p);
-      }
-      const std::size_t first = random() % 2;
-      triangles.push_back({quad[first], quad[first + 1], quad[first + 2]});
-      triangles.push_back({quad[first], quad[first + 2], quad[(first + 3) % 4]});
-    }
-  std::shuffle(triangles.begin(), triangles.end(), random);
+  solid.surface = surfaceMeshOf(
+      cells(CubeSolid::kSize, random, [&](const auto& cube) { return solid.contains(cube); }));
   return solid;
 }
 
@@ -344,32 +281,6 @@ TEST(Crossings, OfAPointAreTheChangesOfInsideAndOutside) {
   EXPECT_GE(touchCount, leastOf(100, 25));
 }
 
-/// The surface of a cube of a grid, each side of which has so many squares in a row.
-Mesh gridCube(Random& random, double size, int squares) {
-  std::map<std::array<int, 3>, std::uint32_t> ids;
-  Mesh mesh;
-  const auto idOf = [&](std::size_t k, int at, int i, int j) {
-    std::array<int, 3> p;
-    p[k] = at, p[(k + 1) % 3] = i, p[(k + 2) % 3] = j;
-    const auto [place, isNew] =
-        ids.try_emplace(p, static_cast<std::uint32_t>(mesh.positions.size()));
-    if (isNew) mesh.positions.push_back(size / squares * Vector3d(p[0], p[1], p[2]));
-    return place->second;
-  };
-  for (std::size_t k = 0; k < 3; ++k)
-    for (const int at : {0, squares})
-      for (int i = 0; i < squares; ++i)
-        for (int j = 0; j < squares; ++j) {
-          std::array quad{idOf(k, at, i, j), idOf(k, at, i + 1, j), idOf(k, at, i + 1, j + 1),
-                          idOf(k, at, i, j + 1)};
-          if (at == 0) std::swap(quad[1], quad[3]);
-          const std::size_t first = random() % 2;
-          mesh.triangles.push_back({quad[first], quad[first + 1], quad[first + 2]});
-          mesh.triangles.push_back({quad[first], quad[first + 2], quad[(first + 3) % 4]});
-        }
-  return mesh;
-}
-
 /// Whether cubes at a distance, of this size and of size 4 at the origin, overlap on a straight
 /// way.
 bool overlapOnTheWay(double size, const Vector3d& p, const Vector3d& q) {
@@ -399,8 +310,10 @@ TEST(Crossings, BodiesThatOnlyTouchHaveNone) {
   std::size_t touching = 0;
   for (int run = 0; run < casesOf(90, 18); ++run) {
     const double size = 2.0 * whole(1, 3);
-    TestGeometry table = testGeometry(gridCube(random, 4.0, whole(1, 2))),
-                 body = testGeometry(gridCube(random, size, whole(1, 2)));
+    const auto cubeOf = [&](double edge) {
+      return testGeometry(dividedBox({0, 0, 0}, {edge, edge, edge}, whole(1, 2)));
+    };
+    TestGeometry table = cubeOf(4.0), body = cubeOf(size);
     if (run % 3 == 2) {
       body = {GeometryType::Lines, {}, {}, {}, {0.0}};
       for (std::uint32_t i = 0; i < 4; ++i) {
@@ -464,19 +377,17 @@ TEST(Crossings, NeedContactsOverTheStep) {
   refuse(b, {.method = Method::Continuous,
              .reportCrossings = true,
              .continuous = {.earliestTimeOnly = true}});
-  // They go with the setting.
-  collisions.addCollisionPair(a, b, {.method = Method::Continuous, .reportCrossings = true});
-  Positions moved = cube.positions;
-  for (Vector3d& p : moved) p += Vector3d(3, 0.2, 0.1);
-  collisions.setPositions(b, moved);
-  collisions.advance();
-  for (Vector3d& p : moved) p -= Vector3d(6, 0, 0);
-  collisions.setPositions(b, moved);
-  collisions.detectCollision();
-  EXPECT_FALSE(collisions.collisionData(a, b).crossings().empty());
-  collisions.setPairSettings(a, b, {.method = Method::Continuous});
-  collisions.detectCollision();
-  EXPECT_TRUE(collisions.collisionData(a, b).crossings().empty());
+  const GeometryId line = collisions.addLineMesh(cube.positions, std::vector<Segment>{{0, 1}},
+                                                 std::vector<double>{0, 1, 0, 0, 0, 0, 0, 0});
+  for (const bool crossings : {true, false})
+    testing::expectRefused(
+        ErrorCode::UnsupportedMethod, "need one radius for all vertices",
+        [&] {
+          collisions.addCollisionPair(
+              line, a,
+              {.thickness = 0.1, .reportCrossings = crossings, .rememberSides = !crossings});
+        },
+        line);
 }
 
 }  // namespace

@@ -1,25 +1,15 @@
 // detectCollision() with a budget, and cancelDetection().
 #include <palpate/Capture.h>
-#include <palpate/Error.h>
-#include <palpate/OctreeBasedCD.h>
-#include <palpate/StepGuard.h>
 
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 
-#include "Common/Sanitized.h"
-#include "Common/StepBodies.h"
+#include "Common/Answers.h"
 #include "Common/SupportedMethods.h"
 #include "Common/TemporaryFolder.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <atomic>
 #include <future>
-#include <limits>
-#include <string>
 #include <thread>
-#include <vector>
 
 namespace palpate::testing {
 namespace {
@@ -48,33 +38,17 @@ class LooksClock {
   std::atomic<std::int64_t> m_looks{0};
 };
 
-struct Answer {
-  std::uint64_t hash = 0;
-  Validity validity{};
-  std::vector<TrackedContact> tracked{}, ended{};
-  std::vector<Crossing> crossings{};
-  friend bool operator==(const Answer&, const Answer&) = default;
-};
-
-Answer answerOf(const CollisionData& data) {
-  Answer answer{data.hash(), data.validity()};
-  for (const auto list : {data.trackedVertexTriangle(), data.trackedTriangleVertex(),
-                          data.trackedEdgeEdge(), data.trackedShape(), data.trackedShapeShape()})
-    answer.tracked.insert(answer.tracked.end(), list.begin(), list.end());
-  answer.ended.assign(data.ended().begin(), data.ended().end());
-  answer.crossings.assign(data.crossings().begin(), data.crossings().end());
-  return answer;
-}
-
-std::vector<Answer> answersOf(const OctreeBasedCD& collisions) {
-  std::vector<Answer> all;
+std::vector<CollisionData> answersOf(const OctreeBasedCD& collisions) {
+  std::vector<CollisionData> all;
   for (const CollisionPair& pair : collisions.pairs())
-    all.push_back(answerOf(collisions.collisionData(pair.a, pair.b)));
+    all.push_back(collisions.collisionData(pair.a, pair.b));
   return all;
 }
 
-std::size_t contactsOf(const OctreeBasedCD& collisions) {
-  return collisions.statistics().contacts + collisions.statistics().intersectingTriangles;
+void expectSameAnswers(const OctreeBasedCD& found, const std::vector<CollisionData>& truth) {
+  const std::vector<CollisionData> all = answersOf(found);
+  ASSERT_EQ(all.size(), truth.size());
+  for (std::size_t i = 0; i < all.size(); ++i) expectSame(all[i], truth[i], Knowledge::Same);
 }
 
 const UnfinishedPair* findUnfinished(const OctreeBasedCD& collisions, const CollisionPair& pair) {
@@ -83,205 +57,6 @@ const UnfinishedPair* findUnfinished(const OctreeBasedCD& collisions, const Coll
     return unfinished.a == pair.a && unfinished.b == pair.b;
   });
   return found == all.end() ? nullptr : &*found;
-}
-
-/// Bodies of every type, with pairs by every row of kSupport.
-class World {
- public:
-  explicit World(const Settings& settings) : m_collisions(settings) {
-    Random random(17);
-    m_bodies = bodiesOfEveryType(random, kMotion);
-    for (StepBody& body : bodiesWithField(Vector3d::Constant(-kMotion)))
-      m_bodies.push_back(std::move(body));
-    for (const StepBody& body : m_bodies) m_ids.push_back(body.add(m_collisions));
-    std::size_t number = 0;
-    for (const SupportedPairs& row : kSupport) {
-      std::size_t left = row.kind == PairKind::Proxy ? 1 : 2;
-      for (std::size_t i = 0; i < m_bodies.size(); ++i)
-        for (std::size_t j = 0; j < m_bodies.size() && left > 0; ++j)
-          if ((7 * i + 3 * j + number) % 3 == 0 && answers(row, m_bodies[i], m_bodies[j]) &&
-              (row.kind != PairKind::Proxy || m_bodies[j].name.starts_with("placed")) &&
-              add(i, j, row, number))
-            --left, ++number;
-    }
-  }
-
-  /// Steps there, back, and at rest.
-  void step(std::size_t number) {
-    if (number > 0) m_collisions.advance();
-    for (std::size_t i = 0; i < m_bodies.size(); ++i) {
-      const StepBody& body = m_bodies[i];
-      if (number % 3 == 0)
-        body.move(m_collisions, m_ids[i]);
-      else if (number % 3 == 1 && !body.now.empty() && !body.name.starts_with("placed"))
-        m_collisions.setPositions(m_ids[i], body.now, body.before);
-    }
-  }
-
-  OctreeBasedCD& collisions() { return m_collisions; }
-  const std::vector<StepBody>& bodies() const { return m_bodies; }
-  const std::vector<GeometryId>& ids() const { return m_ids; }
-
- private:
-  static constexpr double kMotion = 0.05;
-
-  /// Whether the two had no pair before.
-  bool add(std::size_t i, std::size_t j, const SupportedPairs& row, std::size_t number) {
-    PairSettings pair = caseOf(row, number);
-    pair.trackContacts = !pair.continuous.earliestTimeOnly;
-    pair.reportCrossings = row.method == Method::Continuous && row.kind == PairKind::Meshes &&
-                           !pair.continuous.earliestTimeOnly;
-    if (number % 4 == 1 && row.kind != PairKind::Proxy && row.kind != PairKind::Field &&
-        m_bodies[i].type != GeometryType::Field && m_bodies[j].type != GeometryType::Field)
-      pair.freeMotionReach = 0.1;
-    try {
-      m_collisions.addCollisionPair(m_ids[i], m_ids[j], pair);
-      return true;
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::DuplicatePair) << error.what();
-      return false;
-    }
-  }
-
-  OctreeBasedCD m_collisions;
-  std::vector<StepBody> m_bodies;
-  std::vector<GeometryId> m_ids;
-};
-
-/// Expects of each pair the complete answer, or the one before and the marks of an answer that was
-/// kept. Returns how many were not finished.
-std::size_t expectAnswers(OctreeBasedCD& found, const std::vector<Answer>& before,
-                          const std::vector<Answer>& complete, bool newStep) {
-  const auto pairs = found.pairs();
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    SCOPED_TRACE("pair " + std::to_string(i));
-    const Answer now = answerOf(found.collisionData(pairs[i].a, pairs[i].b));
-    const UnfinishedPair* const unfinished = findUnfinished(found, pairs[i]);
-    if (!unfinished) {
-      EXPECT_EQ(now, complete[i]);
-      continue;
-    }
-    EXPECT_EQ(now.hash, before[i].hash);
-    EXPECT_FALSE(now.validity.trusted);
-    EXPECT_TRUE(now.validity.sideMayBeWrong);
-    EXPECT_EQ(now.validity.reason, MethodReason::OutOfTime);
-    EXPECT_EQ(now.validity.age, before[i].validity.age + 1);
-    EXPECT_EQ(unfinished->age, now.validity.age);
-    EXPECT_EQ(now.validity.atEnd, before[i].validity.atEnd);
-    EXPECT_TRUE(now.crossings.empty());
-    std::vector<TrackedContact> tracked = before[i].tracked;
-    if (newStep)
-      for (TrackedContact& contact : tracked) contact.predecessor.reset();
-    EXPECT_EQ(now.tracked, tracked);
-    EXPECT_EQ(now.ended, newStep ? std::vector<TrackedContact>() : before[i].ended);
-  }
-  return found.statistics().unfinishedPairs.size();
-}
-
-void expectFreeMotions(const World& world, OctreeBasedCD& found, OctreeBasedCD& complete) {
-  const FrameStatistics& statistics = found.statistics();
-  const bool isComplete = statistics.unfinishedPairs.empty() && !statistics.freeMotionUnfinished;
-  for (const GeometryId id : world.ids()) {
-    const auto now = found.freeMotion(id), exact = complete.freeMotion(id);
-    ASSERT_EQ(now.size(), exact.size());
-    for (std::size_t v = 0; v < now.size(); ++v) {
-      EXPECT_LE(now[v], exact[v] * (1 + 1e-12));
-      if (isComplete) {
-        EXPECT_EQ(now[v], exact[v]);
-      }
-    }
-  }
-}
-
-class DeadlineWith : public ::testing::TestWithParam<Settings> {};
-
-/// A detection may end at each look at the clock. Afterwards a complete one continues as if that
-/// had not been.
-TEST_P(DeadlineWith, EveryPlaceOfStopping) {
-  Settings settings = GetParam();
-  World world(settings), reference(settings);
-  settings.audit.features = 0;
-  OctreeBasedCD &found = world.collisions(), &truth = reference.collisions();
-  LooksClock clock(found);
-  const auto step = [&](std::size_t number) { world.step(number), reference.step(number); };
-  const auto expectEqual = [&] {
-    EXPECT_EQ(answersOf(found), answersOf(truth));
-    EXPECT_TRUE(found.auditFailures().empty());
-    EXPECT_TRUE(found.statistics().unfinishedPairs.empty());
-  };
-  step(0);
-  found.detectCollision();
-  truth.detectCollision();
-  expectEqual();
-  EXPECT_GT(contactsOf(truth), 100u);
-  bool isComplete = false;
-  std::size_t stops = 0, seenPartly = 0;
-  std::size_t number = 1;
-  const std::size_t share = shareOfCases(3);
-  for (std::int64_t budget = 0; !isComplete; budget += static_cast<std::int64_t>(share)) {
-    SCOPED_TRACE("budget " + std::to_string(budget));
-    step(number++);
-    const std::vector<Answer> before = answersOf(found);
-    truth.detectCollision();
-    isComplete = found.detectCollision(microseconds(budget));
-    const std::size_t unfinished = expectAnswers(found, before, answersOf(truth), true);
-    EXPECT_EQ(isComplete, unfinished == 0 && !found.statistics().freeMotionUnfinished);
-    EXPECT_TRUE(found.auditFailures().empty());
-    expectFreeMotions(world, found, truth);
-    seenPartly += unfinished > 0 && unfinished < found.pairs().size();
-    ++stops;
-    // Of the same step, twice out of time.
-    if (budget % 5 == 0) {
-      const std::vector<Answer> kept = answersOf(found);
-      found.detectCollision(microseconds(budget / 2));
-      expectAnswers(found, kept, answersOf(truth), false);
-    }
-    found.detectCollision();
-    expectEqual();
-    expectFreeMotions(world, found, truth);
-    if (HasFailure()) return;
-  }
-  EXPECT_GT(stops * share, 40u);
-  EXPECT_GT(seenPartly, 20u / share);
-}
-
-Settings withAudit(const Settings& settings) {
-  Settings audited = settings;
-  audited.audit.features = 5;
-  return audited;
-}
-
-INSTANTIATE_TEST_SUITE_P(Engines, DeadlineWith,
-                         ::testing::Values(withAudit(settingsOf(Engine::Octree, 1)),
-                                           settingsOf(Engine::Octree, 3),
-                                           settingsOf(Engine::BruteForce, 1)),
-                         [](const auto& settings) {
-                           return toString(settings.param.engine) +
-                                  std::to_string(settings.param.threads);
-                         });
-
-/// Pairs that wait come first, so that none waits for ever. Contacts over time are those of the
-/// detections that finished a pair.
-TEST(Deadline, NoPairWaitsForEver) {
-  World world(settingsOf(Engine::Octree));
-  OctreeBasedCD& collisions = world.collisions();
-  LooksClock clock(collisions);
-  world.step(0);
-  collisions.detectCollision(microseconds(1'000'000));
-  const std::int64_t all = clock.looks();
-  std::vector<std::uint32_t> ages(collisions.pairs().size()), oldest = ages;
-  for (std::size_t number = 1; number < 40; ++number) {
-    world.step(number);
-    collisions.detectCollision(microseconds(all / 4));
-    for (std::size_t i = 0; i < ages.size(); ++i) {
-      const auto& [a, b, settings] = collisions.pairs()[i];
-      const std::uint32_t age = collisions.collisionData(a, b).validity().age;
-      EXPECT_TRUE(age == 0 || age == ages[i] + 1);
-      oldest[i] = std::max(oldest[i], ages[i] = age);
-    }
-  }
-  EXPECT_GT(*std::max_element(oldest.begin(), oldest.end()), 1u);
-  EXPECT_LT(*std::max_element(oldest.begin(), oldest.end()), 16u);
 }
 
 /// Cubes in a row, each in touch with the next one.
@@ -330,6 +105,110 @@ struct Row {
 
 const PairSettings kTouching{.method = Method::Proximity, .thickness = 0.02};
 
+/// Expects of each pair the complete answer, or the one before and the marks of an answer that was
+/// kept. Returns how many were not finished.
+std::size_t expectAnswers(OctreeBasedCD& found, const std::vector<CollisionData>& before,
+                          const std::vector<CollisionData>& complete, bool newStep) {
+  const auto pairs = found.pairs();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    SCOPED_TRACE("pair " + std::to_string(i));
+    const CollisionData& now = found.collisionData(pairs[i].a, pairs[i].b);
+    const UnfinishedPair* const unfinished = findUnfinished(found, pairs[i]);
+    if (!unfinished) {
+      expectSame(now, complete[i], Knowledge::Same);
+      continue;
+    }
+    EXPECT_EQ(now.hash(), before[i].hash());
+    EXPECT_FALSE(now.validity().trusted);
+    EXPECT_TRUE(now.validity().sideMayBeWrong);
+    EXPECT_EQ(now.validity().reason, MethodReason::OutOfTime);
+    EXPECT_EQ(now.validity().age, before[i].validity().age + 1);
+    EXPECT_EQ(unfinished->age, now.validity().age);
+    EXPECT_EQ(now.validity().atEnd, before[i].validity().atEnd);
+    EXPECT_TRUE(now.crossings().empty());
+    std::vector<TrackedContact> tracked = allTracked(before[i]);
+    if (newStep)
+      for (TrackedContact& contact : tracked) contact.predecessor.reset();
+    EXPECT_EQ(allTracked(now), tracked);
+    EXPECT_TRUE(newStep ? now.ended().empty() : std::ranges::equal(now.ended(), before[i].ended()));
+  }
+  return found.statistics().unfinishedPairs.size();
+}
+
+class DeadlineWith : public ::testing::TestWithParam<Settings> {};
+
+/// A detection may end at each look at the clock. Afterwards a complete one continues as if that
+/// had not been. Random histories (Common/History.h) end detections so with all features.
+TEST_P(DeadlineWith, EveryPlaceOfStopping) {
+  const PairSettings pair{.method = Method::Continuous,
+                          .thickness = 0.02,
+                          .freeMotionReach = 0.1,
+                          .trackContacts = true,
+                          .reportCrossings = true};
+  Row row(12, pair, GetParam()), reference(12, pair, GetParam());
+  OctreeBasedCD &found = row.collisions, &truth = reference.collisions;
+  LooksClock clock(found);
+  const auto expectComplete = [&] {
+    expectSameAnswers(found, answersOf(truth));
+    EXPECT_TRUE(found.auditFailures().empty());
+    EXPECT_TRUE(found.statistics().unfinishedPairs.empty());
+  };
+  const auto expectFreeMotions = [&] {
+    const FrameStatistics& statistics = found.statistics();
+    const bool isComplete = statistics.unfinishedPairs.empty() && !statistics.freeMotionUnfinished;
+    for (const GeometryId id : row.ids) {
+      const auto now = found.freeMotion(id), exact = truth.freeMotion(id);
+      ASSERT_EQ(now.size(), exact.size());
+      for (std::size_t v = 0; v < now.size(); ++v)
+        EXPECT_TRUE(isComplete ? now[v] == exact[v] : now[v] <= exact[v] * (1 + 1e-12)) << v;
+    }
+  };
+  for (OctreeBasedCD* each : {&found, &truth}) each->detectCollision();
+  expectComplete();
+  EXPECT_GT(truth.statistics().contacts, 50u);
+  bool isComplete = false;
+  std::size_t stops = 0, seenPartly = 0;
+  const std::size_t share = shareOfCases(3);
+  for (std::int64_t budget = 0; !isComplete; budget += static_cast<std::int64_t>(share)) {
+    SCOPED_TRACE("budget " + std::to_string(budget));
+    const bool rests = stops % 3 == 2;
+    for (Row* each : {&row, &reference}) {
+      each->collisions.advance();
+      if (!rests) each->moveAll({0, stops % 3 == 0 ? 1e-3 : -1e-3, 0});
+    }
+    const std::vector<CollisionData> before = answersOf(found);
+    truth.detectCollision();
+    isComplete = found.detectCollision(microseconds(budget));
+    const std::size_t unfinished = expectAnswers(found, before, answersOf(truth), true);
+    EXPECT_EQ(isComplete, unfinished == 0 && !found.statistics().freeMotionUnfinished);
+    isComplete = isComplete && !rests;
+    EXPECT_TRUE(found.auditFailures().empty());
+    expectFreeMotions();
+    seenPartly += unfinished > 0 && unfinished < found.pairs().size();
+    ++stops;
+    if (budget % 5 == 0) {  // twice out of time in a step
+      const std::vector<CollisionData> kept = answersOf(found);
+      found.detectCollision(microseconds(budget / 2));
+      expectAnswers(found, kept, answersOf(truth), false);
+    }
+    found.detectCollision();
+    expectComplete();
+    expectFreeMotions();
+    if (HasFailure()) return;
+  }
+  EXPECT_GT(stops * share, 40u);
+  EXPECT_GT(seenPartly, 10u / share);
+}
+
+INSTANTIATE_TEST_SUITE_P(Engines, DeadlineWith,
+                         ::testing::Values(Settings{.threads = 1, .audit = {.features = 5}},
+                                           settingsOf(Engine::Octree, 3),
+                                           settingsOf(Engine::BruteForce, 1)),
+                         [](const auto& settings) {
+                           return toString(settings.param.engine) +
+                                  std::to_string(settings.param.threads);
+                         });
+
 TEST(Deadline, PrioritiesDecideTheOrder) {
   Row row(5, kTouching, {.threads = 1});
   for (std::size_t i = 0; i < 4; ++i) {
@@ -350,30 +229,6 @@ TEST(Deadline, ContactsAndNearPairsComeFirst) {
   std::vector<GeometryId> order = row.order();
   std::sort(order.begin(), order.begin() + 2);  // they are as near
   EXPECT_EQ(order, (std::vector{row.ids[1], row.ids[2], row.ids[0], row.ids[3]}));
-}
-
-/// A pair that takes more than the budget does not keep the others from being finished.
-TEST(Deadline, APairThatIsTooLargeYields) {
-  Row row(3, kTouching, {.threads = 1});
-  const Mesh large = sphere(60, 90, {0, 0, 0}, 5.0);
-  const GeometryId a = addMesh(row.collisions, large), b = addMesh(row.collisions, large);
-  PairSettings first = kTouching;
-  first.priority = 1;
-  row.collisions.addCollisionPair(a, b, first);
-  row.collisions.detectCollision();
-  LooksClock clock(row.collisions);
-  std::size_t finished = 0, tooLarge = 0;
-  for (int i = 0; i < 6; ++i) {
-    row.moveAll({0, 1e-3, 0});
-    auto positions = large.positions;
-    for (Vector3d& x : positions) x[2] += 1e-4 * (i + 1);
-    row.collisions.setPositions(a, positions);
-    row.collisions.detectCollision(microseconds(40));
-    finished += !findUnfinished(row.collisions, row.collisions.pairs()[0]);
-    tooLarge += findUnfinished(row.collisions, row.collisions.pairs()[2]) != nullptr;
-  }
-  EXPECT_EQ(tooLarge, 6u);
-  EXPECT_EQ(finished, 3u);
 }
 
 /// Pairs of the highest priority are finished in every detection, whichever they are and however
@@ -413,19 +268,19 @@ TEST(Deadline, TheHighestPriorityIsServedInEveryFrame) {
   }
 }
 
-/// A pair for which a whole budget is not enough says so, also behind one of the highest priority.
-/// It does not keep the others from being finished, and with a budget that is large enough it is.
+/// A pair for which a whole budget is not enough says so, whatever the priorities. It does not keep
+/// the others from being finished, and with a budget that is large enough it is.
 TEST(Deadline, APairThatExceedsTheBudgetSaysSo) {
-  for (const bool isBehind : {false, true}) {
+  enum class First { None, ASmallPair, TheLargePair };
+  for (const First first : {First::None, First::ASmallPair, First::TheLargePair}) {
+    SCOPED_TRACE(static_cast<int>(first));
     Row row(4, kTouching, {.threads = 1});
-    const Mesh large = sphere(60, 90, {0, 0, 0}, 5.0);
+    const Mesh large = sphere(40, 60, {0, 0, 0}, 5.0);
     const GeometryId a = addMesh(row.collisions, large), b = addMesh(row.collisions, large);
-    row.collisions.addCollisionPair(a, b, kTouching);
-    if (isBehind) {
-      PairSettings pair = kTouching;
-      pair.priority = 1;
-      row.collisions.setPairSettings(row.ids[0], row.ids[1], pair);
-    }
+    PairSettings urgent = kTouching;
+    urgent.priority = 1;
+    row.collisions.addCollisionPair(a, b, first == First::TheLargePair ? urgent : kTouching);
+    if (first == First::ASmallPair) row.collisions.setPairSettings(row.ids[0], row.ids[1], urgent);
     row.collisions.detectCollision();
     LooksClock clock(row.collisions);
     std::size_t said = 0;
@@ -453,14 +308,34 @@ TEST(Deadline, APairThatExceedsTheBudgetSaysSo) {
   }
 }
 
-template <class F>
-void forEachContact(const CollisionData& data, F&& f) {
-  const auto each = [&](const auto& list) { std::for_each(list.begin(), list.end(), f); };
-  each(data.vertexTriangle());
-  each(data.triangleVertex());
-  each(data.edgeEdge());
-  each(data.shape());
-  each(data.shapeShape());
+/// The least distance of two bodies at a time of their step, of which the first is shifted;
+/// infinite beyond the reach. A contact's distance is less radii.
+double leastDistanceAt(double time, const StepBody& a, const Vector3d& shift, const StepBody& b,
+                       double reach) {
+  OctreeBasedCD probe({.threads = 1});
+  const std::array ids{a.add(probe), b.add(probe)};
+  probe.addCollisionPair(
+      ids[0], ids[1], {.method = Method::Proximity, .thickness = reach, .contacts = Contacts::All});
+  for (const std::size_t i : {0, 1}) {
+    const StepBody& body = i == 0 ? a : b;
+    if (body.before.empty()) {  // a shape, whose step begins at the origin
+      body.move(probe, ids[i]);
+      Pose pose = probe.transform(ids[i]);
+      pose.translation *= time;
+      probe.setTransform(ids[i], pose);
+      continue;
+    }
+    Positions between = body.before;
+    for (std::size_t v = 0; v < between.size(); ++v)
+      between[v] = (1.0 - time) * between[v] + time * body.now[v] + (i == 0) * shift;
+    probe.setPositions(ids[i], between);
+  }
+  probe.detectCollision();
+  const CollisionData& data = probe.collisionData(ids[0], ids[1]);
+  double least = leastDistance(data);
+  for (const ShapeContact& c : data.shape()) least = std::min(least, c.distance);
+  for (const ShapeShapeContact& c : data.shapeShape()) least = std::min(least, c.distance);
+  return least;
 }
 
 /// The bound of every pair at once: nothing nearer is found at five times of the step.
@@ -468,98 +343,47 @@ TEST(Deadline, DistanceBoundsHold) {
   Random random(3);
   std::vector<StepBody> bodies = bodiesOfEveryType(random, 0.3);
   std::size_t positive = 0, pairs = 0, nearest = 0;
-  for (std::size_t i = 0; i < bodies.size(); ++i)
-    for (std::size_t j = i; j < bodies.size(); ++j) {
-      const StepBody &a = bodies[i], &b = bodies[j];
-      const bool moves = i != j && !b.name.starts_with("placed");
-      for (const double away : {0.0, 0.9, 2.0}) {
-        if (away > 0.0 && !moves) continue;
-        for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
-          const SupportedPairs* const row = supportOf(method, a.type, b.type, i == j);
-          if (!row || !answers(*row, a, b)) continue;
-          SCOPED_TRACE(a.name + " with " + b.name + " by " + toString(method));
-          OctreeBasedCD collisions({.threads = 1});
-          const GeometryId first = a.add(collisions), second = i == j ? first : b.add(collisions);
-          collisions.addCollisionPair(first, second, {.method = method, .thickness = 0.01});
-          a.move(collisions, first);
-          if (i != j) b.move(collisions, second);
-          Positions before = b.before, now = b.now;
-          const Vector3d shift = away * Vector3d(0.6, 0.5, 0.7);
-          if (moves && before.empty()) {
-            Pose end = collisions.transform(second);
-            end.translation += shift;
-            collisions.setTransform(second, {Eigen::Matrix3d::Identity(), shift}, end);
-          } else if (moves) {
-            for (Vector3d& x : before) x += shift;
-            for (Vector3d& x : now) x += shift;
-            collisions.setPositions(second, before, now);
-          }
-          EXPECT_FALSE(collisions.detectCollision(microseconds(0)));
-          ASSERT_EQ(collisions.statistics().unfinishedPairs.size(), 1u);
-          const double bound = collisions.statistics().unfinishedPairs[0].distanceBound;
-          EXPECT_GE(bound, 0.0);
-          ++pairs;
-          positive += bound > 0.0;
-          if (i == j) {
-            EXPECT_EQ(bound, 0.0);
-            continue;
-          }
-          // Proximity at the end, others at any time. A contact's distance is less radii.
-          OctreeBasedCD probe({.threads = 1});
-          const std::array ids{a.add(probe), b.add(probe)};
-          probe.addCollisionPair(ids[0], ids[1],
-                                 {.method = Method::Proximity,
-                                  .thickness = 1.2 * bound + 0.05,
-                                  .contacts = Contacts::All});
-          for (const double time : {1.0, 0.0, 0.25, 0.5, 0.75}) {
-            if (method == Method::Proximity && time < 1.0) break;
-            const auto place = [&](const StepBody& body, GeometryId id, GeometryId moved,
-                                   const Positions& from, const Positions& to) {
-              if (body.before.empty()) {
-                Pose pose = collisions.transform(moved);
-                const Vector3d start = moved == second && moves ? shift : Vector3d::Zero();
-                pose.translation = start + time * (pose.translation - start);
-                return probe.setTransform(id, pose);
-              }
-              Positions between(from.size());
-              for (std::size_t v = 0; v < from.size(); ++v)
-                between[v] = (1.0 - time) * from[v] + time * to[v];
-              probe.setPositions(id, between);
-            };
-            place(a, ids[0], first, a.before, a.now);
-            place(b, ids[1], second, before, now);
-            probe.detectCollision();
-            const CollisionData& data = probe.collisionData(ids[0], ids[1]);
-            nearest +=
-                !data.shape().empty() || !data.shapeShape().empty() || Rows(data).contacts() > 0;
-            forEachContact(data, [&](const auto& contact) {
-              EXPECT_GE(std::max(0.0, contact.distance), bound);
-            });
-          }
-        }
-      }
+  const auto expectBound = [&](const StepBody& a, const Vector3d& shift, const StepBody& b,
+                               Method method) {
+    SCOPED_TRACE(a.name + " with " + b.name + " by " + toString(method));
+    const bool self = &a == &b;
+    OctreeBasedCD collisions({.threads = 1});
+    const GeometryId first = a.add(collisions), second = self ? first : b.add(collisions);
+    collisions.addCollisionPair(first, second, {.method = method, .thickness = 0.01});
+    a.move(collisions, first);
+    if (!self) b.move(collisions, second);
+    if (shift != Vector3d::Zero()) {
+      Positions before = a.before, now = a.now;
+      for (Positions* all : {&before, &now})
+        for (Vector3d& x : *all) x += shift;
+      collisions.setPositions(first, before, now);
     }
+    EXPECT_FALSE(collisions.detectCollision(microseconds(0)));
+    const double bound = collisions.statistics().unfinishedPairs.at(0).distanceBound;
+    EXPECT_GE(bound, 0.0);
+    ++pairs, positive += bound > 0.0;
+    if (self) {
+      EXPECT_EQ(bound, 0.0);
+      return;
+    }
+    for (const double time : {1.0, 0.0, 0.25, 0.5, 0.75}) {
+      if (method == Method::Proximity && time < 1.0) break;  // it answers for the end
+      const double least = leastDistanceAt(time, a, shift, b, 1.2 * bound + 0.05);
+      nearest += std::isfinite(least);
+      EXPECT_GE(std::max(0.0, least), bound);
+    }
+  };
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    for (std::size_t j = i; j < bodies.size(); ++j)
+      for (const double away : {0.0, 0.9, 2.0})
+        for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
+          const StepBody &a = bodies[i], &b = bodies[j];
+          if (away > 0.0 && (i == j || a.before.empty() || a.name.starts_with("placed"))) continue;
+          const SupportedPairs* const row = supportOf(method, a.type, b.type, i == j);
+          if (row && answers(*row, a, b)) expectBound(a, away * Vector3d(0.6, 0.5, 0.7), b, method);
+        }
   EXPECT_GT(positive, pairs / 4);
   EXPECT_GT(nearest, pairs / 4);
-}
-
-/// A plane's half-space is bounded, too, unless it turns.
-TEST(Deadline, DistanceBoundsOfPlanes) {
-  Mesh cube = testing::cube(-0.5, 0.5);
-  for (Vector3d& x : cube.positions) x[2] += 3.0;
-  for (const bool twoSided : {false, true})
-    for (const double lift : {0.0, 1.0, 5.0}) {
-      OctreeBasedCD collisions({.threads = 1});
-      const GeometryId mesh = addMesh(collisions, cube),
-                       plane =
-                           collisions.addAnalyticalGeometry(Plane{{0, 0, 0}, {0, 0, 1}, twoSided});
-      collisions.addCollisionPair(mesh, plane, {.method = Method::Continuous, .thickness = 0.1});
-      collisions.setTransform(plane, {}, {Eigen::Matrix3d::Identity(), {0, 0, lift}});
-      collisions.detectCollision(microseconds(0));
-      const double bound = collisions.statistics().unfinishedPairs.at(0).distanceBound;
-      EXPECT_NEAR(bound, std::max(0.0, 2.5 - lift), 1e-12);
-      EXPECT_LE(bound, std::max(0.0, 2.5 - lift));
-    }
 }
 
 /// After a change of topology there is no answer to keep. Contacts that the new topology still has
@@ -571,11 +395,6 @@ TEST(Deadline, ChangedTopology) {
   const auto dataOf = [](Row& r) -> const CollisionData& {
     return r.collisions.collisionData(r.ids[0], r.ids[1]);
   };
-  LooksClock clock(row.collisions);
-  EXPECT_FALSE(row.collisions.detectCollision(microseconds(-1)));
-  EXPECT_EQ(Rows(dataOf(row)).contacts(), 0u);
-  EXPECT_EQ(dataOf(row).validity().age, 1u);
-  EXPECT_EQ(dataOf(row).validity().method, Method::Proximity);
   for (Row* each : {&row, &reference}) {
     each->collisions.detectCollision();
     each->collisions.advance();
@@ -597,87 +416,9 @@ TEST(Deadline, ChangedTopology) {
     }
   }
   for (Row* each : {&row, &reference}) each->collisions.detectCollision();
-  EXPECT_EQ(answerOf(dataOf(row)), answerOf(dataOf(reference)));
+  expectSame(dataOf(row), dataOf(reference), Knowledge::Same);
   EXPECT_GT(dataOf(row).trackedVertexTriangle().size() + dataOf(row).trackedEdgeEdge().size(), 0u);
   EXPECT_EQ(dataOf(row).validity().age, 0u);
-}
-
-/// The same for lists that are kept from one detection to the next.
-TEST(Deadline, KeptCandidates) {
-  const Mesh large = sphere(40, 60, {0, 0, 0}, 1.0);
-  const PairSettings pair{.method = Method::Proximity, .thickness = 0.02};
-  OctreeBasedCD found({.threads = 1}), truth({.threads = 1});
-  std::vector<GeometryId> ids;
-  for (OctreeBasedCD* each : {&found, &truth}) {
-    ids = {addMesh(*each, large), addMesh(*each, large)};
-    each->addCollisionPair(ids[0], ids[1], pair);
-  }
-  LooksClock clock(found);
-  std::size_t stopped = 0, stoppedWhileKept = 0;
-  std::int64_t most = 0;
-  for (int i = 0; i < 200; ++i) {
-    auto positions = large.positions;
-    for (Vector3d& x : positions) x[0] += 2.005 + 2e-4 * std::sin(0.1 * i);
-    const bool withBudget = i % 4 == 3;
-    for (OctreeBasedCD* each : {&found, &truth}) each->setPositions(ids[1], positions);
-    truth.detectCollision();
-    if (withBudget) {
-      const std::int64_t before = clock.looks();
-      const bool isStopped = !found.detectCollision(microseconds(i / 8));
-      stopped += isStopped;
-      stoppedWhileKept +=
-          isStopped && implementationOf(found).pairs.records()[0]->memory.kept.answers();
-      most = std::max(most, clock.looks() - before);
-    }
-    found.detectCollision();
-    ASSERT_EQ(found.collisionData(ids[0], ids[1]).hash(),
-              truth.collisionData(ids[0], ids[1]).hash());
-    ASSERT_EQ(found.statistics().candidatePairs > 0, truth.statistics().candidatePairs > 0);
-    for (OctreeBasedCD* each : {&found, &truth}) each->advance();
-  }
-  EXPECT_GT(stopped, 10u);
-  EXPECT_GT(stoppedWhileKept, 5u);
-  EXPECT_GT(most, 10);
-}
-
-/// The same for bodies that are deep in each other, at a share of the looks.
-TEST(Deadline, OverlappingBodies) {
-  const Mesh large = sphere(16, 24, {0, 0, 0}, 1.0), small = sphere(10, 14, {0, 0, 0}, 0.4);
-  OctreeBasedCD found({.threads = 1}), truth({.threads = 1});
-  std::array<GeometryId, 2> ids{};
-  for (OctreeBasedCD* each : {&found, &truth}) {
-    ids = {addMesh(*each, large), addMesh(*each, small)};
-    each->addCollisionPair(ids[0], ids[1], {.method = Method::Auto, .thickness = 0.02});
-    each->detectCollision();
-  }
-  LooksClock clock(found);
-  std::int64_t all = 0;
-  std::size_t stops = 0, deep = 0;
-  for (const double depth : {0.5, 0.95}) {  // within, and piercing
-    bool isComplete = false;
-    for (std::int64_t budget = 0, number = 0; !isComplete; ++number) {
-      auto positions = small.positions;
-      for (Vector3d& x : positions) x += Vector3d(depth, 0.1, 0.01 * std::sin(0.1 * number));
-      for (OctreeBasedCD* each : {&found, &truth}) {
-        each->advance();
-        each->setPositions(ids[1], positions);
-      }
-      truth.detectCollision();
-      const std::vector<Answer> before = answersOf(found), complete = answersOf(truth);
-      isComplete = found.detectCollision(microseconds(budget));
-      expectAnswers(found, before, complete, true);
-      const std::int64_t last = clock.looks();
-      found.detectCollision(microseconds::max());
-      all = clock.looks() - last;
-      EXPECT_EQ(answersOf(found), complete);
-      deep += implementationOf(found).pairs.records()[0]->found.byBodies;
-      ++stops;
-      budget += 1 + all / 200 * kShareOfCases;
-      if (HasFailure()) return;
-    }
-  }
-  EXPECT_GT(stops, 100u / kShareOfCases);
-  EXPECT_GT(deep, stops / 2);
 }
 
 /// Loops over all vertices of a body look at the clock as well.
@@ -704,10 +445,11 @@ TEST(Deadline, LargeBodiesThatOverlap) {
   EXPECT_EQ(looks, loops);
 }
 
-/// Queries, snapshots, guards and captures see the positions now, whatever pairs were not finished.
+/// Queries, snapshots, candidates and captures see the positions now, whatever pairs were not
+/// finished.
 TEST(Deadline, WhatElseReadsTheFrame) {
-  Row row(3, {.method = Method::Continuous, .thickness = 0.02}, {.threads = 1}),
-      reference(3, {.method = Method::Continuous, .thickness = 0.02}, {.threads = 1});
+  const PairSettings pair{.method = Method::Continuous, .thickness = 0.02, .priority = -7};
+  Row row(3, pair, {.threads = 1}), reference(3, pair, {.threads = 1});
   LooksClock clock(row.collisions);
   for (Row* each : {&row, &reference}) {
     each->collisions.detectCollision();
@@ -716,7 +458,6 @@ TEST(Deadline, WhatElseReadsTheFrame) {
   }
   EXPECT_FALSE(row.collisions.detectCollision(microseconds(2)));
   reference.collisions.detectCollision();
-  EXPECT_GE(row.collisions.statistics().unfinishedPairs.size(), 1u);
   const auto distanceIn = [](Row& r) {
     r.collisions.publish();
     return r.collisions.latestSnapshot()->queries().distance(r.ids[0], r.ids[1]).distance;
@@ -728,30 +469,12 @@ TEST(Deadline, WhatElseReadsTheFrame) {
 
   const TemporaryFolder folder;
   const auto file = folder.path / "unfinished.capture";
-  PairSettings pair{.method = Method::Continuous, .thickness = 0.02};
-  pair.priority = -7;
-  row.collisions.setPairSettings(row.ids[0], row.ids[1], pair);
   writeCapture(row.collisions.problem(), file);
   const CollisionProblem problem = readCapture(file);
   EXPECT_EQ(problem.pairs[0].settings.priority, -7);
   OctreeBasedCD replay = setUp(problem);
   replay.detectCollision();
-  EXPECT_EQ(replay.collisionData(replay.pairs()[0].a, replay.pairs()[0].b).hash(),
-            reference.collisions.collisionData(row.ids[0], row.ids[1]).hash());
-
-  std::vector<std::vector<HeldVertex>> held;
-  for (Row* each : {&row, &reference}) {
-    StepGuard guard(each->collisions);
-    EXPECT_GT(guard.hold(), 0u);
-    held.emplace_back(guard.held().begin(), guard.held().end());
-    each->collisions.detectCollision();
-  }
-  ASSERT_EQ(held[0].size(), held[1].size());
-  for (std::size_t i = 0; i < held[0].size(); ++i) {
-    EXPECT_EQ(held[0][i].vertex, held[1][i].vertex);
-    EXPECT_EQ(held[0][i].fraction, held[1][i].fraction);
-  }
-  EXPECT_EQ(answersOf(row.collisions), answersOf(reference.collisions));
+  EXPECT_EQ(answersOf(replay)[0].hash(), answersOf(reference.collisions)[0].hash());
 }
 
 /// cancelDetection() from another thread, while the detection waits for it in a predicate.
@@ -804,8 +527,8 @@ TEST(Deadline, PredicatesUseOtherObjects) {
       OctreeBasedCD other({.threads = threads});
       const auto ids = begin(other);
       other.detectCollision();
-      EXPECT_EQ(answersOf(other), answersOf(truth));
-      EXPECT_GT(contactsOf(other), 10u);
+      expectSameAnswers(other, answersOf(truth));
+      EXPECT_GT(other.statistics().contacts, 10u);
       EXPECT_EQ(other.queries().penetration(ids[0], ids[1]).depth, depth);
       hasEnded = true;
       return true;

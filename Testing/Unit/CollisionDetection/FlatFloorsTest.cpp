@@ -1,32 +1,12 @@
 #include <palpate/ConstraintRows.h>
-#include <palpate/FeaturePairs.h>
-#include <palpate/OctreeBasedCD.h>
 
-#include "Common/PairRun.h"
-#include "Common/RandomMeshes.h"
-#include "Common/Sanitized.h"
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <functional>
-#include <limits>
-#include <set>
-#include <string>
-#include <vector>
+#include "Common/TestGeometry.h"
 
 // The rows of a mesh that slides over another one, against the distance between the two meshes that
 // brute force over all features finds: no row asks for more than this distance needs.
 
 namespace palpate::testing {
 namespace {
-
-using Eigen::Vector3d;
-using Points = std::vector<Vector3d>;
 
 constexpr double kHeldGap = 0.2;
 
@@ -69,47 +49,30 @@ Mesh puckOf(std::uint32_t corners, double radius, double height) {
   return mesh;
 }
 
-std::set<std::array<std::uint32_t, 2>> edgesOf(const Mesh& mesh) {
-  std::set<std::array<std::uint32_t, 2>> edges;
-  for (const Triangle& t : mesh.triangles)
-    for (int i = 0; i < 3; ++i)
-      edges.insert({std::min(t[i], t[(i + 1) % 3]), std::max(t[i], t[(i + 1) % 3])});
-  return edges;
+/// By brute force.
+double distanceOf(const TestGeometry& floor, const TestGeometry& tool, const Positions& at) {
+  OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
+  const GeometryId below = addMesh(collisions, floor),
+                   above = collisions.addTriangleMesh(at, tool.triangles);
+  return collisions.queries().distance(below, above).distance;
 }
 
-double distanceOf(const Mesh& floor, const Mesh& tool, const Points& at) {
-  double least = std::numeric_limits<double>::infinity();
-  const auto vertices = [&](const Points& points, const Mesh& mesh, const Points& corners) {
-    for (const Vector3d& p : points)
-      for (const auto& [a, b, c] : mesh.triangles)
-        least =
-            std::min(least, vertexTriangleDistance(p, corners[a], corners[b], corners[c]).distance);
-  };
-  vertices(at, floor, floor.positions);
-  vertices(floor.positions, tool, at);
-  for (const auto& [p, q] : edgesOf(floor))
-    for (const auto& [r, s] : edgesOf(tool))
-      least = std::min(
-          least, edgeEdgeDistance(floor.positions[p], floor.positions[q], at[r], at[s]).distance);
-  return least;
-}
-
-Points placedAt(const Mesh& mesh, const Vector3d& place) {
-  Points points = mesh.positions;
-  for (Vector3d& p : points) p += place;
-  return points;
+Positions placedAt(const TestGeometry& mesh, const Vector3d& place) {
+  Positions positions = mesh.positions;
+  for (Vector3d& p : positions) p += place;
+  return positions;
 }
 
 /// A tool that slides in steps. At the end of each it is at least the gap away from the floor.
 struct Slide {
-  Mesh floor, tool;
-  std::vector<Points> positions;  ///< of the tool, after each step
+  TestGeometry floor, tool;
+  std::vector<Positions> positions;  ///< of the tool, after each step
   std::vector<double> distances;
 
   /// follows: the tool is lowered to the gap in each step.
   Slide(const Mesh& below, const Mesh& above, const Vector3d& start, const Vector3d& step,
         bool follows = false)
-      : floor(below), tool(above) {
+      : floor(testGeometry(below)), tool(testGeometry(above)) {
     for (int i = 0; i < 5; ++i) {
       Vector3d place = start + i * step;
       for (int k = 0; k < (follows ? 12 : 0); ++k)
@@ -130,12 +93,12 @@ double mostExcess(const Slide& slide, const PairSettings& settings, bool toolFir
   const auto size = static_cast<std::uint32_t>(slide.floor.positions.size());
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < slide.positions.size(); ++i) {
-    const Points& now = slide.positions[i];
+    const Positions& now = slide.positions[i];
     collisions.setPositions(tool, slide.positions[i - 1], now);
     collisions.detectCollision();
     std::vector<ConstraintRow> rows;
     collisions.collisionData(a, b).appendRows(rows, toolFirst ? size : 0, toolFirst ? 0 : size);
-    Points all = slide.floor.positions;
+    Positions all = slide.floor.positions;
     all.insert(all.end(), now.begin(), now.end());
     const double need = std::max(0.0, kHeldGap - slide.distances[i]);
     for (const ConstraintRow& row : rows) most = std::max(most, kHeldGap - row.gap(all) - need);

@@ -1,16 +1,9 @@
-#include <palpate/OctreeBasedCD.h>
 #include <palpate/PenetrationTracker.h>
 
 #include "Common/ExpectRefused.h"
 #include "Common/QueryCalls.h"
-#include "Common/RandomMeshes.h"
+#include "Common/ShapeTruth.h"
 #include "Common/TestGeometry.h"
-
-#include <Eigen/Geometry>
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <vector>
 
 // Functions that read the geometries and pairs of an OctreeBasedCD.
 
@@ -92,38 +85,24 @@ TEST(GeometryAccess, BoundsEncloseVerticesWithTheirRadii) {
 
 /// The furthest point of each shape along each axis, from its definition.
 TEST(GeometryAccess, BoundsOfShapesAreTight) {
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-  const Vector3d shift(0.3, -2, 5), p(1, 2, 3), q(2, 0, 4);
-  const auto boundsOf = [&](const AnalyticalGeometry& shape) {
+  Random random(3);
+  for (const AnalyticalGeometry& shape : shapesOfEveryKind(random)) {
+    const PlacedShape placed{shape, randomTurn(random), {0.3, -2, 5}};
     OctreeBasedCD collisions;
     const GeometryId id = collisions.addAnalyticalGeometry(shape);
-    collisions.setTransform(id, {turn, shift});
-    return collisions.bounds(id);
-  };
-  const auto expectBounds = [](const Eigen::AlignedBox3d& found, const Eigen::AlignedBox3d& truth) {
-    EXPECT_LE((found.min() - truth.min()).norm(), 1e-13);
-    EXPECT_LE((found.max() - truth.max()).norm(), 1e-13);
-  };
-  const auto around = [&](const Positions& points, const Vector3d& reach) {
-    Eigen::AlignedBox3d box;
-    for (const Vector3d& x : points) box.extend(turn * x + shift);
-    return Eigen::AlignedBox3d(box.min() - reach, box.max() + reach);
-  };
-  const Vector3d half = Vector3d::Constant(0.5);
-  expectBounds(boundsOf(Sphere{p, 0.5}), around({p}, half));
-  expectBounds(boundsOf(Capsule{p, q, 0.5}), around({p, q}, half));
-  const Vector3d axis = (turn * (q - p)).normalized();
-  expectBounds(boundsOf(Cylinder{p, q, 0.5}),
-               around({p, q}, 0.5 * (Vector3d::Ones() - axis.cwiseAbs2()).cwiseSqrt()));
-  Positions corners;
-  for (int i = 0; i < 8; ++i)
-    corners.push_back(p + Vector3d(i & 1 ? 1 : -1, i & 2 ? 2 : -2, i & 4 ? 3 : -3));
-  expectBounds(boundsOf(Box{p, {1, 2, 3}}), around(corners, Vector3d::Zero()));
-  expectBounds(boundsOf(ConvexHull{corners}), around(corners, Vector3d::Zero()));
-  const Eigen::AlignedBox3d plane = boundsOf(Plane{});
-  EXPECT_EQ(plane.min()[0], -std::numeric_limits<double>::infinity());
-  EXPECT_EQ(plane.max()[2], std::numeric_limits<double>::infinity());
+    collisions.setTransform(id, {placed.rotation, placed.translation});
+    const Eigen::AlignedBox3d found = collisions.bounds(id);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector3d way = Vector3d::Unit(axis);
+      if (std::holds_alternative<Plane>(shape)) {
+        EXPECT_EQ(found.max()[axis], std::numeric_limits<double>::infinity());
+        EXPECT_EQ(found.min()[axis], -std::numeric_limits<double>::infinity());
+      } else {
+        EXPECT_NEAR(found.max()[axis], reachOf(placed, way), 1e-13);
+        EXPECT_NEAR(found.min()[axis], -reachOf(placed, -way), 1e-13);
+      }
+    }
+  }
 }
 
 TEST(GeometryAccess, PairSettingsAreTheLastOnes) {

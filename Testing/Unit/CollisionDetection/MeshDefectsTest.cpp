@@ -3,15 +3,9 @@
 
 #include "Common/DegenerateCases.h"
 #include "Common/ExpectRefused.h"
-#include "Common/RandomMeshes.h"
 #include "Common/Sanitized.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <limits>
-#include <vector>
 
 // Meshes as they come from files: triangles with vertices of their own, parts, and windings.
 namespace palpate::testing {

@@ -1,11 +1,6 @@
 // Validity::advanceMayBeMissing.
-#include <palpate/OctreeBasedCD.h>
 
 #include "Common/TestGeometry.h"
-
-#include <gtest/gtest.h>
-
-#include <vector>
 
 namespace palpate::testing {
 namespace {

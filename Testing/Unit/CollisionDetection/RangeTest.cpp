@@ -3,11 +3,8 @@
 
 #include "Common/ExpectRefused.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <functional>
-#include <string>
 
 // The range of lengths: every call takes kLargestMeasure, and refuses the next double by name.
 

@@ -1,26 +1,15 @@
 #include <palpate/ConstraintRows.h>
-#include <palpate/FeaturePairs.h>
-#include <palpate/OctreeBasedCD.h>
 
-#include "Common/RandomMeshes.h"
-#include "Common/Sanitized.h"
+#include "Common/TestGeometry.h"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
 
 // Contacts::Distinct where a straight body lies across an edge of a bent surface: a solver that
 // meets all rows keeps the body away from the edge.
 
 namespace palpate::testing {
 namespace {
-
-using Eigen::Vector3d;
-using Positions = std::vector<Vector3d>;
 
 constexpr double kRadius = 0.25, kThickness = 0.2, kGap = 0.1;
 
@@ -37,18 +26,10 @@ struct Roof {
 };
 
 double leastGap(const Positions& line, const Roof& roof) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Triangle& t : roof.triangles)
-    for (int i = 0; i < 3; ++i) {
-      const Vector3d &p = roof.positions[t[i]], &q = roof.positions[t[(i + 1) % 3]];
-      least = std::min(least, edgeEdgeDistance(line[0], line[1], p, q).distance);
-    }
-  for (const Vector3d& p : line)
-    for (const auto& [a, b, c] : roof.triangles)
-      least = std::min(
-          least, vertexTriangleDistance(p, roof.positions[a], roof.positions[b], roof.positions[c])
-                     .distance);
-  return least - kRadius;
+  OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
+  const GeometryId a = collisions.addLineMesh(line, std::vector<Segment>{{0, 1}}, kRadius),
+                   b = collisions.addTriangleMesh(roof.positions, roof.triangles);
+  return collisions.queries().distance(a, b).distance;
 }
 
 /// Moves the two ends until no row has a smaller gap than kGap.

@@ -1,12 +1,9 @@
 #include "Common/PairRun.h"
 
-#include <gtest/gtest.h>
-
 #ifdef PALPATE_TESTS_WITH_TBB
 #include <tbb/parallel_for.h>
 #endif
 
-#include <array>
 #include <atomic>
 #include <thread>
 
@@ -33,17 +30,6 @@ std::vector<std::uint64_t> framesOf(const Settings& settings, std::uint64_t seed
     hashes.push_back(detection.collisionData(idA, idA).hash());
   }
   return hashes;
-}
-
-TEST(SeveralObjects, EachInAThreadOfItsOwn) {
-  std::vector<std::vector<std::uint64_t>> truth, found(4);
-  for (std::uint64_t i = 0; i < found.size(); ++i) truth.push_back(framesOf({.threads = 1}, i));
-  EXPECT_NE(truth[0], truth[1]);
-  std::vector<std::thread> threads;
-  for (std::uint64_t i = 0; i < found.size(); ++i)
-    threads.emplace_back([&, i] { found[i] = framesOf({.threads = 3}, i); });
-  for (std::thread& thread : threads) thread.join();
-  EXPECT_EQ(found, truth);
 }
 
 // Objects with threads of their own, and objects that share a pool with the one that works.

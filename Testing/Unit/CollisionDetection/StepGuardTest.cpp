@@ -1,16 +1,9 @@
 #include <palpate/StepGuard.h>
 
-#include <palpate/ConstraintRows.h>
 #include <palpate/FeaturePairs.h>
-#include <palpate/OctreeBasedCD.h>
 
 #include "Common/ExpectRefused.h"
-#include "Common/Sanitized.h"
 #include "Common/TestGeometry.h"
-
-#include <Eigen/Geometry>
-
-#include <limits>
 
 namespace palpate::testing {
 namespace {
@@ -41,10 +34,7 @@ struct Guarding {
 
 /// A guarded object with the geometries of a Guarding.
 struct Guarded {
-  explicit Guarded(const Guarding& all, const Settings& settings = settingsOf(Engine::Octree))
-      : collisions(settings), guard(collisions) {
-    all.add(collisions);
-  }
+  explicit Guarded(const Guarding& all) { all.add(collisions); }
   std::vector<Positions> hold(const Guarding& all) {
     all.set(collisions, all.now);
     guard.hold();
@@ -65,43 +55,21 @@ struct Guarded {
   }
 
   OctreeBasedCD collisions;
-  StepGuard guard;
+  StepGuard guard{collisions};
 };
 
-/// Whether vertices of a touch triangles of b, or, with edges, edges those of b. Computed from the
-/// definition, without radii.
-std::size_t countTouches(const Guarding& all, std::size_t a, std::size_t b, bool edges,
-                         const std::vector<Positions>& now) {
-  const TimeOfImpactSettings coarse{.timeTolerance = 1.0};
-  std::size_t touches = 0;
-  const auto start = [&](std::size_t body, std::uint32_t v) { return all.before[body][v]; };
-  const auto end = [&](std::size_t body, std::uint32_t v) { return now[body][v]; };
-  if (!edges) {
-    for (std::uint32_t v = 0; v < now[a].size(); ++v)
-      for (const auto& [i, j, k] : all.bodies[b].triangles) {
-        if (a == b && (v == i || v == j || v == k)) continue;
-        touches += vertexTriangleTimeOfImpact(start(a, v), start(b, i), start(b, j), start(b, k),
-                                              end(a, v), end(b, i), end(b, j), end(b, k), coarse)
-                       .has_value();
-      }
-    return touches;
-  }
-  for (const auto& [p, q] : all.bodies[a].edges())
-    for (const auto& [i, j] : all.bodies[b].edges()) {
-      if (a == b && (p == i || p == j || q == i || q == j)) continue;
-      touches += edgeEdgeTimeOfImpact(start(a, p), start(a, q), start(b, i), start(b, j), end(a, p),
-                                      end(a, q), end(b, i), end(b, j), coarse)
-                     .has_value();
-    }
-  return touches;
-}
-
+/// How many features touch within the step, by brute force.
 std::size_t countTouches(const Guarding& all, const std::vector<Positions>& now) {
-  std::size_t touches = 0;
+  OctreeBasedCD collisions(settingsOf(Engine::BruteForce));
+  for (const TestGeometry& body : all.bodies) body.addTo(collisions);
   for (const auto& [a, b] : all.pairs)
-    touches += countTouches(all, a, b, false, now) + countTouches(all, b, a, false, now) +
-               countTouches(all, a, b, true, now);
-  return touches;
+    collisions.addCollisionPair(Guarding::idOf(a), Guarding::idOf(b),
+                                {.method = Method::Continuous,
+                                 .contacts = Contacts::All,
+                                 .continuous = {.timeTolerance = 1.0}});
+  all.set(collisions, now);
+  collisions.detectCollision();
+  return collisions.statistics().contacts;
 }
 
 Guarding everything(Random& random) {
@@ -129,38 +97,28 @@ TEST(StepGuard, NothingTouchesAfterItAndEachVertexMakesItsFraction) {
   Random random(181);
   for (const double most : {0.02, 0.1, 0.4}) {
     Guarding all = everything(random);
-    std::vector<std::unique_ptr<Guarded>> guards;
-    for (const Settings& settings : {settingsOf(Engine::Octree, 1), settingsOf(Engine::Octree, 8),
-                                     settingsOf(Engine::BruteForce, 1)})
-      guards.push_back(std::make_unique<Guarded>(all, settings));
+    Guarded guarded(all);
     for (int step = 0; step < (kShareOfCases == 1 || most == 0.1 ? 2 : 1); ++step) {
       for (std::size_t i = 0; i < all.now.size(); ++i)
         all.now[i] = moved(random, all.before[i], most);
       EXPECT_GT(countTouches(all, all.now), 0u);
-      std::vector<std::vector<Positions>> ends;
-      for (const auto& guarded : guards) {
-        ends.push_back(guarded->hold(all));
-        EXPECT_EQ(ends.back(), ends[0]);
-        EXPECT_TRUE(std::ranges::equal(guarded->guard.held(), guards[0]->guard.held()));
-        EXPECT_EQ(guarded->guard.rounds(), guards[0]->guard.rounds());
-      }
-      EXPECT_EQ(countTouches(all, ends[0]), 0u) << "moved " << most << ", step " << step;
-      std::size_t held = 0, stopped = 0;
+      const std::vector<Positions> ends = guarded.hold(all);
+      EXPECT_EQ(countTouches(all, ends), 0u) << "moved " << most << ", step " << step;
+      std::size_t held = 0;
       for (std::size_t body = 0; body < all.bodies.size(); ++body)
         for (std::uint32_t v = 0; v < all.now[body].size(); ++v) {
-          const double fraction = guards[0]->fraction(body, v);
+          const double fraction = guarded.fraction(body, v);
           held += fraction < 1.0;
-          stopped += fraction == 0.0;
-          EXPECT_LE(offTheWay(all.before[body][v], all.now[body][v], ends[0][body][v], fraction),
+          EXPECT_GT(fraction, 0.0) << "everything creeps on";
+          EXPECT_LE(offTheWay(all.before[body][v], all.now[body][v], ends[body][v], fraction),
                     1e-15);
         }
-      EXPECT_EQ(held, guards[0]->guard.held().size());
+      EXPECT_EQ(held, guarded.guard.held().size());
       EXPECT_GT(held, 0u);
-      EXPECT_EQ(stopped, 0u) << "everything creeps on";
-      EXPECT_EQ(guards[0]->guard.hold(), 0u) << "a second call changes nothing";
-      EXPECT_EQ(guards[0]->guard.rounds(), 1u);
-      EXPECT_EQ(guards[0]->ends(all), ends[0]);
-      all.before = ends[0];
+      EXPECT_EQ(guarded.guard.hold(), 0u) << "a second call changes nothing";
+      EXPECT_EQ(guarded.guard.rounds(), 1u);
+      EXPECT_EQ(guarded.ends(all), ends);
+      all.before = ends;
     }
   }
 }
@@ -319,72 +277,6 @@ TEST(StepGuard, PlacedBodiesStayRigidAndTouchNothing) {
   }
 }
 
-/// A rigid sphere is pressed into a sheet and slid along it. The solver moves the sheet's vertices
-/// out of the way in a single round with a single iteration.
-TEST(StepGuard, AToolPressedIntoASheetCreepsOn) {
-  Guarding all;
-  all.add(testGeometry(sheet(14, 0.5, 0.02)));
-  all.add(testGeometry(sphere(7, 9, {0, 0, 0}, 0.16)));
-  all.pairs.push_back({0, 1});
-  constexpr double kWanted = 0.01, kRate = 0.01;
-  OctreeBasedCD collisions(settingsOf(Engine::Octree));
-  const GeometryId cloth = addMesh(collisions, all.bodies[0]),
-                   tool = addMesh(collisions, all.bodies[1]);
-  collisions.addCollisionPair(cloth, tool, {.thickness = 2 * kWanted});
-  StepGuard guard(collisions);
-  Vector3d at(0.35, 0.5, 0.72);
-  collisions.setTransform(tool, {.translation = at});
-  collisions.advance();
-  const Positions rest = all.bodies[0].positions;
-  Positions now = rest;
-  const auto toolAt = [&](const Vector3d& place) {
-    Positions positions = all.bodies[1].positions;
-    for (Vector3d& p : positions) p += place;
-    return positions;
-  };
-  int still = 0, held = 0;
-  for (int step = 0; step < 120; ++step) {
-    all.before = {now, toolAt(at)};
-    const Vector3d target(0.35 + (step > 40 ? 0.004 * (step - 40) : 0.0), 0.5,
-                          std::max(0.72 - kRate * step, 0.52));
-    const Vector3d way = target - at,
-                   wanted = at + way * std::min(1.0, 2 * kRate / std::max(way.norm(), 1e-300));
-    collisions.setPositions(cloth, now);
-    collisions.setTransform(tool, {.translation = wanted});
-    collisions.detectCollision();
-    std::vector<ConstraintRow> rows;
-    const auto first = static_cast<std::uint32_t>(now.size());
-    const Positions toolNow = toolAt(wanted);
-    appendRows(collisions.collisionData(cloth, tool), {0, all.before[0], now},
-               {first, all.before[1], toolNow}, rows);
-    now.insert(now.end(), toolNow.begin(), toolNow.end());
-    for (const ConstraintRow& row : rows) {
-      double mobility = 0;
-      for (int i = 0; i < 4; ++i)
-        if (row.vertices[i] < first) mobility += row.weights[i] * row.weights[i];
-      const double depth = kWanted - row.gap(now);
-      for (int i = 0; i < 4 && depth > 0 && mobility > 0; ++i)
-        if (row.vertices[i] < first)
-          now[row.vertices[i]] += row.weights[i] * depth / mobility * row.normal;
-    }
-    now.resize(first);
-    // What comes last in the round wins, and the sheet is pulled back into the tool.
-    for (std::size_t v = 0; v < now.size(); ++v) now[v] += 0.1 * (rest[v] - now[v]);
-    collisions.setPositions(cloth, now);
-    held += guard.hold() > 0;
-    now.assign(collisions.positions(cloth).begin(), collisions.positions(cloth).end());
-    const Vector3d reached = collisions.transform(tool).translation;
-    still += (reached - at).norm() < 0.01 * (wanted - at).norm();
-    at = reached;
-    if (!isLeftOut(static_cast<std::size_t>(step))) {
-      ASSERT_EQ(countTouches(all, {now, toolAt(at)}), 0u) << "step " << step;
-    }
-    collisions.advance();
-  }
-  EXPECT_GT(held, 10);
-  EXPECT_LE(still, 20) << "of 120 steps";
-}
-
 /// Expects hold() to throw this error, to name the geometry and the vertex, and to change nothing.
 void expectImpactRemains(Guarded& guarded, const Guarding& all, const std::string& sentence) {
   all.set(guarded.collisions, all.now);
@@ -476,34 +368,37 @@ TEST(StepGuard, FixedVerticesMakeTheirWholeStep) {
 }
 
 TEST(StepGuard, FiltersOfTheObjectApply) {
-  Guarding all = vertexOverTriangle(-1);
-  Guarded guarded(all);
-  OctreeBasedCD& collisions = guarded.collisions;
-  EXPECT_NE(guarded.hold(all), all.now);
-  guarded.guard.setGuarded(GeometryId{1}, GeometryId{0}, false);
-  EXPECT_EQ(guarded.hold(all), all.now);
-  guarded.guard.setGuarded(GeometryId{0}, GeometryId{1}, true);
-  EXPECT_NE(guarded.hold(all), all.now);
-  collisions.setContactPredicate(GeometryId{0}, GeometryId{1},
-                                 [](const ContactFeatures&) { return false; });
-  EXPECT_EQ(guarded.hold(all), all.now);
-  collisions.setContactPredicate(GeometryId{0}, GeometryId{1}, {});
-  EXPECT_NE(guarded.hold(all), all.now);
-  collisions.setCollisionFilter(GeometryId{0}, {.groups = 2, .mask = 2});
-  EXPECT_EQ(guarded.hold(all), all.now);
-  collisions.setCollisionFilter(GeometryId{0}, {.sidedness = Sidedness::Outer});
-  EXPECT_NE(guarded.hold(all), all.now) << "from the side of the winding normal";
+  const Guarding all = vertexOverTriangle(-1);
   Guarding below = all;
   std::swap(below.before[1], below.now[1]);
-  EXPECT_EQ(guarded.hold(below), below.now);
-  collisions.setCollisionFilter(GeometryId{0}, {});
-  EXPECT_NE(guarded.hold(below), below.now);
-  collisions.removeCollisionPair(GeometryId{0}, GeometryId{1});
-  EXPECT_EQ(guarded.hold(all), all.now);
-  collisions.addCollisionPair(GeometryId{1}, GeometryId{0});
-  EXPECT_NE(guarded.hold(all), all.now);
-  collisions.removeGeometry(GeometryId{0});
-  collisions.setPositions(GeometryId{1}, all.before[1], all.now[1]);
+  Guarded guarded(all);
+  OctreeBasedCD& collisions = guarded.collisions;
+  const GeometryId a{0}, b{1};
+  const auto expectHeld = [&](bool isHeld, const Guarding& step) {
+    EXPECT_EQ(guarded.hold(step) != step.now, isHeld);
+  };
+  expectHeld(true, all);
+  guarded.guard.setGuarded(b, a, false);
+  expectHeld(false, all);
+  guarded.guard.setGuarded(a, b, true);
+  expectHeld(true, all);
+  collisions.setContactPredicate(a, b, [](const ContactFeatures&) { return false; });
+  expectHeld(false, all);
+  collisions.setContactPredicate(a, b, {});
+  expectHeld(true, all);
+  collisions.setCollisionFilter(a, {.groups = 2, .mask = 2});
+  expectHeld(false, all);
+  collisions.setCollisionFilter(a, {.sidedness = Sidedness::Outer});
+  expectHeld(true, all);  // from the side of the winding normal
+  expectHeld(false, below);
+  collisions.setCollisionFilter(a, {});
+  expectHeld(true, below);
+  collisions.removeCollisionPair(a, b);
+  expectHeld(false, all);
+  collisions.addCollisionPair(b, a);
+  expectHeld(true, all);
+  collisions.removeGeometry(a);
+  collisions.setPositions(b, all.before[1], all.now[1]);
   EXPECT_EQ(guarded.guard.hold(), 0u);
 }
 
@@ -555,8 +450,8 @@ TEST(StepGuard, SegmentsDoNotOverlap) {
     const auto clearance = [&](const std::vector<Positions>& now) {
       double least = std::numeric_limits<double>::infinity();
       for (int i = 0; i <= 16; ++i)
-        for (int k = 0; k <= 64; ++k) {
-          const double t = i / 16.0, w = k / 64.0;
+        for (int k = 0; k <= 32; ++k) {
+          const double t = i / 16.0, w = k / 32.0;
           const auto at = [&](int body, int v) -> Vector3d {
             return (1 - t) * all.before[body][v] + t * now[body][v];
           };
@@ -594,40 +489,26 @@ TEST(StepGuard, ShapesDoNotSinkIntoAMesh) {
     for (const double turn : {0.0, 0.5}) {
       if (isLeftOut(number++)) continue;
       SCOPED_TRACE(std::to_string(shape.index()) + ", turned " + std::to_string(turn));
-      const Mesh cloth = sheet(8, 0.5, 0.1);
-      OctreeBasedCD collisions(settingsOf(Engine::Octree));
-      OctreeBasedCD reference(settingsOf(Engine::BruteForce));
-      StepGuard guard(collisions), other(reference);
-      for (OctreeBasedCD* each : {&collisions, &reference}) {
-        const GeometryId mesh = each->addTriangleMesh(cloth.positions, cloth.triangles),
-                         tool = each->addAnalyticalGeometry(shape);
-        each->addCollisionPair(mesh, tool);
-        each->setTransform(tool, {turned(0.2), {0.5, 0.5, 0.95}});
-        each->advance();
-      }
-      const GeometryId mesh{0}, tool{1};
-      double height = 0.95, angle = 0.2;
+      OctreeBasedCD collisions;
+      const GeometryId mesh = addMesh(collisions, sheet(8, 0.5, 0.1)),
+                       tool = collisions.addAnalyticalGeometry(shape);
+      collisions.addCollisionPair(mesh, tool);
+      StepGuard guard(collisions);
+      Pose pose{turned(0.2), {0.5, 0.5, 0.95}};
+      collisions.setTransform(tool, pose);
+      collisions.advance();
       for (int step = 0; step < 12; ++step) {
         // Sinks until it is stopped, and slides.
-        for (OctreeBasedCD* each : {&collisions, &reference})
-          each->setTransform(tool,
-                             {turned(angle + turn * 0.1), {0.5 + 0.01 * step, 0.5, height - 0.1}});
+        const Vector3d lower(0.5 + 0.01 * step, 0.5, pose.translation.z() - 0.1);
+        collisions.setTransform(tool, {turned(0.2 + turn * 0.1 * (step + 1)), lower});
         guard.hold();
-        other.hold();
-        const Pose pose = collisions.transform(tool);
-        EXPECT_EQ(pose.translation, reference.transform(tool).translation);
-        EXPECT_EQ(pose.rotation, reference.transform(tool).rotation);
+        pose = collisions.transform(tool);
         EXPECT_GT(collisions.queries().distance(mesh, tool).distance, 0.0);
-        if (turn == 0.0) height = pose.translation.z();
-        if (turn != 0.0) height = pose.translation.z(), angle += turn * 0.1;
-        collisions.setTransform(tool, {pose.rotation, pose.translation});
         collisions.advance();
-        reference.advance();
       }
       EXPECT_LT(collisions.queries().distance(mesh, tool).distance, 0.01) << "it came near";
       // It may leave, also from where the guard stopped it again and again.
-      const Vector3d away = collisions.transform(tool).translation + Vector3d(0.1, 0, 0.3);
-      collisions.setTransform(tool, {collisions.transform(tool).rotation, away});
+      collisions.setTransform(tool, {pose.rotation, pose.translation + Vector3d(0.1, 0, 0.3)});
       EXPECT_EQ(guard.hold(), 0u);
     }
 }
@@ -674,15 +555,11 @@ TEST(StepGuard, ShapesDoNotSinkIntoEachOtherNorThroughPlanes) {
 TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   Random random(184);
   Guarding all = everything(random);
-  Guarded guarded(all), unfailed(all);
+  Guarded guarded(all);
   for (Positions& positions : all.now) positions = moved(random, positions, 0.1);
-  const std::vector<Positions> first = guarded.hold(all);
-  EXPECT_EQ(unfailed.hold(all), first);
-  all.before = first;
+  const std::vector<Positions> ends = guarded.hold(all);
   const std::vector<HeldVertex> held(guarded.guard.held().begin(), guarded.guard.held().end());
-  const std::size_t rounds = guarded.guard.rounds();
-  for (Positions& positions : all.now) positions = moved(random, positions, 0.1);
-  // Others have been shortened. Then particle 0 is before the step where particle 1 is.
+  // Others are shortened before the guard finds that particle 0 starts where particle 1 is.
   Guarding together = all;
   together.before[4][0] = together.before[4][1];
   together.now[4][0] = together.now[4][1];
@@ -690,23 +567,21 @@ TEST(StepGuard, BadInputIsRefusedAndChangesNothing) {
   expectRefused(ErrorCode::ImpactRemains, "", [&] { guarded.guard.hold(); });
   EXPECT_EQ(guarded.ends(together), together.now);
   EXPECT_TRUE(std::ranges::equal(guarded.guard.held(), held));
-  EXPECT_EQ(guarded.guard.rounds(), rounds);
   StepGuard& guard = guarded.guard;
-  expectRefused(ErrorCode::UnknownGeometry, "",
-                [&] { guard.addRigidGroup(std::array{GuardedVertex{GeometryId{9}}}); });
+  const GeometryId particle{4}, unknown{9};
+  const auto addGroup = [&](GeometryId id, std::uint32_t vertex) {
+    guard.addRigidGroup(std::array{GuardedVertex{GeometryId{0}, 0}, GuardedVertex{id, vertex}});
+  };
+  expectRefused(ErrorCode::UnknownGeometry, "", [&] { addGroup(unknown, kNoElement); });
+  expectRefused(ErrorCode::IndexOutOfRange, "", [&] { addGroup(particle, 40); });
   expectRefused(ErrorCode::IndexOutOfRange, "", [&] {
-    guard.addRigidGroup(
-        std::array{GuardedVertex{GeometryId{0}, 0}, GuardedVertex{GeometryId{4}, 40}});
+    guard.setFixedVertices(particle, std::array{0u, 40u});
   });
-  expectRefused(ErrorCode::IndexOutOfRange, "", [&] {
-    guard.setFixedVertices(GeometryId{4}, std::array{0u, 40u});
-  });
-  expectRefused(ErrorCode::UnknownGeometry, "", [&] { guard.setFixedVertices(GeometryId{9}, {}); });
-  guarded.collisions.removeCollisionPair(GeometryId{4}, GeometryId{4});
-  expectRefused(ErrorCode::UnknownPair, "",
-                [&] { guard.setGuarded(GeometryId{4}, GeometryId{4}, false); });
-  guarded.collisions.addCollisionPair(GeometryId{4}, GeometryId{4});
-  EXPECT_EQ(guarded.hold(all), unfailed.hold(all));
+  expectRefused(ErrorCode::UnknownGeometry, "", [&] { guard.setFixedVertices(unknown, {}); });
+  guarded.collisions.removeCollisionPair(particle, particle);
+  expectRefused(ErrorCode::UnknownPair, "", [&] { guard.setGuarded(particle, particle, false); });
+  guarded.collisions.addCollisionPair(particle, particle);
+  EXPECT_EQ(guarded.hold(all), ends);
 
   StepGuard other = std::move(guard);
   expectRefused(ErrorCode::InvalidCall, "", [&] { guard.hold(); });

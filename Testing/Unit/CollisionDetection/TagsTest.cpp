@@ -1,13 +1,8 @@
 #include "Common/ExpectRefused.h"
-#include "Common/PairRun.h"
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 
 #include <palpate/Capture.h>
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
 
 // OctreeBasedCD::setTags(), beside tags that are looked up in the elements as they were given.
 
@@ -159,42 +154,6 @@ TEST(Tags, OfShapesAndTetrahedra) {
   const CollisionData& shapes = collisions.collisionData(tool, other);
   ASSERT_EQ(shapes.shapeShape().size(), 1u);
   EXPECT_EQ(shapes.tagsOf(shapes.shapeShape()[0]), (ContactTags{5, 0}));
-}
-
-TEST(Tags, ReachPredicates) {
-  Random random(3);
-  const TestGeometry first = testGeometry(soup(random, 100, 0.2)),
-                     second = testGeometry(soup(random, 100, 0.2));
-  OctreeBasedCD collisions;
-  const GeometryId a = first.addTo(collisions), b = second.addTo(collisions);
-  Tags tagsA, tagsB;
-  for (std::uint32_t i = 0; i < 100; ++i) tagsA.push_back(i % 3), tagsB.push_back(i % 4);
-  collisions.setTags(a, tagsA);
-  collisions.setTags(b, tagsB);
-  const PairSettings settings{
-      .method = Method::Proximity, .thickness = 0.05, .contacts = Contacts::All};
-  collisions.addCollisionPair(a, b, settings);
-  collisions.detectCollision();
-  const CollisionData all = collisions.collisionData(a, b);
-  collisions.setContactPredicate(
-      a, b, [](const ContactFeatures& f) { return f.tagA == 1 && f.tagB != 2; });
-  collisions.detectCollision();
-  const auto expectLeft = [&](auto list) {
-    const CollisionData& left = collisions.collisionData(a, b);
-    std::vector<typename decltype((all.*list)())::value_type> truth;
-    for (const auto& c : (all.*list)())
-      if (const auto [tagA, tagB] = all.tagsOf(c); tagA == 1 && tagB != 2) truth.push_back(c);
-    EXPECT_FALSE(truth.empty());
-    EXPECT_TRUE(std::ranges::equal((left.*list)(), truth));
-  };
-  expectLeft(&CollisionData::vertexTriangle);
-  expectLeft(&CollisionData::triangleVertex);
-  expectLeft(&CollisionData::edgeEdge);
-  // New tags alone make a new answer.
-  const std::size_t contacts = collisions.statistics().contacts;
-  collisions.setTags(a, Tags(100, 1));
-  collisions.detectCollision();
-  EXPECT_GT(collisions.statistics().contacts, contacts);
 }
 
 TEST(Tags, AreInSnapshotsAndProblems) {

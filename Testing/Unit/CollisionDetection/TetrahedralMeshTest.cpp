@@ -2,13 +2,7 @@
 #include "Common/Solids.h"
 #include "Common/TestGeometry.h"
 
-#include <palpate/OctreeBasedCD.h>
-
-#include <gtest/gtest.h>
-
-#include <limits>
 #include <map>
-#include <string>
 
 namespace palpate::testing {
 namespace {
@@ -141,122 +135,59 @@ TEST(TetrahedralMesh, TetrahedraWithoutVolumeAreWoundAsTheirNeighbours) {
   EXPECT_EQ(surfaceOf({}).triangles.size(), 0u);
 }
 
-/// Contacts of a pair over three frames, in which the solid is deformed, moved and cut.
-std::vector<Rows> contactsOver(const Settings& settings, const Solid& solid, const Solid& cut,
-                               bool asTriangles, const TestGeometry& other,
-                               const PairSettings& pair) {
-  Random random(3);
-  OctreeBasedCD detection(settings);
-  const Surface before = surfaceOf(solid), after = surfaceOf(cut);
-  const GeometryId body = asTriangles
-                              ? detection.addTriangleMesh(solid.positions, before.triangles)
-                              : detection.addTetrahedralMesh(solid.positions, solid.tetrahedra),
-                   second = other.addTo(detection);
-  detection.addCollisionPair(body, second, pair);
-  std::vector<Rows> rows;
-  const auto frame = [&] {
-    detection.detectCollision();
-    detection.advance();
-    EXPECT_EQ(detection.octree().validate(), std::vector<std::string>{});
-    EXPECT_TRUE(detection.auditFailures().empty());
-    rows.emplace_back(detection.collisionData(body, second));
-  };
-  frame();
-  detection.setPositions(body, moved(random, solid.positions, 0.2));
-  frame();
-  asTriangles ? detection.setTriangles(body, cut.positions, after.triangles)
-              : detection.setTetrahedra(body, cut.positions, cut.tetrahedra);
-  frame();
-  detection.setTransform(
-      body, {Eigen::AngleAxisd(0.1, Vector3d::UnitX()).toRotationMatrix(), {0.01, 0, 0}});
-  frame();
-  return rows;
-}
-
-TEST(TetrahedralMesh, CollidesAsItsSurfaceWithEveryGeometryTypeByEveryMethod) {
-  Random random(4);
-  Solid solid = cells(3, random), cut = solid;
-  for (Vector3d& p : solid.positions) p = p / 3 + randomPoint(random, -0.02, 0.02);
-  for (Vector3d& p : cut.positions) p /= 3;
-  std::erase_if(cut.tetrahedra, [&](const Tetrahedron&) { return random() % 5 == 0; });
-  const TestGeometry kinds[] = {testGeometry(sphere(8, 12, {0.9, 0.5, 0.5}, 0.4)),
-                                thread(random, 60, 0.3, 0.01, false), particles(random, 100, 0.02)};
-  Settings audited = settingsOf(Engine::Octree, 2);
-  audited.audit.features = 20;
-  std::size_t contacts = 0;
-  for (const TestGeometry& geometry : kinds) {
-    std::vector<PairSettings> settings = settingsFor(0.02);
-    if (geometry.type == GeometryType::Triangles) {
-      settings.push_back({Method::Intersection, 0.0});
-      settings.push_back({Method::Auto, 0.02});
-    }
-    for (const PairSettings& pair : settings) {
-      const auto rows = contactsOver(audited, solid, cut, false, geometry, pair);
-      expectSame(rows, contactsOver(audited, solid, cut, true, geometry, pair));
-      for (const Rows& r : rows) contacts += r.contacts();
-    }
-  }
-  EXPECT_GT(contacts, 1000u);
-}
-
 TEST(TetrahedralMesh, BadInputThrowsErrorsThatNameIt) {
-  const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {2, 1, 1}};
+  using enum ErrorCode;
   using Tetrahedra = std::vector<Tetrahedron>;
-  OctreeBasedCD detection(settingsOf(Engine::Octree));
+  const Positions some{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {2, 1, 1}};
+  Positions bad = some;
+  bad[4][1] = std::numeric_limits<double>::quiet_NaN();
+  OctreeBasedCD detection;
   const GeometryId mesh = detection.addTriangleMesh(some, std::vector<Triangle>{{0, 1, 2}}),
                    solid = detection.addTetrahedralMesh(some, Tetrahedra{{0, 1, 2, 3}});
-  for (const bool again : {false, true}) {
-    const std::string name = again ? "geometry 1" : "geometry 2";
-    const auto give = [&](const Positions& positions, const Tetrahedra& tetrahedra) {
-      if (again)
-        detection.setTetrahedra(solid, positions, tetrahedra);
-      else
-        detection.addTetrahedralMesh(positions, tetrahedra);
-    };
+  struct Bad {
+    ErrorCode code;
+    std::size_t element;
+    const char* words;
+    const Positions& positions;
+    Tetrahedra tetrahedra;
+  };
+  const std::vector<Bad> all{
+      {IndexOutOfRange,
+       1,
+       ", tetrahedron 1: vertex index 6 is out of range; the mesh has 6 vertices",
+       some,
+       {{0, 1, 2, 3}, {1, 2, 3, 6}}},
+      {IndexOutOfRange, 0, ", tetrahedron 0 has vertex 3 twice", some, {{3, 1, 2, 3}}},
+      {SharedFace,
+       3,
+       ", tetrahedron 3: its face with vertices 0, 1 and 2 already belongs to tetrahedra 0 and 1",
+       some,
+       {{0, 1, 2, 3}, {4, 2, 1, 0}, {1, 2, 3, 5}, {5, 0, 1, 2}}},
+      {NonFinitePosition,
+       4,
+       ", vertex 4: position is (1, nan, 1); positions must be finite and at most 1e+300 in "
+       "magnitude",
+       bad,
+       {{0, 1, 2, 3}}}};
+  for (const Bad& one : all) {
+    const std::string words = one.words;
     expectRefused(
-        ErrorCode::IndexOutOfRange,
-        name + ", tetrahedron 1: vertex index 6 is out of range; the mesh has 6 vertices",
-        [&] {
-          give(some, {{0, 1, 2, 3}, {1, 2, 3, 6}});
-        },
-        {}, 1);
+        one.code, "geometry 2" + words,
+        [&] { detection.addTetrahedralMesh(one.positions, one.tetrahedra); }, {}, one.element);
     expectRefused(
-        ErrorCode::IndexOutOfRange, name + ", tetrahedron 0 has vertex 3 twice",
-        [&] {
-          give(some, {{3, 1, 2, 3}});
-        },
-        {}, 0);
-    expectRefused(
-        ErrorCode::SharedFace,
-        name +
-            ", tetrahedron 3: its face with vertices 0, 1 and 2 already belongs to "
-            "tetrahedra 0 and 1",
-        [&] {
-          give(some, {{0, 1, 2, 3}, {4, 2, 1, 0}, {1, 2, 3, 5}, {5, 0, 1, 2}});
-        },
-        {}, 3);
-    Positions bad = some;
-    bad[4][1] = std::numeric_limits<double>::quiet_NaN();
-    expectRefused(
-        ErrorCode::NonFinitePosition,
-        name +
-            ", vertex 4: position is (1, nan, 1); positions must be finite and at most "
-            "1e+300 in magnitude",
-        [&] {
-          give(bad, {{0, 1, 2, 3}});
-        },
-        {}, 4);
+        one.code, "geometry 1" + words,
+        [&] { detection.setTetrahedra(solid, one.positions, one.tetrahedra); }, {}, one.element);
   }
-  expectRefused(ErrorCode::UnsupportedMethod,
+  expectRefused(UnsupportedMethod,
                 "geometry 1 is a tetrahedral mesh; setTriangles() is for triangle meshes",
                 [&] { detection.setTriangles(solid, some, {}); });
-  expectRefused(ErrorCode::UnsupportedMethod,
+  expectRefused(UnsupportedMethod,
                 "geometry 0 is a triangle mesh; setTetrahedra() is for tetrahedral meshes",
                 [&] { detection.setTetrahedra(mesh, some, {}); });
-  expectRefused(ErrorCode::UnsupportedMethod,
+  expectRefused(UnsupportedMethod,
                 "geometry 0 is a triangle mesh; surface() is for tetrahedral meshes",
                 [&] { detection.surface(mesh); });
-  expectRefused(ErrorCode::WrongPositionCount,
+  expectRefused(WrongPositionCount,
                 "geometry 1: 5 positions given, but it has 6 vertices; setTetrahedra() changes "
                 "their number",
                 [&] { detection.setPositions(solid, Positions(5, Vector3d::Zero())); });
