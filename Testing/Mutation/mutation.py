@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""mutation.py [OPTION...]: plants faults in a copy of Source, and shows which of them unit tests notice.
+"""mutation.py [OPTION...]: plants faults in a copy of Source, and shows which of them tests notice.
 
-All faults are compiled into one build, and the environment variable PALPATE_FAULT selects one. The tests of a module
-are linked with its planted files; the other modules come from the library of a release build. For each fault the tests
-of its module run until one fails; the quickest run first. Outcomes are appended to a file, and a later call continues
-after them.
+All faults are compiled into one build, and the environment variable PALPATE_FAULT selects one. First each test runs
+alone and without a fault, which says which faults it evaluates. Then, for each fault, the tests that evaluate it run
+until one fails: first the test that noticed it before, then the quick tests that noticed many faults of its module.
+Outcomes are appended to a file. A later call continues after them, and repeats a fault if its test is gone.
 """
 import argparse
+import collections
 import concurrent.futures
+import contextlib
 import csv
 import hashlib
 import json
@@ -18,24 +20,28 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
+import threading
 from pathlib import Path
 
 from sites import File
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = ['Exact', 'Math', 'Octree', 'Contact', 'NarrowPhase', 'Queries']
+MODULES = sorted(path.name for path in (ROOT / 'Source').iterdir() if any(path.glob('*.h')))
+FOLDERS = [f'Unit/{module}' for module in MODULES if (ROOT / 'Testing' / 'Unit' / module).is_dir()] + ['Frame']
+BINARIES = [folder.replace('/', '') for folder in FOLDERS]
 KINDS = ['comparison', 'off by one', 'bound', 'sign', 'logic', 'minimum or maximum']
-PER_MODULE = 84  # faults that are planted in each module, before those that do not compile are taken out
-REQUIRED = 300
+PER_MODULE = 52  # faults that are planted in each module, before those that do not compile are taken out
 SELECTOR = 'Core/PlantedFault.h'
 PLACE = re.compile(r'Source/(\S+?):(\d+):\d+: ')
 MEMORY = 8 << 30  # bytes of address space of a test
-# Fewer SIMD paths build in less time; range checks of the standard library notice more.
-FLAGS = "-std=c++20 -O1 -w -DNDEBUG -fPIE -ffp-contract=off -fvisibility=hidden -fvisibility-inlines-hidden $\n" \
-        "  -D_GLIBCXX_ASSERTIONS -DPALPATE_THREADS_STD -DHWY_SHARED_DEFINE $\n" \
-        "  '-DHWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL)'"
-BATCHES = [1.0, 5.0]  # seconds without a fault of the first batches of tests; the last batch has the rest
+LONGEST = 3.0  # seconds; tests that take longer are not run
+BATCHES = [0.2, 1.0, 3.0, 15.0]  # seconds without a fault up to which each batch of tests reaches; no more run
+# One SIMD path builds in less time; range checks of the standard library notice more.
+OPTIONS = ['-DCMAKE_BUILD_TYPE=Release', '-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG -w -D_GLIBCXX_ASSERTIONS',
+           '-DPALPATE_PRECOMPILED_HEADERS=ON', '-DPALPATE_UNITY=ON', '-DPALPATE_UNITY_TESTS=ON',
+           '-DPALPATE_SIMD_NATIVE=ON', '-DPALPATE_TEST_SHARDS=1', '-DPALPATE_TEST_FOLDERS=' + ';'.join(FOLDERS),
+           f"-DPALPATE_SHARED_DATA={ROOT.parent / 'shared' / 'data'}",
+           *(f'-DPALPATE_WITH_{part}=OFF' for part in ['C', 'VTK', 'FCL', 'PYTHON']), '-DPALPATE_BUILD_EXAMPLES=OFF']
 
 
 def evenly(items, count):
@@ -48,11 +54,8 @@ def evenly(items, count):
 def shares(sizes, total):
     """Equal shares of the total for each kind, or as many as there are."""
     share = dict.fromkeys(sizes, 0)
-    for _ in range(total):
-        open_kinds = [k for k in sizes if share[k] < sizes[k]]
-        if not open_kinds:
-            break
-        share[min(open_kinds, key=lambda k: share[k])] += 1
+    for _ in range(min(total, sum(sizes.values()))):
+        share[min((kind for kind in sizes if share[kind] < sizes[kind]), key=share.get)] += 1
     return share
 
 
@@ -67,7 +70,7 @@ def choose():
     faults, left_out, matched = [], unchanged(), set()
     for module in MODULES:
         found = {kind: [] for kind in KINDS}
-        for path in sorted((ROOT / 'Source' / module).iterdir()):
+        for path in sorted((ROOT / 'Source' / module).glob('*.*')):
             file = File(path.read_text())
             name = str(path.relative_to(ROOT / 'Source'))
             for site in file.sites():
@@ -87,7 +90,7 @@ def choose():
                 ranges = taken.setdefault(fault['file'], [])
                 if count == share[kind]:
                     break
-                if fault['leftOut'] or any(fault['start'] < end and start < fault['end'] for start, end in ranges):
+                if any(fault['start'] < end and start < fault['end'] for start, end in ranges):
                     continue
                 ranges.append((fault['start'], fault['end']))
                 faults.append(fault)
@@ -95,10 +98,13 @@ def choose():
     if matched != left_out:
         sys.exit('unchanged.txt names faults that do not exist: ' + '; '.join(map(': '.join, sorted(left_out - matched))))
     faults.sort(key=lambda f: (MODULES.index(f['module']), f['file'], f['start']))
-    for fault in faults:
-        fault['key'] = hashlib.sha256('|'.join(
-            [fault['file'], str(fault['start']), fault['before'], fault['after']]).encode()).hexdigest()[:16]
-        fault['id'] = int(fault['key'][:7], 16)  # stays when other faults are left out, so that less is built again
+    seen, ids = collections.Counter(), {0}
+    for fault in faults:  # keys and ids stay when other faults change, so that outcomes stay, and less is built again
+        name = '|'.join([fault['file'], fault['before'], fault['after']])
+        seen[name] += 1
+        fault['key'] = hashlib.sha256(f'{name}|{seen[name]}'.encode()).hexdigest()[:16]
+        fault['id'] = next(i for k in range(1 << 16) if (i := int(fault['key'][:4], 16) + k & 0xffff) not in ids)
+        ids.add(fault['id'])
     return faults
 
 
@@ -111,10 +117,28 @@ def write(path, text):
 
 def plant(faults, tree):
     """Copies Source with the faults to the tree."""
-    selector = '#pragma once\n#include <cstdlib>\nnamespace palpate {\n' \
-               'inline const int plantedFault = [] {\n  const char* id = std::getenv("PALPATE_FAULT");\n' \
-               '  return id ? std::atoi(id) : 0;\n}();\n}  // namespace palpate\n'
-    texts = {SELECTOR: selector}
+    texts = {SELECTOR: """#pragma once
+#include <cstdio>
+#include <cstdlib>
+namespace palpate {
+struct PlantedFaults {
+  int chosen = std::getenv("PALPATE_FAULT") ? std::atoi(std::getenv("PALPATE_FAULT")) : 0;
+  bool evaluated[1 << 16] = {};
+  ~PlantedFaults() {
+    const char* name = std::getenv("PALPATE_EVALUATED");
+    std::FILE* file = name ? std::fopen(name, "a") : nullptr;
+    for (int i = 0; file && i < 1 << 16; ++i)
+      if (evaluated[i]) std::fprintf(file, "%d\\n", i);
+    if (file) std::fclose(file);
+  }
+};
+inline PlantedFaults plantedFaults;
+[[gnu::always_inline]] inline bool isPlanted(int id) {
+  if (!plantedFaults.evaluated[id]) plantedFaults.evaluated[id] = true;
+  return plantedFaults.chosen == id;
+}
+}  // namespace palpate
+"""}
     for path in (ROOT / 'Source').rglob('*'):
         if path.is_file():
             texts[str(path.relative_to(ROOT / 'Source'))] = path.read_text()
@@ -123,44 +147,17 @@ def plant(faults, tree):
         for fault in sorted((f for f in faults if f['file'] == name), key=lambda f: -f['start']):
             first, last = fault['start'], fault['end']
             lines = '\n' * text.count('\n', first, last)  # so that later lines keep their numbers
-            text = f"{text[:first]}(::palpate::plantedFault == {fault['id']} ? {fault['after']} : " \
+            text = f"{text[:first]}(::palpate::isPlanted({fault['id']}) ? {fault['after']} : " \
                    f"{fault['before']}){lines}{text[last:]}"
         texts[name] = f'#include "{SELECTOR}"\n#line 1\n{text}'
+    for path in (tree / 'Source').rglob('*'):
+        if path.is_file() and str(path.relative_to(tree / 'Source')) not in texts:
+            path.unlink()
     for name, text in texts.items():
         write(tree / 'Source' / name, text)
-
-
-def configure(tree, build, library):
-    """Writes the Ninja file. Each test binary has the planted files of its module; the library has the others."""
-    packages = subprocess.run(['pkg-config', '--cflags', 'eigen3', 'gmpxx', 'libhwy'], text=True, check=True,
-                              stdout=subprocess.PIPE).stdout.strip()
-    data, testing = ROOT.parent / 'shared' / 'data', ROOT / 'Testing'
-    launcher = os.environ.get('CMAKE_CXX_COMPILER_LAUNCHER', '')
-    headers = build / 'precompiled.h'
-    write(headers, ''.join(f'#include <{h}>\n' for h in [
-        'gtest/gtest.h', 'Eigen/Core', 'Eigen/Geometry', 'algorithm', 'array', 'cmath', 'functional', 'map', 'memory',
-        'random', 'set', 'span', 'string', 'vector']))
-    text = f"""flags = {FLAGS} -I{tree}/Source -I{tree}/Source/Public -I{tree}/Source/Simplify/Public -I{testing} -I{ROOT}/Examples/Common {packages} $
-  -DPALPATE_SHARED_DATA='"{data}"' -DPALPATE_SOURCE_DIR='"{ROOT}"'
-rule precompile
-  command = c++ $flags -x c++-header -c $in -o $out
-rule compile
-  command = {launcher} c++ $flags -include {headers} -MD -MF $out.d -c $in -o $out
-  depfile = $out.d
-rule link
-  command = c++ $in {library}/Examples/Common/libPalpateScenes.a {library}/Source/libPalpateInternal.a $
-    -lgtest -lgtest_main -lhwy -lmeshoptimizer -lgmpxx -lgmp -lpthread -o $out
-build {headers}.gch: precompile {headers}
-"""
-    for module in MODULES:
-        sources = sorted((ROOT / 'Source' / module).glob('*.cpp'))
-        files = [tree / 'Source' / module / source.name for source in sources]
-        files += sorted((testing / 'Unit' / module).glob('*Test.cpp')) + [testing / 'Common' / 'FailingAllocation.cpp']
-        objects = [f'{module}/{file.stem}.o' for file in files]
-        for file, made in zip(files, objects):
-            text += f'build {made}: compile {file} | {headers}.gch\n'
-        text += f"build Unit{module}: link {' '.join(objects)}\n"
-    (build / 'build.ninja').write_text(text)
+    for path in ROOT.iterdir():
+        if path.name not in ('Source', 'build', '.git') and not (tree / path.name).exists():
+            (tree / path.name).symlink_to(path)
 
 
 def refused_in(output, faults):
@@ -178,185 +175,188 @@ def refused_in(output, faults):
     return refused
 
 
-def check_headers(faults, tree):
-    """Takes out the faults in headers that do not compile, before many files include them."""
-    headers = {f['file'] for f in faults if f['file'].endswith('.h')}
-    headers = sorted(h for h in headers if '#pragma once' in (ROOT / 'Source' / h).read_text())
-    eigen = subprocess.run(['pkg-config', '--cflags', 'eigen3'], text=True, stdout=subprocess.PIPE, check=True).stdout
-    command = ['c++', '-std=c++20', '-fsyntax-only', '-x', 'c++', '-', f'-I{tree}/Source', f'-I{tree}/Source/Public', f'-I{tree}/Source/Simplify/Public',
-               *eigen.split()]
-    while True:
-        plant(faults, tree)
-        result = subprocess.run(command, input=''.join(f'#include "{h}"\n' for h in headers), text=True,
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        refused = refused_in(result.stdout, faults) if result.returncode else set()
-        if not refused:
-            return faults
-        print(f'{len(refused)} of {len(faults)} faults do not compile', flush=True)
-        faults = [f for f in faults if f['id'] not in refused]
-
-
-def compile_all(faults, tree, build, jobs):
+def compile_all(faults, tree, build, jobs, parse):
     """Builds the tests. Takes out the faults that do not compile, until all others do."""
-    command = ['ninja', '-C', build, '-k', '0', '-j', str(jobs)] + [f'Unit{m}' for m in MODULES]
-    while True:
-        plant(faults, tree)
-        result = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        if result.returncode == 0:
-            return faults
-        (build / 'errors.txt').write_text(result.stdout)
-        refused = refused_in(result.stdout, faults)
-        if not refused:
-            sys.exit(f'The build fails, but not at a planted fault: see {build}/errors.txt')
-        print(f'{len(refused)} of {len(faults)} faults do not compile', flush=True)
-        faults = [f for f in faults if f['id'] not in refused]
+    def attempt(command, **options):
+        nonlocal faults
+        while True:
+            plant(faults, tree)
+            result = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options)
+            if result.returncode == 0:
+                return
+            (build / 'errors.txt').write_text(result.stdout)
+            refused = refused_in(result.stdout, faults)
+            if not refused:
+                sys.exit(f'The build fails, but not at a planted fault: see {build}/errors.txt')
+            print(f'{len(refused)} of {len(faults)} faults do not compile', flush=True)
+            faults = [f for f in faults if f['id'] not in refused]
+
+    plant(faults, tree)
+    if not (build / 'build.ninja').exists():
+        subprocess.run(['cmake', '-G', 'Ninja', '-S', tree, '-B', build, *OPTIONS], check=True, stdout=subprocess.DEVNULL)
+    if parse:
+        # Sources are parsed first: a fault in a header that does not compile would build much again.
+        commands = [c for c in json.loads((build / 'compile_commands.json').read_text())
+                    if '/build/Source/' in c['file'] and 'cmake_pch' not in c['file']]
+        headers = {os.path.relpath(h, build) for c in commands for h in re.findall(r'-include (\S+)', c['command'])}
+        subprocess.run(['ninja', '-C', build, *(f'{header}.gch' for header in headers)], check=True,
+                       stdout=subprocess.DEVNULL)
+        for c in commands:
+            attempt(c['command'] + ' -fsyntax-only', shell=True, cwd=c['directory'])
+    attempt(['ninja', '-C', build, '-k', '0', '-j', str(jobs), *BINARIES])
+    return faults
 
 
-def prepare(folder, library, jobs):
+def prepare(folder, jobs):
     """The faults in the build, which is made again if Source or this script changed."""
-    tree, build = folder / 'tree', folder / 'build'
-    build.mkdir(parents=True, exist_ok=True)
-    state = hashlib.sha256()
-    for path in sorted((ROOT / 'Source').rglob('*')) + [Path(__file__).with_name('sites.py')]:
-        if path.is_file():
-            state.update(path.read_bytes())
-    kept = folder / 'faults.json'
+    state = hashlib.sha256(b''.join(path.read_bytes() for path in sorted(
+        [*(ROOT / 'Source').rglob('*.*'), Path(__file__).with_name('sites.py')]) if path.is_file())).hexdigest()
+    kept = folder / 'refused.json'
     stored = json.loads(kept.read_text()) if kept.exists() else {}
-    refused = stored['refused'] if stored.get('state') == state.hexdigest() else []
+    refused = stored['refused'] if stored.get('state') == state else []
     chosen = choose()
-    faults = [f for f in chosen if f['key'] not in refused]
-    if not stored or stored.get('state') != state.hexdigest():
-        faults = check_headers(faults, tree)
-    configure(tree, build, library)
-    faults = compile_all(faults, tree, build, jobs)
+    faults = compile_all([f for f in chosen if f['key'] not in refused], folder / 'tree', folder / 'build', jobs,
+                         parse=stored.get('state') != state)
     refused = sorted({f['key'] for f in chosen} - {f['key'] for f in faults})
-    kept.write_text(json.dumps({'state': state.hexdigest(), 'refused': refused}))
-    return faults, build
+    kept.write_text(json.dumps({'state': state, 'refused': refused}))
+    return [f for f in faults if not f['leftOut']]
 
 
-def run(binary, fault, tests, limit):
-    """Runs tests until one fails. Returns (noticed, by which test)."""
+def run(build, tests, seconds, **environment):
+    """Runs tests of one binary until one fails. Returns its name, how it ended, and the seconds of processor time."""
+    binary = tests[0].split('.')[0]
+
     def restrict():
         os.setsid()
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 26, 1 << 26))
+        for limit, most in [('CPU', int(seconds) + 1), ('AS', MEMORY), ('CORE', 0), ('FSIZE', 1 << 26)]:
+            resource.setrlimit(getattr(resource, f'RLIMIT_{limit}'), (most, most))
 
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            [binary, '--gtest_fail_fast', '--gtest_filter=' + ':'.join(tests)], preexec_fn=restrict, stdout=output,
-            stderr=subprocess.STDOUT, env=os.environ | {'PALPATE_FAULT': str(fault)})
-        try:
-            code = process.wait(limit)
-        except subprocess.TimeoutExpired:
-            code = 'time'
-        finally:
-            try:
+            [next((build / 'Testing').rglob(binary)), '--gtest_fail_fast', '--gtest_filter=' + ':'.join(test.split('.', 1)[1] for test in tests)],
+            preexec_fn=restrict, stdout=output, stderr=subprocess.STDOUT, env=os.environ | environment)
+
+        def end():
+            with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            except ProcessLookupError:
-                pass
-        process.wait()
+
+        timer = threading.Timer(60 + 10 * seconds, end)  # for tests that wait forever
+        timer.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        timer.cancel()
+        end()
+        process.returncode = code = os.waitstatus_to_exitcode(status)
+        spent = usage.ru_utime + usage.ru_stime
         if code == 0:
-            return False, ''
+            return '', '', spent
         output.seek(max(0, output.seek(0, 2) - 100_000))
         text = output.read().decode(errors='replace')
     started = re.findall(r'^\[ RUN      \] (\S+)', text, re.M)
     failed = re.findall(r'^\[  FAILED  \] (\S+?)(?:,|$| \()', text, re.M)
-    test = failed[0] if failed else started[-1] if started else ''
-    return True, test + ('' if failed else ' (time)' if code == 'time' else f' (exit {code})')
+    if failed:
+        return f'{binary}.{failed[0]}', '', spent
+    last = started[-1] if started else tests[0].split('.', 1)[1]
+    return f'{binary}.{last}', 'time' if code in (-signal.SIGXCPU, -signal.SIGKILL) else f'exit {code}', spent
 
 
-def baseline(build, folder):
-    """Seconds of each test of each module, without a fault."""
-    times = {}
-    for module in MODULES:
-        report = folder / f'{module}.json'
-        binary = build / f'Unit{module}'
-        begin = time.time()
-        result = subprocess.run([binary, f'--gtest_output=json:{report}', '--gtest_brief=1'], text=True,
-                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        if result.returncode != 0:
-            sys.exit(f'{binary} fails without a fault:\n{result.stdout[-3000:]}')
-        times[module] = {f"{suite['name']}.{test['name']}": float(test['time'].rstrip('s'))
-                         for suite in json.loads(report.read_text())['testsuites'] for test in suite['testsuite']
-                         if test.get('result') != 'SKIPPED'}
-        print(f'{module}: {len(times[module])} tests, {time.time() - begin:.1f} s without a fault', flush=True)
-    return times
+def names_of_tests(build):
+    """All tests, each with its binary's name before it as ctest has them."""
+    names = []
+    for binary in BINARIES:
+        listed = subprocess.check_output([next((build / 'Testing').rglob(binary)), '--gtest_list_tests'], text=True)
+        for suite, tests in re.findall(r'^(\S+\.).*\n((?:  .*\n)+)', listed, re.M):
+            names += [f'{binary}.{suite}{test}' for test in re.findall(r'^  (\S+)', tests, re.M)]
+    return names
 
 
-def batches(times):
-    """Tests by time, the quickest first, in batches."""
-    result, spent = [[] for _ in range(len(BATCHES) + 1)], 0.0
-    for test, seconds in sorted(times.items(), key=lambda item: item[1]):
-        spent += seconds
-        result[next((i for i, most in enumerate(BATCHES) if spent <= most), len(BATCHES))].append(test)
-    return [batch for batch in result if batch]
+def measure(names, build, folder):
+    """Seconds of each test without a fault, and the faults that it evaluates. A later call measures new tests only."""
+    kept, evaluated = folder / 'tests.json', folder / 'evaluated.txt'
+    measured = json.loads(kept.read_text()) if kept.exists() else {}
+    for name in (n for n in names if n not in measured):
+        evaluated.write_text('')
+        failed, ended, seconds = run(build, [name], LONGEST, PALPATE_EVALUATED=str(evaluated))
+        measured[name] = [round(seconds, 3), [] if failed else sorted(map(int, set(evaluated.read_text().split())))]
+        if failed:
+            print(f'not run ({ended or "it fails without a fault"}): {name}', flush=True)
+    kept.write_text(json.dumps(measured))
+    return {name: (measured[name][0], set(measured[name][1])) for name in names}
 
 
-def outcome(fault, build, times):
-    """Whether a test notices the fault, which one, and after how long. `times`: of the tests of its module."""
-    begin, noticed, test = time.time(), False, ''
-    for batch in batches(times):
-        noticed, test = run(build / f"Unit{fault['module']}", fault['id'], batch, 10 + 5 * sum(times[t] for t in batch))
-        if noticed:
+def batches(fault, tests, hits, before):
+    """The tests that evaluate the fault: the one that noticed it before, then quick tests that noticed many."""
+    able = {name: seconds for name, (seconds, evaluated) in tests.items() if fault['id'] in evaluated}
+    result, spent = [[] for _ in BATCHES], 0.0
+    for name in sorted(able, key=lambda n: (n != before, able[n] / (1 + hits[fault['module'], n]))):
+        spent += able[name]
+        if spent <= BATCHES[-1] or name == before:
+            result[0 if name == before else sum(spent > most for most in BATCHES)].append(name)
+    for batch in result:
+        for binary in dict.fromkeys(name.split('.')[0] for name in batch):
+            own = [name for name in batch if name.split('.')[0] == binary]
+            yield own, sum(able[name] for name in own)
+
+
+def outcome(fault, build, tests, hits, before):
+    """Which test notices the fault, how it ends, and the seconds of all that ran."""
+    total, noticed, ended = 0.0, '', ''
+    for batch, seconds in batches(fault, tests, hits, before):
+        noticed, ended, spent = run(build, batch, 3 + 5 * seconds, PALPATE_FAULT=str(fault['id']))
+        total += spent
+        # A test that depends on the machine's other work fails once.
+        if noticed and (ended or run(build, [noticed], 3 + 5 * seconds, PALPATE_FAULT=str(fault['id']))[0]):
+            hits[fault['module'], noticed] += 1
             break
-    return {'key': fault['key'], 'noticed': 'yes' if noticed else 'no', 'test': test,
-            'seconds': f'{time.time() - begin:.2f}'}
+        noticed = ''
+    return {'key': fault['key'], 'test': noticed, 'ended': ended, 'seconds': f'{total:.2f}'}
 
 
 def table(faults, outcomes):
     known = [f for f in faults if f['key'] in outcomes]
-    print('\n| module | planted | noticed | share |\n|---|---:|---:|---:|')
-    for name in MODULES + ['all']:
-        own = [f for f in known if name in (f['module'], 'all')]
-        noticed = sum(outcomes[f['key']]['noticed'] == 'yes' for f in own)
-        print(f"| {name} | {len(own)} | {noticed} | {100 * noticed / max(1, len(own)):.1f} % |")
-    print('\n| kind | planted | noticed |\n|---|---:|---:|')
-    for kind in KINDS:
-        own = [f for f in known if f['kind'] == kind]
-        print(f"| {kind} | {len(own)} | {sum(outcomes[f['key']]['noticed'] == 'yes' for f in own)} |")
-    print('\nNo test notices:')
-    for f in known:
-        if outcomes[f['key']]['noticed'] != 'yes':
-            print(f"  Source/{f['file']}:{f['line']}: {f['kind']}: {f['before']}  ->  {f['after']}")
+    for title, names in [('module', MODULES), ('kind', KINDS)]:
+        print(f'\n| {title} | planted | noticed | share |\n|---|---:|---:|---:|')
+        for name in [*names, 'all']:
+            own = [f for f in known if name in (f[title], 'all')]
+            noticed = sum(outcomes[f['key']]['test'] != '' for f in own)
+            print(f'| {name} | {len(own)} | {noticed} | {100 * noticed / max(1, len(own)):.1f} % |')
+    print('\nNo test notices:', *(described(f) for f in known if not outcomes[f['key']]['test']), sep='\n  ')
+
+
+def described(fault):
+    return f"Source/{fault['file']}:{fault['line']}: {fault['kind']}: {fault['before']}  ->  {fault['after']}"
 
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument('--list', action='store_true', help='only print the faults')
     arguments.add_argument('--again', action='store_true', help='repeat the faults that no test noticed')
-    arguments.add_argument('--build', type=Path, default=ROOT / 'build' / 'mutation',
-                           help='folder of the build and of outcomes.csv')
-    arguments.add_argument('--release', type=Path, default=ROOT / 'build' / 'release',
-                           help='folder of a release build; build/release is brought up to date')
+    arguments.add_argument('--all', action='store_true', help='repeat all faults')
+    arguments.add_argument('--build', type=Path, default=ROOT / 'build' / 'mutation', help='folder of build and outcomes')
     arguments.add_argument('--jobs', type=int, default=os.cpu_count())
     given = arguments.parse_args()
     if given.list:
-        faults = choose()
-        for f in faults:
-            print(f"Source/{f['file']}:{f['line']}: {f['kind']}: {f['before']}  ->  {f['after']}")
-        print(f'{len(faults)} faults')
-        return len(faults) < REQUIRED
+        print('\n'.join(map(described, choose())))
+        return 0
 
     folder = given.build.resolve()
-    folder.mkdir(parents=True, exist_ok=True)
-    if given.release == ROOT / 'build' / 'release':
-        subprocess.run(['cmake', '--preset', 'release'], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(['cmake', '--build', '--preset', 'release', '--target', 'PalpateInternal', 'PalpateScenes', '-j',
-                        str(given.jobs)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    faults, build = prepare(folder, given.release.resolve(), given.jobs)
+    (folder / 'build').mkdir(parents=True, exist_ok=True)
+    faults, build = prepare(folder, given.jobs), folder / 'build'
     print(f'{len(faults)} faults are planted', flush=True)
     store = folder / 'outcomes.csv'
     outcomes = {row['key']: row for row in csv.DictReader(store.open())} if store.exists() else {}
-    open_faults = [f for f in faults if f['key'] not in outcomes or
-                   given.again and outcomes[f['key']]['noticed'] != 'yes']
-    times = baseline(build, folder) if open_faults else {}
+    names = set(names_of_tests(build))
+    noticed = {key: row['test'] for key, row in outcomes.items() if row['test']}
+    open_faults = [f for f in faults if given.all or noticed.get(f['key']) not in names and
+                   (given.again or f['key'] not in outcomes or f['key'] in noticed)]
+    open_faults.sort(key=lambda f: f['key'])  # so that some outcomes of all modules are there early
+    tests = measure(sorted(names), build, folder) if open_faults else {}
+    hits = collections.Counter((f['module'], noticed[f['key']]) for f in faults if f['key'] in noticed)
     with store.open('a', newline='') as file:
-        writer = csv.DictWriter(file, ['key', 'noticed', 'test', 'seconds'])
+        writer = csv.DictWriter(file, ['key', 'test', 'ended', 'seconds'])
         if file.tell() == 0:
             writer.writeheader()
         with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
-            for row in pool.map(lambda fault: outcome(fault, build, times[fault['module']]), open_faults):
+            for row in pool.map(lambda f: outcome(f, build, tests, hits, noticed.get(f['key'])), open_faults):
                 outcomes[row['key']] = row
                 writer.writerow(row)
                 file.flush()
