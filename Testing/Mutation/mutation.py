@@ -222,6 +222,10 @@ def prepare(folder, jobs):
     return [f for f in faults if not f['leftOut']]
 
 
+def path_of(binary, build):
+    return next(path for path in (build / 'Testing').rglob(binary) if path.is_file())
+
+
 def run(build, tests, seconds, **environment):
     """Runs tests of one binary until one fails. Returns its name, how it ended, and the seconds of processor time."""
     binary = tests[0].split('.')[0]
@@ -233,7 +237,7 @@ def run(build, tests, seconds, **environment):
 
     with tempfile.TemporaryFile() as output:
         process = subprocess.Popen(
-            [next((build / 'Testing').rglob(binary)), '--gtest_fail_fast', '--gtest_filter=' + ':'.join(test.split('.', 1)[1] for test in tests)],
+            [path_of(binary, build), '--gtest_fail_fast', '--gtest_filter=' + ':'.join(test.split('.', 1)[1] for test in tests)],
             preexec_fn=restrict, stdout=output, stderr=subprocess.STDOUT, env=os.environ | environment)
 
         def end():
@@ -263,7 +267,7 @@ def names_of_tests(build):
     """All tests, each with its binary's name before it as ctest has them."""
     names = []
     for binary in BINARIES:
-        listed = subprocess.check_output([next((build / 'Testing').rglob(binary)), '--gtest_list_tests'], text=True)
+        listed = subprocess.check_output([path_of(binary, build), '--gtest_list_tests'], text=True)
         for suite, tests in re.findall(r'^(\S+\.).*\n((?:  .*\n)+)', listed, re.M):
             names += [f'{binary}.{suite}{test}' for test in re.findall(r'^  (\S+)', tests, re.M)]
     return names
