@@ -244,7 +244,7 @@ def run(build, tests, seconds, **environment):
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
 
-        timer = threading.Timer(60 + 10 * seconds, end)  # for tests that wait forever
+        timer = threading.Timer(20 + 8 * seconds, end)  # for tests that wait forever
         timer.start()
         _, status, usage = os.wait4(process.pid, 0)
         timer.cancel()
@@ -289,9 +289,12 @@ def measure(names, build, folder):
 
 def batches(fault, tests, hits, before):
     """The tests that evaluate the fault: the one that noticed it before, then quick tests that noticed many."""
-    able = {name: seconds for name, (seconds, evaluated) in tests.items() if fault['id'] in evaluated}
+    able = {name: seconds for name, (seconds, evaluated) in tests.items() if fault['id'] in evaluated} or \
+        {name: seconds for name, (seconds, evaluated) in tests.items() if evaluated}  # in a child process perhaps
     result, spent = [[] for _ in BATCHES], 0.0
-    for name in sorted(able, key=lambda n: (n != before, able[n] / (1 + hits[fault['module'], n]))):
+    worth = {n: 1 + hits[fault['module'], n] + 4 * hits[fault['file'], n] + 4 * n.startswith(f"Unit{fault['module']}.")
+             for n in able}
+    for name in sorted(able, key=lambda n: (n != before, able[n] / worth[n])):
         spent += able[name]
         if spent <= BATCHES[-1] or name == before:
             result[0 if name == before else sum(spent > most for most in BATCHES)].append(name)
@@ -305,11 +308,11 @@ def outcome(fault, build, tests, hits, before):
     """Which test notices the fault, how it ends, and the seconds of all that ran."""
     total, noticed, ended = 0.0, '', ''
     for batch, seconds in batches(fault, tests, hits, before):
-        noticed, ended, spent = run(build, batch, 3 + 5 * seconds, PALPATE_FAULT=str(fault['id']))
+        noticed, ended, spent = run(build, batch, 2 + 3 * seconds, PALPATE_FAULT=str(fault['id']))
         total += spent
         # A test that depends on the machine's other work fails once.
-        if noticed and (ended or run(build, [noticed], 3 + 5 * seconds, PALPATE_FAULT=str(fault['id']))[0]):
-            hits[fault['module'], noticed] += 1
+        if noticed and (ended or run(build, [noticed], 2 + 3 * seconds, PALPATE_FAULT=str(fault['id']))[0]):
+            hits.update([(fault['module'], noticed), (fault['file'], noticed)])
             break
         noticed = ''
     return {'key': fault['key'], 'test': noticed, 'ended': ended, 'seconds': f'{total:.2f}'}
@@ -354,7 +357,7 @@ def main():
                    (given.again or f['key'] not in outcomes or f['key'] in noticed)]
     open_faults.sort(key=lambda f: f['key'])  # so that some outcomes of all modules are there early
     tests = measure(sorted(names), build, folder) if open_faults else {}
-    hits = collections.Counter((f['module'], noticed[f['key']]) for f in faults if f['key'] in noticed)
+    hits = collections.Counter((f[part], noticed[f['key']]) for f in faults if f['key'] in noticed for part in ('module', 'file'))
     with store.open('a', newline='') as file:
         writer = csv.DictWriter(file, ['key', 'test', 'ended', 'seconds'])
         if file.tell() == 0:
