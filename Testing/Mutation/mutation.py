@@ -11,6 +11,7 @@ import collections
 import concurrent.futures
 import contextlib
 import csv
+import functools
 import hashlib
 import json
 import os
@@ -29,11 +30,11 @@ ROOT = Path(__file__).resolve().parents[2]
 MODULES = sorted(path.name for path in (ROOT / 'Source').iterdir() if any(path.glob('*.h')))
 FOLDERS = [f'Unit/{module}' for module in MODULES if (ROOT / 'Testing' / 'Unit' / module).is_dir()] + ['Frame']
 BINARIES = [folder.replace('/', '') for folder in FOLDERS]
+PARTS = ['module', 'file']  # of a fault, for which tests that notice faults are counted
 KINDS = ['comparison', 'off by one', 'bound', 'sign', 'logic', 'minimum or maximum']
 PER_MODULE = 52  # faults that are planted in each module, before those that do not compile are taken out
 SELECTOR = 'Core/PlantedFault.h'
 PLACE = re.compile(r'Source/(\S+?):(\d+):\d+: ')
-MEMORY = 8 << 30  # bytes of address space of a test
 LONGEST = 3.0  # seconds; tests that take longer are not run
 BATCHES = [0.2, 1.0, 3.0, 15.0]  # seconds without a fault up to which each batch of tests reaches; no more run
 # One SIMD path builds in less time; range checks of the standard library notice more.
@@ -47,8 +48,7 @@ OPTIONS = ['-DCMAKE_BUILD_TYPE=Release', '-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG
 def evenly(items, count):
     """The order in which `count` of the items, evenly spaced, come first; the others follow."""
     chosen = [len(items) * i // count for i in range(min(count, len(items)))] if count else []
-    rest = sorted(set(range(len(items))) - set(chosen))
-    return [items[i] for i in chosen + rest]
+    return [items[i] for i in chosen + sorted(set(range(len(items))) - set(chosen))]
 
 
 def shares(sizes, total):
@@ -87,16 +87,13 @@ def choose():
         for kind in sorted(KINDS, key=lambda k: len(found[k])):
             count = 0
             for fault in evenly(found[kind], share[kind]):
-                ranges = taken.setdefault(fault['file'], [])
-                if count == share[kind]:
-                    break
-                if any(fault['start'] < end and start < fault['end'] for start, end in ranges):
-                    continue
-                ranges.append((fault['start'], fault['end']))
-                faults.append(fault)
-                count += 1
+                ends = taken.setdefault(fault['file'], [])
+                if count < share[kind] and not any(fault['start'] < end and start < fault['end'] for start, end in ends):
+                    ends.append((fault['start'], fault['end']))
+                    faults.append(fault)
+                    count += 1
     if matched != left_out:
-        sys.exit('unchanged.txt names faults that do not exist: ' + '; '.join(map(': '.join, sorted(left_out - matched))))
+        sys.exit('unchanged.txt names faults that do not exist: ' + ', '.join(map(': '.join, left_out - matched)))
     faults.sort(key=lambda f: (MODULES.index(f['module']), f['file'], f['start']))
     seen, ids = collections.Counter(), {0}
     for fault in faults:  # keys and ids stay when other faults change, so that outcomes stay, and less is built again
@@ -193,14 +190,13 @@ def compile_all(faults, tree, build, jobs, parse):
 
     plant(faults, tree)
     if not (build / 'build.ninja').exists():
-        subprocess.run(['cmake', '-G', 'Ninja', '-S', tree, '-B', build, *OPTIONS], check=True, stdout=subprocess.DEVNULL)
+        subprocess.check_output(['cmake', '-G', 'Ninja', '-S', tree, '-B', build, *OPTIONS])
     if parse:
         # Sources are parsed first: a fault in a header that does not compile would build much again.
         commands = [c for c in json.loads((build / 'compile_commands.json').read_text())
                     if '/build/Source/' in c['file'] and 'cmake_pch' not in c['file']]
         headers = {os.path.relpath(h, build) for c in commands for h in re.findall(r'-include (\S+)', c['command'])}
-        subprocess.run(['ninja', '-C', build, *(f'{header}.gch' for header in headers)], check=True,
-                       stdout=subprocess.DEVNULL)
+        subprocess.check_output(['ninja', '-C', build, *(f'{header}.gch' for header in headers)])
         for c in commands:
             attempt(c['command'] + ' -fsyntax-only', shell=True, cwd=c['directory'])
     attempt(['ninja', '-C', build, '-k', '0', '-j', str(jobs), *BINARIES])
@@ -222,6 +218,7 @@ def prepare(folder, jobs):
     return [f for f in faults if not f['leftOut']]
 
 
+@functools.cache
 def path_of(binary, build):
     return next(path for path in (build / 'Testing').rglob(binary) if path.is_file())
 
@@ -232,13 +229,14 @@ def run(build, tests, seconds, **environment):
 
     def restrict():
         os.setsid()
-        for limit, most in [('CPU', int(seconds) + 1), ('AS', MEMORY), ('CORE', 0), ('FSIZE', 1 << 26)]:
+        for limit, most in [('CPU', int(seconds) + 1), ('AS', 8 << 30), ('CORE', 0), ('FSIZE', 1 << 26)]:
             resource.setrlimit(getattr(resource, f'RLIMIT_{limit}'), (most, most))
 
     with tempfile.TemporaryFile() as output:
-        process = subprocess.Popen(
-            [path_of(binary, build), '--gtest_fail_fast', '--gtest_filter=' + ':'.join(test.split('.', 1)[1] for test in tests)],
-            preexec_fn=restrict, stdout=output, stderr=subprocess.STDOUT, env=os.environ | environment)
+        command = [path_of(binary, build), '--gtest_fail_fast',
+                   '--gtest_filter=' + ':'.join(test.split('.', 1)[1] for test in tests)]
+        process = subprocess.Popen(command, preexec_fn=restrict, stdout=output, stderr=subprocess.STDOUT,
+                                   env=os.environ | environment)
 
         def end():
             with contextlib.suppress(ProcessLookupError):
@@ -257,10 +255,8 @@ def run(build, tests, seconds, **environment):
         text = output.read().decode(errors='replace')
     started = re.findall(r'^\[ RUN      \] (\S+)', text, re.M)
     failed = re.findall(r'^\[  FAILED  \] (\S+?)(?:,|$| \()', text, re.M)
-    if failed:
-        return f'{binary}.{failed[0]}', '', spent
-    last = started[-1] if started else tests[0].split('.', 1)[1]
-    return f'{binary}.{last}', 'time' if code in (-signal.SIGXCPU, -signal.SIGKILL) else f'exit {code}', spent
+    ended = '' if failed else 'time' if code in (-signal.SIGXCPU, -signal.SIGKILL) else f'exit {code}'
+    return f"{binary}.{(failed[:1] or started[-1:] or [''])[0]}", ended, spent
 
 
 def names_of_tests(build):
@@ -284,14 +280,13 @@ def measure(names, build, folder):
         if failed:
             print(f'not run ({ended or "it fails without a fault"}): {name}', flush=True)
     kept.write_text(json.dumps(measured))
-    return {name: (measured[name][0], set(measured[name][1])) for name in names}
+    return {name: (measured[name][0], set(measured[name][1])) for name in names if measured[name][1]}
 
 
 def batches(fault, tests, hits, before):
     """The tests that evaluate the fault: the one that noticed it before, then quick tests that noticed many."""
-    able = {name: seconds for name, (seconds, evaluated) in tests.items() if fault['id'] in evaluated} or \
-        {name: seconds for name, (seconds, evaluated) in tests.items() if evaluated}  # in a child process perhaps
-    result, spent = [[] for _ in BATCHES], 0.0
+    able = [n for n in tests if fault['id'] in tests[n][1]] or tests  # a child process may evaluate it, too
+    able, result, spent = {n: tests[n][0] for n in able}, [[] for _ in BATCHES], 0.0
     worth = {n: 1 + hits[fault['module'], n] + 4 * hits[fault['file'], n] + 4 * n.startswith(f"Unit{fault['module']}.")
              for n in able}
     for name in sorted(able, key=lambda n: (n != before, able[n] / worth[n])):
@@ -312,7 +307,7 @@ def outcome(fault, build, tests, hits, before):
         total += spent
         # A test that depends on the machine's other work fails once.
         if noticed and (ended or run(build, [noticed], 2 + 3 * seconds, PALPATE_FAULT=str(fault['id']))[0]):
-            hits.update([(fault['module'], noticed), (fault['file'], noticed)])
+            hits.update((fault[part], noticed) for part in PARTS)
             break
         noticed = ''
     return {'key': fault['key'], 'test': noticed, 'ended': ended, 'seconds': f'{total:.2f}'}
@@ -338,12 +333,11 @@ def main():
     arguments.add_argument('--list', action='store_true', help='only print the faults')
     arguments.add_argument('--again', action='store_true', help='repeat the faults that no test noticed')
     arguments.add_argument('--all', action='store_true', help='repeat all faults')
-    arguments.add_argument('--build', type=Path, default=ROOT / 'build' / 'mutation', help='folder of build and outcomes')
+    arguments.add_argument('--build', type=Path, default=ROOT / 'build' / 'mutation', help='folder for all files')
     arguments.add_argument('--jobs', type=int, default=os.cpu_count())
     given = arguments.parse_args()
     if given.list:
-        print('\n'.join(map(described, choose())))
-        return 0
+        return print('\n'.join(map(described, choose())))
 
     folder = given.build.resolve()
     (folder / 'build').mkdir(parents=True, exist_ok=True)
@@ -357,7 +351,7 @@ def main():
                    (given.again or f['key'] not in outcomes or f['key'] in noticed)]
     open_faults.sort(key=lambda f: f['key'])  # so that some outcomes of all modules are there early
     tests = measure(sorted(names), build, folder) if open_faults else {}
-    hits = collections.Counter((f[part], noticed[f['key']]) for f in faults if f['key'] in noticed for part in ('module', 'file'))
+    hits = collections.Counter((f[part], noticed[f['key']]) for f in faults if f['key'] in noticed for part in PARTS)
     with store.open('a', newline='') as file:
         writer = csv.DictWriter(file, ['key', 'test', 'ended', 'seconds'])
         if file.tell() == 0:
@@ -368,8 +362,7 @@ def main():
                 writer.writerow(row)
                 file.flush()
     table(faults, outcomes)
-    return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()
