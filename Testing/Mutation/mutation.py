@@ -88,7 +88,7 @@ def choose():
             count = 0
             for fault in evenly(found[kind], share[kind]):
                 ends = taken.setdefault(fault['file'], [])
-                if count < share[kind] and not any(fault['start'] < end and start < fault['end'] for start, end in ends):
+                if count < share[kind] and not any(fault['start'] < b and a < fault['end'] for a, b in ends):
                     ends.append((fault['start'], fault['end']))
                     faults.append(fault)
                     count += 1
