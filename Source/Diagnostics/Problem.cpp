@@ -68,7 +68,8 @@ CollisionProblem problemOf(const Settings& settings, const GeometryTable& geomet
     problem.pairs.push_back({indices.at(record->a), indices.at(record->b), record->pair.settings,
                              plan.kind == PairKind::AttachedProxy ? Method::Proxy : plan.method,
                              static_cast<bool>(record->filters.predicate)});
-    if (const auto& sides = record->memory.sides.sides; sides && record->pair.settings.rememberSides)
+    if (const auto& sides = record->memory.sides.sides;
+        sides && record->pair.settings.rememberSides)
       problem.pairs.back().sides = sides->list(record->meshes(), geometries.stepNumber());
     if (record->pair.settings.restDistance > 0.0)
       copyTo<Eigen::Vector3d>(problem.geometries[problem.pairs.back().a].rest,
