@@ -140,9 +140,11 @@ struct KnownSide {
   Approach approach;
   /// The normal of the plane through both features, on that side. None if they were always in it.
   std::optional<Vector3d> plane;
+  bool withBorder = false;  ///< directions across the approach are on the side, too
 
   bool has(const Vector3d& normal) const {
-    return normal.dot(approach.side) > kTouchAngle && normal.dot(approach.origin) > kTouchAngle &&
+    const double least = withBorder ? -kTouchAngle : kTouchAngle;
+    return normal.dot(approach.side) > least && normal.dot(approach.origin) > least &&
            (!plane || normal.dot(*plane) > -kTouchAngle);
   }
 };
@@ -163,7 +165,8 @@ class BestNormal {
     if (m_normal == normal || (m_side && !m_side->has(normal))) return;
     const double violation = std::round(violationOf(normal) / m_equalAngle);
     if (m_normal && violation > m_rank[0]) return;
-    const double agreement = normal.dot(m_side ? m_side->approach.side : knownSides());
+    const double agreement =
+        normal.dot(m_side && !m_side->withBorder ? m_side->approach.side : knownSides());
     const Rank rank{violation,
                     static_cast<double>(kind),
                     -std::round(agreement / kEqualAgreement),
@@ -177,6 +180,9 @@ class BestNormal {
   }
   void offerBoth(const Vector3d& normal, int kind) { offer(normal, kind), offer(-normal, kind); }
   bool separates() const { return m_normal && m_rank[0] == 0.0; }
+  bool separates(const Vector3d& normal) const {
+    return std::round(violationOf(normal) / m_equalAngle) == 0.0;
+  }
   const Vector3d& other() const { return m_other; }
   Vector3d normal() const { return m_normal.value_or(m_other); }
 
@@ -278,6 +284,13 @@ TouchNormal touchNormal(const Features<kind>& of, std::uint32_t firstId, std::ui
   BestNormal best(first, second, side, side ? side->approach.side : normal);
   offerAll(first, second, best);
   if (plane && !best.separates()) best.offer(*plane, 2);
+  if (side && !best.separates()) {
+    // Surfaces that slide along each other: features come from within the common plane.
+    side->withBorder = true;
+    BestNormal across(first, second, side, best.normal());
+    offerAll(first, second, across);
+    if (across.separates()) return {across.normal(), !across.separates(-across.normal())};
+  }
   return {best.normal(), side.has_value()};
 }
 

@@ -27,8 +27,10 @@ struct TouchNormal {
 /// products of an edge of each star; and one that the step or the distance functions give. Those on
 /// the side from which the first feature came (Approach) compete. The one wins that is nearest to
 /// separating the stars, up to kTouchAngle, or within the step up to 2^-10. Among equals the first
-/// kind wins, then the least angle to the approach. If the step tells no side, the agreement with
-/// both surfaces' winding normals takes the place of that angle; a closed surface counts more.
+/// kind wins, then the least angle to the approach. If none on that side separates, those at right
+/// angles to the approach compete, too: of surfaces that slide along each other. Then, and if the
+/// step tells no side, the agreement with both surfaces' winding normals takes the place of the
+/// angle to the approach; a closed surface counts more.
 ///
 /// holders   the features of Features::first and Features::second that hold the closest points
 /// time      in [0, 1] of the step, of the positions of the stars

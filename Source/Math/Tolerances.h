@@ -129,6 +129,10 @@ constexpr double kFreeMotionApproach = 8 * kApproachError;
 /// Sine of an angle: unit vectors that differ by less are equal. Above kCertainDirection's 2^-24
 /// and the rounding of a star's directions, and far below any angle that matters to a solver.
 constexpr double kTouchAngle = 0x1p-20;
+/// Weight of a closest point within the step: a smaller one may be the rounding of a touch at an
+/// edge or a corner, whose star then decides. Far above the rounding of weights; a star that is
+/// asked without need only has more triangles.
+constexpr double kTouchWeight = 0x1p-20;
 /// L: shorter vectors are scaled up before they are interpolated in time.
 constexpr double kTinyLength = 0x1p-500;
 

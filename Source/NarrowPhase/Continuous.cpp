@@ -99,6 +99,20 @@ void forEachLikelyPair(const MeshPair& pair, std::span<const ElementPair> candid
   filterPairs<false>(Features<Kind::EdgeEdge>{pair.a, pair.b}, pairs.edgeEdge, settings, f);
 }
 
+bool isWithinStep(double time) { return time > 0.0 && time < 1.0; }
+
+/// The weights of the closest point that decide which star touches (kTouchWeight).
+Vector3d touchWeights(Vector3d weights, double time) {
+  if (isWithinStep(time))
+    for (double& weight : weights)
+      if (weight < kTouchWeight) weight = 0.0;
+  return weights;
+}
+double touchWeight(double weight, double time) {
+  if (!isWithinStep(time)) return weight;
+  return weight < kTouchWeight ? 0.0 : weight > 1.0 - kTouchWeight ? 1.0 : weight;
+}
+
 /// Tests feature pairs for impacts and appends their contacts.
 class ContactFinder {
  public:
@@ -136,15 +150,14 @@ class ContactFinder {
            bool swapped, const ImpactQuery& query, double time, bool store) {
     PALPATE_ASSERT(time >= 0.0 && time <= 1.0);
     const std::array<Vector3d, 4> p = positionsAt(query, time);
-    std::array<MeshFeature, 2> closestFeatures;
+    std::array<MeshFeature, 2> closestFeatures, touching;
     const auto complete = [&](auto& contact) {
       const bool touch = m_settings.minimumDistance == 0.0 || contact.distance == 0.0;
       contact.timeOfImpact = time;
       contact.distance -= m_pair.a.largestRadius + m_pair.b.largestRadius;
       if (!touch) return;
-      const TouchNormal normal = touchNormal(features, firstId, secondId,
-                                             {closestFeatures[swapped], closestFeatures[!swapped]},
-                                             time, contact.normal, m_out.exactDecisions);
+      const TouchNormal normal = touchNormal(features, firstId, secondId, touching, time,
+                                             contact.normal, m_out.exactDecisions);
       contact.normal = normal.direction;
       PALPATE_ASSERT(!contact.normal.isZero(0.0));
       m_out.facts.sideUnknown |= !normal.isSideKnown;
@@ -162,6 +175,9 @@ class ContactFinder {
           contactOf(firstId, secondId, topology.elements[secondId], closest);
       closestFeatures[swapped] = {MeshFeature::Kind::Vertex, firstId};
       closestFeatures[!swapped] = featureOf(topology, secondId, closest.feature);
+      touching = {MeshFeature{MeshFeature::Kind::Vertex, firstId},
+                  featureOf(topology, secondId,
+                            spannedFeature(contact.vertices, touchWeights(contact.weights, time)))};
       complete(contact);
       const Vector3d direction = swapped ? -contact.normal : contact.normal;
       if (isSuppressed(closest, direction, rejectsVertex(m_pair, firstId, secondId, swapped)))
@@ -177,6 +193,9 @@ class ContactFinder {
           contactOf(firstTopology.edges[firstId], secondTopology.edges[secondId], closest);
       closestFeatures = {featureOf(firstTopology, firstId, closest.featureA),
                          featureOf(secondTopology, secondId, closest.featureB)};
+      touching = {
+          featureOf(firstTopology, firstId, spannedFeature(touchWeight(contact.weightA, time))),
+          featureOf(secondTopology, secondId, spannedFeature(touchWeight(contact.weightB, time)))};
       complete(contact);
       if (isSuppressed(closest, contact.normal, rejectsEdges(m_pair, firstId, secondId)))
         return false;
