@@ -4,6 +4,7 @@
 #include "Mesh/FaceAtCorner.h"
 #include "Mesh/FaceBlock.h"
 #include "Math/StableLength.h"
+#include "Math/Tolerances.h"
 #include "Core/Assert.h"
 
 #include <algorithm>
@@ -68,6 +69,22 @@ Vector3d onSideOf(const Vector3d& normal, const Vector3d& smooth) {
   const double cosine = normal.dot(stableUnit(smooth));
   if (!(std::abs(cosine) >= kLeastCosine)) return normal;
   return stableUnit(cosine > 0.0 ? smooth : Vector3d(-smooth));
+}
+
+/// Whether the smooth normal alone says that an impact's features come nearer: along the contact's
+/// own normal they slide or part. A row along it would ask for what no feature needs.
+bool holdsBack(const MeshPair& pair, ContactKind kind, const auto& contact,
+               const Vector3d& smooth) {
+  if (!(contact.timeOfImpact < 1.0)) return false;
+  const Stencil all = stencil(contact);
+  const auto sides = sidesOf(kind);
+  Vector3d displacement = Vector3d::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    const TriangleMesh& mesh = pair.meshOf(sides[i]);
+    displacement += all.weights[i] * (mesh.now[all.vertices[i]] - mesh.before[all.vertices[i]]);
+  }
+  const double rounding = kTouchAngle * stableLength(displacement);
+  return smooth.dot(displacement) < -rounding && contact.normal.dot(displacement) >= -rounding;
 }
 
 /// The sum of vertices' normals by weights. Unit, or zero.
@@ -160,6 +177,8 @@ void findSmoothNormals(const MeshPair& pair, bool smoothsShape, const Threads& t
           const auto& contact = list[i - first];
           Vector3d& normal = contents.columnsOf(kind).smooth[i - first];
           normal = onSideOf(contact.normal, smooth(kind, contact));
+          if constexpr (kind != ContactKind::Shape)
+            if (holdsBack(pair, kind, contact, normal)) normal = contact.normal;
           PALPATE_ASSERT(std::abs(normal.norm() - 1.0) < 1e-9);
         }
         first += list.size();

@@ -131,6 +131,43 @@ TEST(RestingBodies, HaveNoContactWithADepthWhereTheyTouch) {
       }
 }
 
+/// Whether a body begins on the table, and not beside it.
+bool beginsOnTable(const RestScene& scene) {
+  Eigen::AlignedBox3d body, table;
+  for (const Vector3d& p : scene.before) body.extend(p);
+  for (const Vector3d& p : scene.table.positions) table.extend(p);
+  return ((body.max().cwiseMin(table.max()) - body.min().cwiseMax(table.min())).array() > 0)
+             .count() == 2;
+}
+
+/// Bodies that slide along the table, also over its rims, only touch it: no row holds them back.
+TEST(RestingBodies, SlideWithoutResistance) {
+  Random random(9);
+  std::size_t rowCount = 0;
+  for (int run = 0; run < casesOf(200); ++run)
+    for (const bool isCloth : {false, true}) {
+      const RestScene scene = restScene(random, isCloth, true, 0, 0);
+      if (!beginsOnTable(scene)) continue;
+      OctreeBasedCD collisions(settingsOf(Engine::Octree));
+      const GeometryId table = addMesh(collisions, scene.table),
+                       body = addMesh(collisions, scene.body);
+      PairSettings settings{.method = run % 2 ? Method::Auto : Method::Continuous};
+      settings.smoothNormals = run % 3 == 0;
+      collisions.addCollisionPair(body, table, settings);
+      collisions.setPositions(body, scene.before, scene.body.positions);
+      collisions.detectCollision();
+      std::vector<ConstraintRow> rows;
+      const auto size = static_cast<std::uint32_t>(scene.body.positions.size());
+      collisions.collisionData(body, table).appendRows(rows, 0, size);
+      std::vector<Vector3d> now = scene.body.positions;
+      now.insert(now.end(), scene.table.positions.begin(), scene.table.positions.end());
+      rowCount += rows.size();
+      for (const ConstraintRow& row : rows)
+        EXPECT_GE(row.gap(now), -1e-12) << "run " << run << ", along " << row.normal.transpose();
+    }
+  EXPECT_GE(rowCount, leastOf(1000));
+}
+
 /// The same bodies, a quarter lower: what overlaps has a depth, of a quarter at most.
 TEST(RestingBodies, HaveADepthWhereTheyAreLower) {
   Random random(8);

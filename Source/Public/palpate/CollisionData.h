@@ -201,7 +201,8 @@ class PALPATE_EXPORT CollisionData {
   /// empty. It is interpolated between the angle-weighted normals of the mesh's vertices, with the
   /// contact's weights and at its time, and is on the side of the contact's normal. For two edges
   /// both meshes count, for a vertex only that of the triangle. It is the contact's normal where
-  /// both are over 60 degrees apart, and without a triangle.
+  /// both are over 60 degrees apart, without a triangle, and of an impact whose features come
+  /// nearer along the smooth normal alone: they slide, and no row holds them back.
   std::span<const Eigen::Vector3d> smoothVertexTriangle() const;
   std::span<const Eigen::Vector3d> smoothTriangleVertex() const;
   std::span<const Eigen::Vector3d> smoothEdgeEdge() const;
