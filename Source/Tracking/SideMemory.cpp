@@ -385,32 +385,39 @@ bool SideMemory::anyCourse(const Crossing& features, F&& f) const {
   return false;
 }
 
-/// To which side a vertex had passed when the step began; none if it had not. kind: of vertices of
-/// its mesh.
-std::optional<bool> SideMemory::sideOf(ContactKind kind, std::uint32_t vertex) const {
-  std::optional<bool> forward;
+/// The side to which a vertex had passed when the step began; null if it had not. kind: of vertices
+/// of its mesh.
+const Side* SideMemory::sideOf(ContactKind kind, std::uint32_t vertex) const {
+  const Side* side = nullptr;
   anyCourse({kind, {vertex, vertex}}, [&](std::uint32_t i) {
-    if (i < m_here.size()) forward = m_here[i].passage.forward;
-    return forward.has_value();
+    if (i < m_here.size()) side = &m_here[i];
+    return side != nullptr;
   });
-  return forward;
+  return side;
 }
 
 /// The side to which vertices with weight had passed; none if they had not, or to both sides.
-SideMemory::PartSide SideMemory::sideOf(ContactKind kind, const Part& part) const {
-  PartSide found{{}, true};
+SideMemory::PartSide SideMemory::sideOf(const MeshPair& pair, ContactKind kind,
+                                        const Part& part) const {
+  PartSide found{{}, true, Vector3d::Zero()};
+  const Positions& p = VertexSide(pair, kind).triangles.before;
   for (std::size_t i = 0; i < part.size; ++i) {
     if (part.weights[i] == 0.0) continue;
-    const std::optional<bool> side = sideOf(kind, part.vertices[i]);
-    if (side && found.forward && found.forward != side) return {{}, false};
-    if (side) found.forward = side;
-    found.isWhole &= side.has_value();
+    const Side* const side = sideOf(kind, part.vertices[i]);
+    found.isWhole &= side != nullptr;
+    if (!side) continue;
+    const bool forward = side->passage.forward;
+    if (found.forward.value_or(forward) != forward) return {{}, false, Vector3d::Zero()};
+    found.forward = forward;
+    const auto& [a, b, c] = side->corners;
+    found.back += (forward ? -1.0 : 1.0) * part.weights[i] * windingNormal(p[a], p[b], p[c]);
   }
   return found;
 }
 
 /// Turns contacts of elements all of whose vertices had passed through the other mesh. Not where
-/// they are clearly on the side from which they came: this is another fold of the surface. Elements
+/// they are clearly on the side from which they came: this is another fold of the surface. And not
+/// where they clearly lead the way back already: this is the far wall of a body. Elements
 /// of which some vertices had passed pierce the surface; those of their contacts that lead
 /// these vertices further behind it are removed.
 void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
@@ -420,13 +427,14 @@ void SideMemory::turnPassed(const MeshPair& pair, Contents& contents) const {
   // part: of MeshPair::b or a; onSurface: of the other mesh. toA: from b to a.
   const auto changeOf = [&](const Part& part, const Part& onSurface, bool ofB, const Vector3d& toA,
                             double time) {
-    const PartSide side = sideOf(ofB ? kOfB : kOfA, part);
+    const PartSide side = sideOf(pair, ofB ? kOfB : kOfA, part);
     if (!side.forward) return Change::None;
     const Vector3d normal =
         interpolatedNormal(ofB ? pair.a : pair.b, onSurface.ids(), onSurface.weights.data(), time);
     const Vector3d direction = ofB ? Vector3d(-toA) : toA;
     const double back = (*side.forward ? -1.0 : 1.0) * direction.dot(normal);
-    if (side.isWhole) return back < kClearly ? Change::Turned : Change::None;
+    const bool isFarWall = direction.dot(side.back) > kClearly * side.back.norm();
+    if (side.isWhole) return back < kClearly && !isFarWall ? Change::Turned : Change::None;
     return back < 0.0 ? Change::Removed : Change::None;
   };
   const auto changeOfContact = [&](ContactKind kind, const auto& contact) {

@@ -75,7 +75,8 @@ class SideMemory : public CountedObject {
   };
   struct PartSide {
     std::optional<bool> forward;
-    bool isWhole;  ///< all vertices of the part had passed
+    bool isWhole;          ///< all vertices of the part had passed
+    Eigen::Vector3d back;  ///< along the normals of the triangles through which they passed
   };
   /// A remembered side within the step, and the features along which it slides.
   struct Course {
@@ -104,8 +105,8 @@ class SideMemory : public CountedObject {
   std::size_t listOf(const Crossing&) const;
   template <class F>
   bool anyCourse(const Crossing& features, F&&) const;
-  std::optional<bool> sideOf(ContactKind, std::uint32_t vertex) const;
-  PartSide sideOf(ContactKind, const Part&) const;
+  const Side* sideOf(ContactKind, std::uint32_t vertex) const;
+  PartSide sideOf(const MeshPair&, ContactKind, const Part&) const;
   void turnPassed(const MeshPair&, Contents&) const;
   bool contains(const MeshPair&, const Course&, const Side&, bool* isSame = nullptr) const;
   bool hasPassedEnd(const Crossing&) const;

@@ -1,3 +1,4 @@
+#include "Common/DegenerateCases.h"
 #include "Common/ExpectRefused.h"
 #include "Common/TestGeometry.h"
 #include "Unit/Math/ImpactOracle.h"
@@ -448,6 +449,34 @@ TEST(SideMemory, InAClosedBodyLeadsBackTheWayThatAPointCame) {
       collisions.detectCollision();
       EXPECT_TRUE(collisions.collisionData(tip, wall).rememberedSides().empty()) << aside;
     }
+}
+
+/// A needle in a plate that is as thin as the thickness: its far wall does not lead it out.
+TEST(SideMemory, InAPlateNoRowLeadsThroughTheFarWall) {
+  const Mesh plate = dividedBox({-3, -3, -0.2}, {3, 3, 0}, 4);
+  for (const Method method : {Method::Auto, Method::Continuous})
+    for (const double depth : {0.05, 0.1, 0.15, 0.19})
+      for (const double motion : {0.0, 0.001}) {
+        OctreeBasedCD collisions;
+        const auto needle = [](double tip) {
+          return Positions{{0.53, 0.97, tip}, {0.53, 0.97, tip + 4}};
+        };
+        const GeometryId line = collisions.addLineMesh(needle(0.5), std::vector<Segment>{{0, 1}}),
+                         body = collisions.addTriangleMesh(plate.positions, plate.triangles);
+        PairSettings settings = remembering(0.2);
+        settings.method = method;
+        collisions.addCollisionPair(line, body, settings);
+        collisions.advance();
+        collisions.setPositions(line, needle(-depth));
+        collisions.detectCollision();
+        collisions.advance();
+        collisions.setPositions(line, needle(motion - depth));
+        collisions.detectCollision();
+        std::vector<ConstraintRow> rows;
+        collisions.collisionData(line, body).appendRows(rows, 0, 2);
+        EXPECT_GE(rows.size(), 2u);
+        for (const ConstraintRow& row : rows) EXPECT_EQ(row.normal, Vector3d(0, 0, 1));
+      }
 }
 
 TEST_F(OnePoint, ABudgetWithoutTimeForgetsNothing) {
