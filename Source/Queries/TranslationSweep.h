@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Queries/BodyPair.h"
+#include "Queries/SweepTree.h"
 
 #include <Eigen/Core>
 
@@ -13,20 +14,6 @@
 namespace palpate {
 
 struct SweepScratch {
-  /// Along the coordinate axes, and along one more direction.
-  struct Box {
-    std::array<double, 4> lower, upper;
-  };
-  /// The triangles of a body with area, along a space-filling curve, and boxes over parts of them:
-  /// a complete binary tree, in which node i has the children 2 i and 2 i + 1. The leaves hold
-  /// kLeaf triangles each.
-  struct Side {
-    CountedVector<std::pair<std::uint32_t, std::uint32_t>> order;  ///< place on the curve, element
-    CountedVector<Corners> corners;
-    CountedVector<Box> own;    ///< of the triangles
-    CountedVector<Box> boxes;  ///< by node, from 1 on
-    std::size_t leaves = 0;
-  };
   /// Nodes, or triangles, of both bodies that meet at most from `enter` to `leave`.
   struct Task {
     double enter, leave;
@@ -34,9 +21,8 @@ struct SweepScratch {
     bool areTriangles;
   };
 
-  Side a, b;
-  CountedVector<Corners> inset;  ///< the triangles of a, moved inward
-  CountedVector<Eigen::Vector3d> normals, vertices;
+  SweepTree a, b;
+  SweepInset inset;           ///< of a
   CountedVector<Task> now;    ///< a stack
   CountedVector<Task> later;  ///< a heap by `enter`
 };
@@ -50,9 +36,8 @@ struct SweepScratch {
 ///          must not count, so a is made smaller by kInset where it is asked whether triangles
 ///          cross. They then leave each other where the true ones touch last.
 /// Source   separating axes: Gottschalk, Lin, Manocha: OBBTree (1996), for triangles that move.
-///          The tree over a sorted order: Lauterbach et al., Fast BVH construction on GPUs (2009).
-/// Cost     prepare() is linear in the triangles, a direction in the pairs of boxes and triangles
-///          that meet along it.
+/// Cost     the constructor sorts the triangles, a direction is linear in the pairs of boxes and
+///          triangles that meet along it.
 class TranslationSweep {
  public:
   struct Contact {
@@ -74,10 +59,7 @@ class TranslationSweep {
   /// body at t(), and the next interval must be passed. Returns false if that is beyond the end,
   /// if there is no such interval, or after so many operations.
   bool advance(const Limits&, bool isInside);
-  struct Hit {
-    double t;  ///< L
-    std::uint32_t element;
-  };
+  using Hit = SweepTree::Hit;  ///< t: L
   /// Where a vertex meets the other body first on its way along a direction of a, within rounding.
   /// None if it does not, or not before `end`, L.
   std::optional<Hit> firstHit(bool ofA, std::uint32_t vertex, const Eigen::Vector3d& direction,
@@ -92,16 +74,9 @@ class TranslationSweep {
   std::size_t operations() const { return m_operations; }  ///< of all directions
 
  private:
-  using Side = SweepScratch::Side;
-  using Box = SweepScratch::Box;
   using Task = SweepScratch::Task;
-  static constexpr std::size_t kLeaf = 4;
 
-  void load(bool ofA, Side&);
-  void makeInset();
-  void makeBoxes(Side&, bool withInset);
-  void extend(Box&, const Eigen::Vector3d&) const;
-  Task taskOf(const Box& a, const Box& b) const;
+  Task taskOf(const SweepTree::Box& a, const SweepTree::Box& b) const;
   void enter(const Task&);
   void run();
   void runTriangles(const Task&);
