@@ -1,7 +1,6 @@
 #include "Queries/RayHits.h"
 
 #include "Queries/ElementDistance.h"
-#include "Bodies/OctreeFrame.h"
 #include "Mesh/Corners.h"
 #include "Math/ClosestPoint.h"
 #include "Math/RoundSegment.h"
@@ -13,33 +12,10 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
-#include <memory>
 
 namespace palpate {
 
 using Eigen::Vector3d;
-
-namespace {
-
-/// Moves `enter` and `leave` to where a ray enters a box that is grown by `slack`, and leaves it.
-/// Where it does not enter, `leave` is then less.
-void clipTo(const FloatBox& box, double slack, const Vector3d& origin, const Vector3d& direction,
-            double& enter, double& leave) {
-  for (int k = 0; k < 3; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const double lower = box.lower[at] - slack, upper = box.upper[at] + slack;
-    if (direction[k] == 0.0) {
-      if (origin[k] < lower || origin[k] > upper) leave = -std::numeric_limits<double>::infinity();
-      continue;
-    }
-    const double s = (lower - origin[k]) / direction[k], t = (upper - origin[k]) / direction[k];
-    const double margin = kNearestError * std::max(std::abs(s), std::abs(t));
-    enter = std::max(enter, std::min(s, t) - margin);
-    leave = std::min(leave, std::max(s, t) + margin);
-  }
-}
-
-}  // namespace
 
 RayHits::RayHits(const Body& geometry, const Ray& ray, bool bruteForce, std::vector<Met>& scratch,
                  double radius)
@@ -49,68 +25,6 @@ RayHits::RayHits(const Body& geometry, const Ray& ray, bool bruteForce, std::vec
       m_radius(radius),
       m_isSolid(geometry.mesh.largestRadius + radius > 0),
       m_met(scratch) {}
-
-/// Never negative, which would end the traversal: m_start is rounded.
-float RayHits::floatOf(double t) const {
-  const double along = (t * m_perT - m_start) * (1.0 + kNearestError);
-  return std::max(OutwardRounding::up(along), 0.0f);
-}
-
-bool RayHits::clip(FloatRay& clipped, LineFilter& line) {
-  std::construct_at(&line);  // in place here and below, as a copy would wait for each part
-  const RaySegment& ray = m_ray;
-  const double radius = m_geometry.mesh.largestRadius + m_radius;  // by which boxes grow
-  const OctreeFrame frame(m_geometry);
-  const FloatBox root = m_geometry.tree.octree().box(0);
-  double extent = root.reach();
-  const double error = frame.error() + (m_geometry.isPlaced() ? 4.0 * kOrthonormal * extent : 0.0);
-  Vector3d origin = frame.toFrame(ray.origin), direction = frame.turned(ray.direction);
-  Eigen::Index axis;
-  const double length = direction.cwiseAbs().maxCoeff(&axis), perT = length * frame.scale();
-  direction /= length;
-  extent += radius * frame.scale();
-  // A ray from far away begins where it enters the grown root box.
-  double enter = ray.tMin * perT, leave = ray.tMax * perT;
-  const double far = origin.cwiseAbs().maxCoeff(), reach = far + std::abs(enter);
-  const bool isNear = reach <= 4.0 * extent;
-  // With S the extent and the reach, all coordinates are at most S, and t grows by at most three
-  // times that. Its floats err by at most 2^-20 of it; kFloatRayError has a margin. The rest are
-  // errors of the origin in double.
-  const double doubleError =
-      kPlacedPointError * far + error + radius * (1.0 + kNearestError) * frame.scale();
-  const double slack =
-      kFloatRayError * (extent + (isNear ? reach : 0.0)) + doubleError + OutwardRounding::kAbsolute;
-  clipped.slack = OutwardRounding::up(slack);
-  m_perT = perT;
-  if (!(extent < kLargestFloat) || !(perT >= 0x1p-900) || !(perT <= 0x1p900) ||
-      !(slack < kLargestFloat)) {  // every box is entered at once
-    clipped.origin = {};
-    clipped.inverse = {1, 1, 1};
-    clipped.slack = clipped.tMax = std::numeric_limits<float>::infinity();
-    m_perT = m_start = 0.0;
-    return true;
-  }
-  for (int k = 0; k < 3; ++k) {
-    // A smaller component moves the ray by less than the slack.
-    const double least = std::copysign(std::max(std::abs(direction[k]), 0x1p-100), direction[k]);
-    clipped.inverse[static_cast<std::size_t>(k)] = 1.0f / static_cast<float>(least);
-  }
-  if (!isNear) clipTo(root, slack, origin, direction, enter, leave);
-  if (!(enter <= leave)) return false;
-  m_start = enter;
-  clipped.tMax = OutwardRounding::up((leave - enter) * (1.0 + kNearestError));
-  origin += enter * direction;
-  for (int k = 0; k < 3; ++k)
-    clipped.origin[static_cast<std::size_t>(k)] = static_cast<float>(origin[k]);
-  if (radius == 0) {
-    const double unit = frame.unit(), most = extent + origin.cwiseAbs().maxCoeff();
-    const Vector3d& zero = m_geometry.tree.frame().origin;
-    std::construct_at(&line, unit * origin + zero, direction, static_cast<int>(axis), unit * most,
-                      unit * (doubleError + kPlacedPointError * most) +
-                          kPlacedPointError * zero.cwiseAbs().maxCoeff());
-  }
-  return true;
-}
 
 template <class F>
 void RayHits::intersect(std::uint32_t place, F&& f) const {
@@ -159,9 +73,10 @@ bool RayHits::start(Wanted wanted, double bound, double atLeast, RayTask& task) 
   }
   task = {
       {m_geometry.tree.ordered().data(), m_geometry.mesh.now.body().data(), {}}, {}, this, take};
-  if (!clip(task.ray, task.elements.line)) return false;
+  const double radius = m_geometry.mesh.largestRadius + m_radius;
+  if (!m_inOctree.clip(m_geometry, m_ray, radius, task.ray, task.elements.line)) return false;
   m_end = task.ray.tMax;
-  m_tMax = task.ray.tMax = std::min(m_end, floatOf(m_least));
+  m_tMax = task.ray.tMax = std::min(m_end, m_inOctree.floatOf(m_least));
   return true;
 }
 
@@ -170,7 +85,8 @@ float RayHits::take(void* context, std::uint32_t place) {
   hits.add(place);
   if (hits.m_wanted == Wanted::Any && !hits.m_met.empty()) return -1.0f;
   if (hits.m_first == kInfinity) return hits.m_tMax;
-  return std::min(hits.m_end, hits.floatOf(std::max(hits.m_last + hits.m_error, hits.m_atLeast)));
+  const double least = std::max(hits.m_last + hits.m_error, hits.m_atLeast);
+  return std::min(hits.m_end, hits.m_inOctree.floatOf(least));
 }
 
 double RayHits::end() {
@@ -298,9 +214,26 @@ std::optional<RayHit> RayHits::first(double bound) {
   return endFirst(bound);
 }
 
-void RayHits::first(const Body& geometry, std::span<const Ray> rays, bool bruteForce,
-                    std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
-                    std::span<RayHit> out) {
+bool RayHits::any() {
+  // A solid element that holds the whole ray has no hit.
+  if (m_isSolid) return first(m_ray.tMax).has_value();
+  collect(Wanted::Any, m_ray.tMax, m_ray.tMin);
+  return !m_met.empty();
+}
+
+void RayHits::all(std::vector<RayHit>& out) {
+  collect(Wanted::All, m_ray.tMax, m_ray.tMin);
+  double least = -kInfinity;  // hits are in order, but each t is rounded
+  forEachHit([&](RayHit hit) {
+    hit.t = least = std::max(least, hit.t);
+    out.push_back(hit);
+    return true;
+  });
+}
+
+void firstHits(const Body& geometry, std::span<const Ray> rays, bool bruteForce,
+               std::array<std::vector<RayHits::Met>, kRaysInFlight>& scratch, const RayHit& none,
+               std::span<RayHit> out) {
   PALPATE_ASSERT(rays.size() == out.size());
   // The processor's caches hold a small octree, and turns then cost more than they save.
   constexpr std::size_t kLeastForTurns = 30'000;
@@ -331,23 +264,6 @@ void RayHits::first(const Body& geometry, std::span<const Ray> rays, bool bruteF
     return false;
   };
   traverseRays(geometry.tree.octree(), tasks, next);
-}
-
-bool RayHits::any() {
-  // A solid element that holds the whole ray has no hit.
-  if (m_isSolid) return first(m_ray.tMax).has_value();
-  collect(Wanted::Any, m_ray.tMax, m_ray.tMin);
-  return !m_met.empty();
-}
-
-void RayHits::all(std::vector<RayHit>& out) {
-  collect(Wanted::All, m_ray.tMax, m_ray.tMin);
-  double least = -kInfinity;  // hits are in order, but each t is rounded
-  forEachHit([&](RayHit hit) {
-    hit.t = least = std::max(least, hit.t);
-    out.push_back(hit);
-    return true;
-  });
 }
 
 }  // namespace palpate

@@ -2,6 +2,7 @@
 
 #include <palpate/SpatialQueries.h>
 
+#include "Queries/OctreeRay.h"
 #include "Queries/RayTraversal.h"
 #include "Bodies/Body.h"
 #include "Math/RayTriangle.h"
@@ -42,10 +43,10 @@ class RayHits {
   /// bound: t; if the first hit is not before it, the result is no hit or one that is not before
   /// it.
   std::optional<RayHit> first(double bound);
-  /// The first hits of many rays, each as first(tMax); `none` where there is none.
-  static void first(const Body&, std::span<const Ray>, bool bruteForce,
-                    std::array<std::vector<Met>, kRaysInFlight>& scratch, const RayHit& none,
-                    std::span<RayHit> out);
+  /// first() in three parts: startFirst(), a traversal, and endFirst(). startFirst() returns false
+  /// if there is nothing to traverse.
+  bool startFirst(double bound, RayTask&);
+  std::optional<RayHit> endFirst(double bound);
   bool any();
   /// Number of decisions about triangles and their hits by exact arithmetic so far.
   std::size_t exactDecisions() const { return m_exactDecisions; }
@@ -70,16 +71,10 @@ class RayHits {
   /// the result. Returns how far it reaches, or atLeast.
   double collect(Wanted, double bound, double atLeast);
   // collect() in three parts: start(), a traversal, whose context is this object, and end().
-  // start() returns false if there is nothing to traverse.
+  // start() returns as startFirst().
   bool start(Wanted, double bound, double atLeast, RayTask&);
   static float take(void* context, std::uint32_t place);  ///< TestElement
   double end();
-  // first() in the same three parts.
-  bool startFirst(double bound, RayTask&);
-  std::optional<RayHit> endFirst(double bound);
-  /// Returns false if the ray certainly misses all boxes.
-  bool clip(FloatRay&, LineFilter&);
-  float floatOf(double t) const;
   void add(std::uint32_t place);
   /// Calls f(interval) for what the ray shares with an element.
   template <class F>
@@ -123,9 +118,14 @@ class RayHits {
   /// The part that begins first, as far as it is known, with the error of its ends. Until an
   /// element is met, it has no end before tMax.
   double m_first, m_last, m_error;
-  double m_least;          ///< no element beyond this t is wanted
-  double m_start, m_perT;  ///< the ray's t, in the octree's floats, is t m_perT - m_start
-  float m_end, m_tMax;     ///< in floats: where the ray ends, and where the traversal ends
+  double m_least;  ///< no element beyond this t is wanted
+  OctreeRay m_inOctree;
+  float m_end, m_tMax;  ///< in floats: where the ray ends, and where the traversal ends
 };
+
+/// The first hits of many rays, each as RayHits::first(tMax); `none` where there is none.
+void firstHits(const Body&, std::span<const Ray>, bool bruteForce,
+               std::array<std::vector<RayHits::Met>, kRaysInFlight>& scratch, const RayHit& none,
+               std::span<RayHit> out);
 
 }  // namespace palpate

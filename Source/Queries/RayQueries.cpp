@@ -109,8 +109,8 @@ class RayQuery {
                      });
         },
         [&](std::size_t begin, std::size_t count) {
-          RayHits::first(geometry, rays.subspan(begin, count), m_bruteForce, m_scratch->metInFlight,
-                         none, out.subspan(begin, count));
+          firstHits(geometry, rays.subspan(begin, count), m_bruteForce, m_scratch->metInFlight,
+                    none, out.subspan(begin, count));
         });
   }
   /// Appends all hits of one ray after the other. counts: of each ray's hits.
