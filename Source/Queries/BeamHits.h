@@ -2,16 +2,15 @@
 
 #include <palpate/SpatialQueries.h>
 
+#include "Queries/BeamRays.h"
 #include "Queries/RayBeam.h"
 #include "Queries/RayHits.h"
 #include "Bodies/Body.h"
-#include "Bodies/OctreeFrame.h"
 #include "Math/RayTriangles.h"
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -37,8 +36,7 @@ class BeamHits {
 
   BeamHits(const Body&, Scratch&);
 
-  /// Makes a beam of the first rays that go the same way. Returns their number; 0 if there are too
-  /// few for a beam.
+  /// Makes a beam of the first rays, as BeamRays::start().
   std::size_t start(std::span<const Ray>);
   /// The first hits of the beam's rays. Calls hit(ray, hit) for each ray that has one, miss(ray)
   /// for each that has none, and other(ray) for each that is left to RayHits.
@@ -46,7 +44,7 @@ class BeamHits {
   void first(Hit&& hit, Miss&& miss, Other&& other) {
     collect(true);
     m_scratch.sorted.clear();
-    for (std::uint32_t i = 0; i < m_count; ++i)
+    for (std::uint32_t i = 0; i < m_rays.count(); ++i)
       if (m_isLeft[i] || !isApart(m_first[i], m_second[i], m_error[i]))
         other(i);
       else if (m_firstMet[i].t < kInfinity)
@@ -61,7 +59,7 @@ class BeamHits {
     collect(false);
     sort();
     std::size_t begin = 0;
-    for (std::uint32_t i = 0; i < m_count; ++i) {
+    for (std::uint32_t i = 0; i < m_rays.count(); ++i) {
       if (!m_isLeft[i]) continue;
       forEachHit(std::span(m_scratch.sorted).subspan(begin, m_ends[i] - begin), hit);
       begin = m_ends[i];
@@ -77,21 +75,6 @@ class BeamHits {
   static bool isApart(double first, double second, double mostError) {
     return second - first > 2.0 * mostError || second == kInfinity;
   }
-  /// A ray's line. w: as in RayBeam.
-  struct Line {
-    double origin[2], slope[2];  ///< on the other axes; per w
-    double atZero, perT;         ///< w = atZero + t perT
-    double begin, end;           ///< w of the ray's ends, at least
-    double reach;                ///< of the origin's coordinates and the octree's
-
-    double at(std::size_t k, double w) const { return origin[k] + (w - atZero) * slope[k]; }
-  };
-  using Sides = std::array<std::array<double, 2>, 2>;  ///< of rays: axis, at m_begin and m_end
-
-  std::optional<Line> lineOf(const Ray&);
-  bool isLongEnough(const Line&);
-  bool add(const Ray&);
-  void finish();
   void collect(bool first);
   float take(std::span<const RayPair>, bool first);
   void sort();
@@ -116,22 +99,10 @@ class BeamHits {
 
   const Body& m_geometry;
   Scratch& m_scratch;
-  const OctreeFrame m_frame;
   const Triangle* const m_ordered;
   const Eigen::Vector3d* const m_positions;  ///< where the octree is
-  bool m_hasBeams;                           ///< whether the geometry can be searched by beams
-  double m_extent;      ///< of the octree's root; this and what follows is in its floats
-  double m_frameError;  ///< of positions, besides their share of the coordinates
-  double m_perEdge;     ///< per about the mean edge of the triangles
-
-  std::size_t m_count = 0;
-  RayBeam m_beam;
-  double m_begin, m_end;  ///< w between which the beam's lines are taken
-  double m_slack;
-  Sides m_lower, m_upper;
+  BeamRays m_rays;
   // Of each ray:
-  std::array<RaySegment, kSize> m_rays;
-  std::array<double, kSize> m_perT, m_atZero;            ///< w = m_atZero + t m_perT
   std::array<bool, kSize> m_isLeft;                      ///< to RayHits
   std::array<float, kSize> m_wanted;                     ///< the largest w that is still wanted
   std::array<double, kSize> m_first, m_second, m_error;  ///< t; the largest error
