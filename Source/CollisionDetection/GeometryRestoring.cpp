@@ -47,6 +47,40 @@ bool isSameBody(const Geometry& geometry, const SavedGeometry& saved) {
          areEqual(given.rest.empty() ? given.now : given.rest, body.mesh.rest);
 }
 
+/// An end of a saved step: positions in the body's frame, and the pose if it is placed. What equals
+/// that of an end now, or of one in `others`, takes its revision.
+Positions savedEnd(Geometry& geometry, std::span<const Eigen::Vector3d> saved,
+                   const std::optional<Pose>& pose, std::initializer_list<const Positions*> others,
+                   const Threads& threads) {
+  const TriangleMesh& mesh = geometry.body.mesh;
+  std::vector<const Positions*> known{&mesh.now, &geometry.step.detected(), &mesh.before};
+  known.insert(known.end(), others.begin(), others.end());
+  Positions positions;
+  const auto same = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
+    return other->size() == saved.size() &&
+           (saved.empty() || std::memcmp(other->body().data(), saved.data(),
+                                         saved.size() * sizeof(Eigen::Vector3d)) == 0);
+  });
+  if (same != known.end()) {
+    positions.setBodyOf(**same);
+  } else {
+    auto body = std::make_shared<CountedVector<Eigen::Vector3d>>(saved.size());
+    const auto bounds = checkPositions(geometry, saved, body->data(), "", threads);
+    positions.setBody(std::move(body), bounds, geometry.step.nextRevision());
+  }
+  if (!pose) return positions;
+  if (const std::string fault = faultOf(*pose); !fault.empty())
+    throw Error(ErrorCode::InvalidTransform, nameOf(geometry) + ": " + fault, geometry.body.id);
+  const auto equal = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
+    return other->isPlaced() && haveSameBits(other->transform(), *pose);
+  });
+  if (equal != known.end())
+    positions.placeAs(**equal);
+  else
+    positions.place(*pose, geometry.step.nextRevision());
+  return positions;
+}
+
 /// The ends of the step of a geometry whose body is as it was saved.
 GeometryStep::State restoredStep(const SavedGeometry& saved, Geometry& geometry,
                                  const Threads& threads) {
@@ -57,9 +91,7 @@ GeometryStep::State restoredStep(const SavedGeometry& saved, Geometry& geometry,
   const auto end = [&](std::span<const Eigen::Vector3d> positions, std::size_t i,
                        std::initializer_list<const Positions*> others) {
     if (hasPositions) checkPositionCount(geometry, positions.size());
-    return geometry.step.positionsOf(geometry, body.mesh,
-                                     {hasPositions ? positions : fixed, saved.poses[i]},
-                                     {others.begin(), others.size()}, threads);
+    return savedEnd(geometry, hasPositions ? positions : fixed, saved.poses[i], others, threads);
   };
   if (!saved.poses[0] && (saved.poses[1] || saved.poses[2]))
     throw Error(ErrorCode::InvalidTransform, nameOf(geometry) + " is placed before, but not now",

@@ -30,43 +30,10 @@ void GeometryStep::start(TriangleMesh& mesh, Positions::Body body) noexcept {
   m_detected = mesh.before;
 }
 
-void GeometryStep::releaseMemory() {
-  std::erase_if(m_bodies, [](const auto& body) { return body->isFree(); });
-}
-
 void GeometryStep::startShape(const Shape& shape) { m_spare = m_spareBefore = shape; }
 
-/// Memory that nothing uses; if possible, memory from which few vertices of `like` are missing.
-GeometryStep::BodyMemory& GeometryStep::freeBody(const Positions* like) {
-  BodyMemory* found = nullptr;
-  for (const auto& body : m_bodies) {
-    if (!body->isFree()) continue;
-    if (!found) found = body.get();
-    if (!like || (body->revision && like->changesSince(*body->revision))) return *body;
-  }
-  if (found) return *found;
-  auto body = std::make_unique<BodyMemory>();
-  body->positions = std::make_shared<CountedVector<Eigen::Vector3d>>();
-  return *m_bodies.emplace_back(std::move(body));
-}
-
-GeometryStep::CheckedBody GeometryStep::checkedBody(const GeometryLabel& label,
-                                                    std::span<const Eigen::Vector3d> positions,
-                                                    const char* which, const Threads& threads,
-                                                    const Eigen::Vector3d* from,
-                                                    MotionRange* moved) {
-  BodyMemory& free = freeBody();
-  free.revision.reset();
-  if (positions.size() > free.positions->capacity())
-    free.positions->reserve(withSpare(positions.size()));
-  free.positions->resize(positions.size());
-  const auto bounds =
-      checkPositions(label, positions, free.positions->data(), which, threads, from, moved);
-  return {&free, free.positions, bounds};
-}
-
 void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
-                           const CheckedBody& checked) noexcept {
+                           const PositionBodies::Checked& checked) noexcept {
   const Positions::Body& body = checked.positions;
   // The ends often share one body; it is compared only once.
   const Positions* last = nullptr;
@@ -88,29 +55,7 @@ void GeometryStep::setBody(TriangleMesh& mesh, Positions& end,
 void GeometryStep::reserveCut(TriangleMesh& mesh, std::size_t count, std::size_t gone) {
   reserveAmortized(m_cuts.gone, m_cuts.gone.size() + gone);
   m_cuts.positions.reserve(m_cuts.positions.size() + ends(mesh).size());
-  if (count == 0) return;
-  for (Positions* end : ends(mesh)) {
-    const Positions::Body body = end->sharedBody();
-    std::vector<Positions*> same;
-    for (Positions* other : ends(mesh))
-      if (other->sharedBody() == body) same.push_back(other);
-    if (end != same.front()) continue;
-    const auto own = std::find_if(m_bodies.begin(), m_bodies.end(),
-                                  [&](const auto& memory) { return memory->positions == body; });
-    const std::size_t size = body->size() + count;
-    // These ends, the memory itself, and `body`.
-    if (own != m_bodies.end() && body.use_count() == static_cast<long>(same.size()) + 2) {
-      reserveAmortized(*(*own)->positions, size);
-      for (Positions* other : same) other->findData();
-      continue;
-    }
-    BodyMemory& free = freeBody();
-    free.revision.reset();
-    free.positions->reserve(withSpare(size));
-    free.positions->assign(body->begin(), body->end());
-    for (Positions* other : same) other->moveBody(free.positions);
-    free.revision = end->bodyRevision();
-  }
+  if (count > 0) m_bodies.reserve(ends(mesh), count);
 }
 
 void GeometryStep::cut(TriangleMesh& mesh, std::span<const Eigen::Vector3d> newVertices,
@@ -138,11 +83,9 @@ void GeometryStep::append(TriangleMesh& mesh, std::span<const Eigen::Vector3d> p
       (*end)->setBodyOf(**same);
       continue;
     }
-    const auto own = std::find_if(m_bodies.begin(), m_bodies.end(), [&](const auto& memory) {
-      return memory->positions == (*end)->sharedBody();
-    });
-    PALPATE_ASSERT(own != m_bodies.end());
-    BodyMemory& memory = **own;
+    PositionBodies::Memory* const own = m_bodies.find((*end)->sharedBody());
+    PALPATE_ASSERT(own);
+    PositionBodies::Memory& memory = *own;
     memory.positions->insert(memory.positions->end(), positions.begin(), positions.end());
     memory.revision = m_revisions.next();
     m_cuts.append((*end)->bodyRevision(), *memory.revision);
@@ -156,15 +99,8 @@ void GeometryStep::setSomePositions(const GeometryLabel& label, TriangleMesh& me
   const VertexRange changed{first, first + now.size()};
   const std::span<const Eigen::Vector3d> last = mesh.now.body();
   PALPATE_ASSERT(!now.empty() && changed.end <= last.size());
-  BodyMemory& memory = freeBody(&mesh.now);
-  VertexRange missing{0, last.size()};
-  if (memory.revision && memory.positions->size() == last.size())
-    missing = mesh.now.changesSince(*memory.revision).value_or(missing);
-  memory.revision.reset();
-  memory.positions->resize(last.size());
+  PositionBodies::Memory& memory = m_bodies.copyOf(mesh.now);
   Eigen::Vector3d* const all = memory.positions->data();
-  std::copy(last.begin() + static_cast<std::ptrdiff_t>(missing.begin),
-            last.begin() + static_cast<std::ptrdiff_t>(missing.end), all + missing.begin);
   const Eigen::AlignedBox3d part =
       checkPositions(label, now, all + first, "", threads, nullptr, nullptr, first);
   // Nothing below throws. Positions that equal those of another end take its revision.
@@ -205,13 +141,14 @@ void GeometryStep::setPositions(const GeometryLabel& label, TriangleMesh& mesh,
                                 std::span<const Eigen::Vector3d> now, const Threads& threads,
                                 std::optional<MotionRange>* moved) {
   const bool isPlaced = mesh.now.isPlaced() || mesh.before.isPlaced();
-  const auto start = before ? checkedBody(label, *before, " before", threads) : CheckedBody();
+  const auto start =
+      before ? m_bodies.checked(label, *before, " before", threads) : PositionBodies::Checked();
   const bool followsNow = m_isNew && !m_bodyGiven && !before;
   const bool measures = moved && !isPlaced && !followsNow && !now.empty();
   const Eigen::Vector3d* const from =
       !measures ? nullptr : (before ? *start.positions : mesh.before.body()).data();
   MotionRange motion;
-  const auto end = checkedBody(label, now, before ? " now" : "", threads, from, &motion);
+  const auto end = m_bodies.checked(label, now, before ? " now" : "", threads, from, &motion);
   // Nothing below throws.
   if (before) {
     m_bodyGiven = true;
@@ -295,37 +232,6 @@ void GeometryStep::restoreNow(TriangleMesh& mesh, PlacedShape* shape,
 
 GeometryStep::State GeometryStep::state(const TriangleMesh& mesh) const {
   return {mesh.now, mesh.before, m_detected, m_isNew, m_bodyGiven, m_transformGiven, m_sets};
-}
-
-Positions GeometryStep::positionsOf(const GeometryLabel& label, const TriangleMesh& mesh,
-                                    const SavedEnd& end, std::span<const Positions* const> others,
-                                    const Threads& threads) {
-  std::vector<const Positions*> known{&mesh.now, &m_detected, &mesh.before};
-  known.insert(known.end(), others.begin(), others.end());
-  Positions positions;
-  const auto same = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
-    return other->size() == end.body.size() &&
-           (end.body.empty() || std::memcmp(other->body().data(), end.body.data(),
-                                            end.body.size() * sizeof(Eigen::Vector3d)) == 0);
-  });
-  if (same != known.end()) {
-    positions.setBodyOf(**same);
-  } else {
-    auto body = std::make_shared<CountedVector<Eigen::Vector3d>>(end.body.size());
-    const auto bounds = checkPositions(label, end.body, body->data(), "", threads);
-    positions.setBody(std::move(body), bounds, m_revisions.next());
-  }
-  if (!end.pose) return positions;
-  if (const std::string fault = faultOf(*end.pose); !fault.empty())
-    throw Error(ErrorCode::InvalidTransform, nameOf(label) + ": " + fault, label.id);
-  const auto equal = std::find_if(known.begin(), known.end(), [&](const Positions* other) {
-    return other->isPlaced() && haveSameBits(other->transform(), *end.pose);
-  });
-  if (equal != known.end())
-    positions.placeAs(**equal);
-  else
-    positions.place(*end.pose, m_revisions.next());
-  return positions;
 }
 
 void GeometryStep::restore(TriangleMesh& mesh, PlacedShape* shape, const State& state) noexcept {

@@ -2,6 +2,7 @@
 
 #include <palpate/Types.h>
 
+#include "CollisionDetection/PositionBodies.h"
 #include "CollisionDetection/StepSets.h"
 #include "Bodies/Body.h"
 #include "Shapes/PlacedShape.h"
@@ -71,7 +72,9 @@ class GeometryStep {
   /// Puts the end `now` back to what it was in this step, with its revisions.
   void restoreNow(TriangleMesh&, PlacedShape*, const Positions& now) noexcept;
 
-  void releaseMemory();  ///< frees arrays that only the next calls need
+  void releaseMemory() {
+    m_bodies.releaseMemory();
+  }  ///< frees arrays that only the next calls need
 
   /// A detection has used the end `now`.
   void recordDetection(const TriangleMesh& mesh) noexcept {
@@ -92,35 +95,11 @@ class GeometryStep {
     StepSets sets{};
   };
   State state(const TriangleMesh&) const;
-  /// An end of a saved state: positions in the body's frame, and the pose if it is placed.
-  struct SavedEnd {
-    std::span<const Eigen::Vector3d> body;
-    std::optional<Pose> pose;
-  };
-  /// Positions for restore(). What equals that of an end now, or of one in `others`, takes its
-  /// revision. Throws NonFinitePosition, InvalidTransform.
-  Positions positionsOf(const GeometryLabel&, const TriangleMesh&, const SavedEnd&,
-                        std::span<const Positions* const> others, const Threads&);
   void restore(TriangleMesh&, PlacedShape*, const State&) noexcept;
   Revision nextRevision() { return m_revisions.next(); }
 
  private:
-  /// Positions are checked while they are copied into one of these that nothing else uses.
-  struct BodyMemory {
-    std::shared_ptr<CountedVector<Eigen::Vector3d>> positions;
-    std::optional<Revision> revision;  ///< of its contents, if they were an end of a step
-    bool isFree() const { return positions.use_count() == 1; }
-  };
-  struct CheckedBody {
-    BodyMemory* memory = nullptr;
-    Positions::Body positions;  ///< those in it, so that it is not free
-    Eigen::AlignedBox3d bounds;
-  };
-  BodyMemory& freeBody(const Positions* like = nullptr);
-  CheckedBody checkedBody(const GeometryLabel&, std::span<const Eigen::Vector3d>, const char* which,
-                          const Threads&, const Eigen::Vector3d* from = nullptr,
-                          MotionRange* moved = nullptr);
-  void setBody(TriangleMesh&, Positions& end, const CheckedBody&) noexcept;
+  void setBody(TriangleMesh&, Positions& end, const PositionBodies::Checked&) noexcept;
   void append(TriangleMesh&, std::span<const Eigen::Vector3d>) noexcept;
   std::array<Positions*, 3> ends(TriangleMesh& mesh) {
     return {&mesh.now, &mesh.before, &m_detected};
@@ -134,8 +113,7 @@ class GeometryStep {
   bool m_bodyGiven = false, m_transformGiven = false;  ///< `before` was given in this step
   StepSets m_sets;
   Revision::Counter m_revisions;
-  /// Three ends, two incoming arrays and the copies of snapshots use them.
-  CountedVector<std::unique_ptr<BodyMemory>> m_bodies;
+  PositionBodies m_bodies;
   std::optional<Shape> m_spare, m_spareBefore;  ///< hold new placements until nothing can throw
 };
 
