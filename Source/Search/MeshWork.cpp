@@ -18,43 +18,12 @@
 
 namespace palpate {
 
-namespace {
-
-/// Whether the traversal may skip neighbours that UnfoldedStars proves not to touch. It may if the
-/// method reports nothing but touching features: Continuous, without a thickness.
-bool reportsOnlyTouching(const Question& question) {
-  return question.self() && question.plan.method == Method::Continuous &&
-         question.a.mesh.topology.hasFaces() && question.meshes().maxFeatureDistance() == 0.0;
-}
-
-/// L: by how much more than the thickness Continuous may report features (TimeOfImpactSettings).
-/// Their boxes in the world overlap at the thickness, but those in another frame may not.
-double approachSlack(const Question& question, double thickness) {
-  if (!question.plan.swept()) return 0.0;
-  const double motion = question.plan.motion,
-               largestDifference = question.aInStep.extent + question.bInStep.extent + motion;
-  return question.settings().continuous.timeTolerance * motion +
-         kApproachError * (largestDifference + 2.0 * thickness);
-}
-
-FloatPair floatsOf(const Question& question, const TreePair& trees) {
-  FloatPair floats{question.a.tree.floats(), question.b.tree.floats(), nullptr, nullptr,
-                   trees.shiftLower,         trees.shiftUpper};
-  if (question.plan.swept()) {
-    floats.beforeA = question.a.tree.floatsAtStart();
-    floats.beforeB = question.b.tree.floatsAtStart();
-  }
-  return floats;
-}
-
-}  // namespace
-
 std::size_t MeshWork::start(const FrameStart& frame) {
   m_byBruteForce = frame.engine == Engine::BruteForce;
   if (m_byBruteForce) return 1;
   const KeptSource& kept = m_search.kept;
   if (kept.answers) return startKept(frame);
-  m_searchJobs = startTraversal(frame, true, BoxFrame::Body);
+  m_searchJobs = m_candidates.start(question(), frame, true, BoxFrame::Body);
   if (!kept.lists || !question().hasElements()) return m_searchJobs;
   return m_searchJobs + kept.lists->startGathering(question().a, question().b, kept.reach,
                                                    kept.detections, jobsFor(frame));
@@ -67,16 +36,12 @@ std::size_t MeshWork::jobsFor(const FrameStart& frame) {
 std::size_t MeshWork::startKept(const FrameStart& frame) {
   if (!question().hasElements()) return 0;
   KeptPairs& lists = *m_search.kept.lists;
-  const std::size_t jobs =
-      lists.start(question().a, question().b, m_search.kept.reach, jobsFor(frame));
-  m_thickness = question().meshes().maxFeatureDistance();
-  m_floats = lists.floats();
-  return jobs;
+  return lists.start(question().a, question().b, m_search.kept.reach, jobsFor(frame));
 }
 
 void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
   KeptPairs& lists = *m_search.kept.lists;
-  const MeshPair meshes = question().meshes(&m_floats);
+  const MeshPair meshes = question().meshes(&lists.floats());
   scratch.near.clear();
   lists.run(job, meshes, scratch, scratch.near);
   const MemoryScope memory(MemoryStage::NarrowPhase);
@@ -103,82 +68,6 @@ void MeshWork::runKept(std::size_t job, JobScratch& scratch) const {
               [&](const auto& part) { findContacts(meshes, part, scratch.contacts); });
 }
 
-std::size_t MeshWork::startCandidates(const FrameStart& frame) {
-  return startTraversal(frame, false, BoxFrame::World);
-}
-
-std::size_t MeshWork::startTraversal(const FrameStart& frame, bool adjacentPairs,
-                                     BoxFrame boxFrame) {
-  const Question& asked = question();
-  GeometryOctree &ofA = asked.a.tree, &ofB = asked.b.tree;
-  if (!asked.hasElements()) return 0;
-  const Triangle* const unfolded = adjacentPairs && reportsOnlyTouching(asked)
-                                       ? ofA.findUnfoldedStars(asked.a.mesh, frame.threads)
-                                       : nullptr;
-  m_thickness =
-      asked.plan.method == Method::Intersection ? 0.0 : asked.meshes().maxFeatureDistance();
-  const auto treesIn = [&](BoxFrame in, double distance) {
-    if (in == BoxFrame::Body) distance += approachSlack(asked, m_thickness);
-    TreePair trees = treesOf(asked.a, asked.b, distance, asked.plan.swept(), in);
-    if (trees.self() && !adjacentPairs) trees.adjacency = ofA.ordered().data();
-    if (unfolded) trees.adjacency = unfolded;
-    return trees;
-  };
-  m_floats = floatsOf(asked, treesIn(BoxFrame::World, m_thickness));
-  // A search at the searchDistance is for boxes in the world.
-  const bool searches = adjacentPairs && asked.plan.searchDistance > 0.0,
-             inWorld = searches || !asked.a.isPlaced() || !asked.b.isPlaced();
-  const TreePair trees =
-      treesIn(inWorld ? BoxFrame::World : boxFrame,
-              searches ? std::max(m_thickness, asked.plan.searchDistance) : m_thickness);
-  return m_traversal.start(trees, ofA.octree().size() + ofB.octree().size(), frame);
-}
-
-/// Whether the boxes of the traversal may be larger than those of the pair's method.
-bool MeshWork::hasWiderBoxes() const {
-  return question().hasWiderBoxes() || question().plan.searchDistance > 0.0;
-}
-
-bool MeshWork::isFiltered() const {
-  return hasWiderBoxes() || question().anyDisabled() || m_traversal.trees().isMapped();
-}
-
-/// Keeps the candidates of a batch of the traversal.
-std::span<const ElementPair> MeshWork::candidatesAmong(std::span<const ElementPair> pairs,
-                                                       JobScratch& scratch) const {
-  if (!isFiltered()) {
-    scratch.nearby = true;
-    return pairs;
-  }
-  const PairPlan& plan = question().plan;
-  const bool searches = plan.searchDistance > 0.0;
-  Buffer<ElementPair>& kept = scratch.kept;
-  kept.assign(pairs.begin(), pairs.end());
-  // First, pairs whose boxes overlap at the thickness of the traversal. That of mapped trees finds
-  // other pairs as well. So does a search if other pairs of the geometries need boxes over the
-  // step.
-  if (m_traversal.trees().isMapped() || (searches && question().hasWiderBoxes()))
-    keepInWorld(searches ? std::max(plan.step.motionWithRounding, m_thickness) : m_thickness,
-                scratch);
-  scratch.nearby |= !kept.empty();
-  const MeshTopology &a = question().a.mesh.topology, &b = question().b.mesh.topology;
-  if (question().anyDisabled())
-    std::erase_if(kept,
-                  [&](const ElementPair& p) { return !a.isEnabled(p.a) || !b.isEnabled(p.b); });
-  // Then those whose boxes overlap at the pair's own thickness. The boxes are those of the pair's
-  // method: at the step's end, or over the whole step.
-  if (m_traversal.trees().isMapped()) {
-    if (plan.searchDistance > m_thickness) keepInWorld(m_thickness, scratch);
-  } else if (hasWiderBoxes()) {
-    keepOverlapping(a, b, m_floats, kept);
-  }
-  return kept;
-}
-
-void MeshWork::keepInWorld(double distance, JobScratch& scratch) const {
-  keepOverlapping(question().meshes(), question().plan.swept(), distance, scratch.kept);
-}
-
 bool MeshWork::repeats(const JobScratch& job) const {
   return job.intersectionsMissed && question().plan.runsIntersection;
 }
@@ -200,7 +89,8 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
     runKept(job, scratch);
   } else if (job >= m_searchJobs) {
     if (round == 0)
-      m_search.kept.lists->gather(job - m_searchJobs, question().meshes(&m_floats), scratch);
+      m_search.kept.lists->gather(job - m_searchJobs, question().meshes(&m_candidates.floats()),
+                                  scratch);
   } else if (round == 0) {
     forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
       forEachPart(pairs, [&](const auto& part) { detect(part, scratch); });
@@ -215,7 +105,8 @@ void MeshWork::run(int round, std::size_t job, JobScratch& scratch) const {
 }
 
 void MeshWork::detect(std::span<const ElementPair> pairs, JobScratch& scratch) const {
-  const MeshPair meshes = question().meshes(m_traversal.trees().isMapped() ? nullptr : &m_floats);
+  const MeshPair meshes =
+      question().meshes(m_candidates.isMapped() ? nullptr : &m_candidates.floats());
   {
     const MemoryScope memory(MemoryStage::NarrowPhase);
     const AddedTime time(scratch.narrowMilliseconds);

@@ -3,7 +3,7 @@
 #include "Search/JobScratch.h"
 #include "Search/PairResults.h"
 #include "Search/Question.h"
-#include "Search/TraversalJobs.h"
+#include "Search/TreeCandidates.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "Bodies/Body.h"
 #include "Bodies/OctreeFrame.h"
@@ -28,27 +28,20 @@ class MeshWork {
   void run(int round, std::size_t job, JobScratch&) const;
   void join(Jobs, const FrameJoin&) const;
 
-  /// The same as start(), for those who ask for candidates: element pairs whose boxes overlap in
+  /// In place of start(), for those who ask for candidates: element pairs whose boxes overlap in
   /// the world, of one mesh without those that share a vertex.
-  std::size_t startCandidates(const FrameStart&);
+  std::size_t startCandidates(const FrameStart& frame) {
+    return m_candidates.start(question(), frame, false, BoxFrame::World);
+  }
   /// Calls use(pairs) for each batch of a job's candidates.
   template <class Use>
   void forEachBatch(std::size_t job, JobScratch& scratch, Use&& use) const {
-    m_traversal.forEachBatch(job, scratch, [&](std::span<const ElementPair> pairs) {
-      const std::span<const ElementPair> candidates = candidatesAmong(pairs, scratch);
-      if (!candidates.empty()) use(candidates);
-    });
+    m_candidates.forEachBatch(question(), job, scratch, use);
   }
 
  private:
   const Question& question() const { return *m_search.question; }
   static std::size_t jobsFor(const FrameStart&);
-  std::size_t startTraversal(const FrameStart&, bool adjacentPairs, BoxFrame);
-  std::span<const ElementPair> candidatesAmong(std::span<const ElementPair> pairs,
-                                               JobScratch&) const;
-  bool hasWiderBoxes() const;
-  bool isFiltered() const;
-  void keepInWorld(double distance, JobScratch&) const;
   std::size_t startKept(const FrameStart&);
   void runKept(std::size_t job, JobScratch&) const;
   void runByBruteForce(JobScratch&) const;
@@ -61,9 +54,7 @@ class MeshWork {
 
   Search m_search;
   bool m_byBruteForce = false;
-  TraversalJobs m_traversal;
-  FloatPair m_floats{};
-  double m_thickness = 0;        ///< L: of the boxes that the pair's method compares
+  TreeCandidates m_candidates;
   std::size_t m_searchJobs = 0;  ///< further jobs make lists of KeptPairs
 };
 
