@@ -76,8 +76,8 @@ static double lagFor(const Geometry& geometry) {
   MotionRange all;
   for (const MotionRange& range : geometry.pieces.ranges()) all.add(range);
   const double speed = all.lower.cwiseAbs().cwiseMax(all.upper.cwiseAbs()).maxCoeff();
-  if (!(speed <= KeptPairs::kMostSpeed * geometry.shortEdge)) return 0.0;
-  return 0.5 * KeptPairs::reachFor(0.0, speed, geometry.shortEdge).lists;
+  if (!(speed <= KeptReach::kMostSpeed * geometry.shortEdge)) return 0.0;
+  return 0.5 * KeptReach::of(0.0, speed, geometry.shortEdge).lists;
 }
 
 GeometryId GeometryTable::nextId() const {

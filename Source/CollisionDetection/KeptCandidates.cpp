@@ -61,7 +61,7 @@ void KeptCandidates::plan(const PairRecord& record, const PairPlan& expected,
                           const Settings& settings) {
   constexpr double kSpeedDecay = 0.95;  // in each detection
   const double edge = edgeOf(record), motion = expected.motion;
-  const double most = KeptPairs::kMostSpeed * edge;
+  const double most = KeptReach::kMostSpeed * edge;
   m_recentSpeed = motion > most ? 0.0 : std::max(motion, kSpeedDecay * m_recentSpeed);
   m_pauseFrames = std::max(m_pauseFrames - 1, 0);
   const bool isSlow = settings.octree.keepsPairs && settings.engine == Engine::Octree &&
@@ -108,8 +108,8 @@ void KeptCandidates::reviewPlan(const PairRecord& record) {
 
 KeptSource KeptCandidates::source(const PairRecord& record) {
   if (!areInUse()) return {};
-  const KeptPairs::Reach reach = KeptPairs::reachFor(record.question->meshes().maxFeatureDistance(),
-                                                     m_recentSpeed, edgeOf(record));
+  const KeptReach reach =
+      KeptReach::of(record.question->meshes().maxFeatureDistance(), m_recentSpeed, edgeOf(record));
   return {&m_lists, m_answers, reach, detectionsToGather(reach.lists, m_recentSpeed)};
 }
 

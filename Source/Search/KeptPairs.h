@@ -1,7 +1,8 @@
 #pragma once
 
 #include "Search/JobScratch.h"
-#include "NarrowPhase/FeatureBounds.h"
+#include "Search/KeptDetection.h"
+#include "Search/OctreeParts.h"
 #include "NarrowPhase/FeaturePairs.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Bodies/Body.h"
@@ -39,19 +40,6 @@ namespace palpate {
 /// Docs/Algorithms/LooseOctree.md has the argument.
 class KeptPairs {
  public:
-  /// How far the lists and classes reach.
-  struct Reach {
-    double distance = 0;  ///< L: of features, and of boxes, that may be in contact
-    double lists = 0;     ///< L: the margin of the lists
-    double classes = 0;   ///< L: the same of the classes
-    double error = 0;     ///< L: rounding of boxes and distances; set by start()
-  };
-  /// The margins at which making lists, sorting and testing cost least together. distance: L.
-  /// speed: the relative motion in a step, L. edge: length of a short edge, L.
-  static Reach reachFor(double distance, double speed, double edge);
-  /// Above this share of an edge, the motion of a step makes keeping cost more than it saves.
-  static constexpr double kMostSpeed = 0.04;
-
   bool isActive() const { return m_isActive; }
   /// The lists are not kept up to date any more. Their memory is kept.
   void deactivate() { m_isActive = false; }
@@ -61,10 +49,10 @@ class KeptPairs {
 
   /// Begins a detection by lists alone, and activates them. Lists that are missing are made.
   /// Returns the number of jobs, at most `mostJobs`.
-  std::size_t start(const Body& a, const Body& b, const Reach&, std::size_t mostJobs);
+  std::size_t start(const Body& a, const Body& b, const KeptReach&, std::size_t mostJobs);
   /// The same along with a search, for gather(): lists are made in this detection so that none is
   /// missing after about `detections` like it, and few in the first one.
-  std::size_t startGathering(const Body& a, const Body& b, const Reach&, std::size_t detections,
+  std::size_t startGathering(const Body& a, const Body& b, const KeptReach&, std::size_t detections,
                              std::size_t mostJobs);
   /// Whether the parts are of the present octrees, or of those before the last cut.
   bool fits(const Body& a, const Body& b) const;
@@ -74,7 +62,7 @@ class KeptPairs {
   /// motion of `speed`, L. 0 before any list was made.
   double cost(double speed) const;
   /// The boxes of the elements now, with the distance between them.
-  const FloatPair& floats() const { return m_floats; }
+  const FloatPair& floats() const { return m_detection.floats(); }
   /// Appends the element pairs of a job that may have features in contact to `near`.
   void run(std::size_t job, const MeshPair&, JobScratch&, Buffer<ElementPair>& near);
   /// After startGathering(): makes the lists of a job.
@@ -96,35 +84,15 @@ class KeptPairs {
   void releaseMemory() { *this = KeptPairs(); }
 
  private:
-  static constexpr int kClasses = 8;  ///< within Reach::classes
-  using PartPair = std::array<std::uint32_t, 2>;
-
-  struct Unit {
-    std::uint32_t partA = 0, partB = 0;
-    /// L: how far elements of both parts have moved, relative to each other, since the lists were
-    /// made, and since they were sorted.
-    double movedSinceLists = std::numeric_limits<double>::infinity(), movedSinceClasses = 0;
-    Reach atLists{}, atClasses{};
-    Buffer<ElementPair> boxes, near;
-    std::array<std::uint32_t, kClasses> ends{};  ///< of the classes in `near`; the rest is further
-    std::array<std::uint32_t, 2> last{};         ///< the highest ids in `boxes`
-    bool isMade = false, isSorted = false;       ///< false: in this detection
-    PartPair parts() const { return {partA, partB}; }
-    bool isListed() const { return movedSinceLists < std::numeric_limits<double>::infinity(); }
-    double weight() const { return static_cast<double>(boxes.size()) + 16.0; }
-    double weightOfClasses() const { return static_cast<double>(near.size()) + 4.0; }
-  };
+  using Unit = KeptUnit;
   /// Whose turn it is.
   struct Turn {
     double due = 0;        ///< weight of the units that are due
     std::size_t next = 0;  ///< the unit that is due next
   };
 
-  void startUnits(const Body& a, const Body& b, const Reach&);
+  void startUnits(const Body& a, const Body& b, const KeptReach&);
   void makeParts(const Body& a, const Body& b);
-  /// Ascending pairs of parts whose boxes are within `reached` now. cut: only those that a cut
-  /// changed, with all others.
-  CountedVector<PartPair> nearParts(const Body& a, const Body& b, double reached, bool cut) const;
   void makeUnits(const CountedVector<PartPair>&);
   void cutUnits(const Body& a, const Body& b);
   void chooseUnits();
@@ -133,43 +101,17 @@ class KeptPairs {
   template <class Weight>
   std::size_t divide(std::size_t mostJobs, Weight&&);
   void make(Unit&, const MeshPair&, JobScratch&);
-  void sort(Unit&, const MeshPair&, std::span<const ElementPair>, JobScratch&);
-  FloatMeshes floatMeshes(const MeshTopology& a, const MeshTopology& b) const;
-  std::span<const ElementPair> nearOf(const Unit&) const;
-  bool overlap(const Triangle& a, const Triangle& b) const;
-
-  /// The nodes of an octree that hold all of its elements, each once.
-  struct Parts {
-    CountedVector<OctreeNode> nodes;  ///< as NodePair has them
-    /// Part i has groups [groups[i], groups[i + 1]) of the octree.
-    CountedVector<std::uint32_t> groups;
-    IndexLists pieces;                  ///< of PieceMotion, for each node
-    CountedVector<MotionRange> moved;   ///< of each node, since the last detection
-    std::uint64_t layout = 0;           ///< Octree::layout() of the nodes
-    CountedVector<std::uint8_t> isCut;  ///< those that cut() changed
-    void make(const Body&);
-    bool areOf(const Body& body) const { return layout == body.tree.octree().layout(); }
-    /// Whether a cut made the present octree of the parts' one.
-    bool canCut(const Body&) const;
-    void cut(const Body&);
-    MotionRange addMotion(const PieceMotion&);
-  };
+  const OctreeParts& partsB() const { return m_detection.self() ? m_partsA : m_partsB; }
 
   bool m_isActive = false;
   CountedVector<Unit> m_units;        ///< ascending parts
   CountedVector<Unit> m_formerUnits;  ///< their buffers are used again
-  Parts m_partsA, m_partsB;           ///< of one mesh with itself, m_partsA only
+  OctreeParts m_partsA, m_partsB;     ///< of one mesh with itself, m_partsA only
   double m_reached = 0;  ///< L: further apart, less m_moved, are all pairs of parts without a unit
   double m_moved = 0;    ///< L: the relative motion of all since the units were made
   Turn m_lists, m_classes;
 
-  // Of the detection that runs:
-  Reach m_reach{};
-  double m_scale = 1;               ///< of the floats
-  std::array<float, 3> m_offset{};  ///< brings a's floats into the frame of b's
-  float m_floatError = 0;           ///< of the difference of two coordinates
-  TreePair m_trees{};
-  FloatPair m_floats{};
+  KeptDetection m_detection;   ///< the last one
   Buffer<std::size_t> m_jobs;  ///< job i has units [m_jobs[i], m_jobs[i + 1])
 };
 

@@ -87,7 +87,7 @@ struct Answer {
 struct KeptSource {
   KeptPairs* lists = nullptr;  ///< null: there are none
   bool answers = false;        ///< the lists have all candidates, and no octree is searched
-  KeptPairs::Reach reach{};
+  KeptReach reach{};
   std::size_t detections = 1;  ///< unless it answers: in how many the lists are made
 };
 
