@@ -2,6 +2,9 @@
 
 #include <palpate/Tracking.h>
 
+#include "Tracking/HookedEdges.h"
+#include "Tracking/PassedSide.h"
+#include "Tracking/SideCourses.h"
 #include "Contact/Contents.h"
 #include "NarrowPhase/NarrowPhase.h"
 #include "Core/Assert.h"
@@ -9,7 +12,6 @@
 #include "Core/MemoryBudget.h"
 
 #include <array>
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -25,14 +27,7 @@ namespace palpate {
 class SideMemory : public CountedObject {
  public:
   using Contents = CollisionData::Contents;
-  /// A passage from which the features have not returned, with the features between which they are
-  /// now.
-  struct Side {
-    Crossing passage;
-    Triangle corners;  ///< of the triangle
-  };
-
-  struct VertexSide;
+  using Side = PassedSide;
 
   /// If a step has begun since, the sides at the end of the last one become those at its start.
   void startStep(std::uint64_t step) noexcept;
@@ -47,7 +42,7 @@ class SideMemory : public CountedObject {
   void follow(const MeshPair&, std::span<const Crossing> passages);
   /// Gives the pairs that had passed when the step began their contacts. Call after follow().
   void apply(const MeshPair&, Contents&) const;
-  bool changesContacts() const { return !m_courses.empty(); }  ///< apply()
+  bool changesContacts() const { return !m_courses.all().empty(); }  ///< apply()
   /// What follow() found holds for the step.
   void commit() noexcept { m_end.swap(m_next); }
   /// Instead of follow(): no side is left at the step's end.
@@ -78,62 +73,17 @@ class SideMemory : public CountedObject {
     bool isWhole;          ///< all vertices of the part had passed
     Eigen::Vector3d back;  ///< along the normals of the triangles through which they passed
   };
-  /// A remembered side within the step, and the features along which it slides.
-  struct Course {
-    Side side;    ///< at the step's end
-    double time;  ///< of the passage; 0: the step began so
-    bool hasPassed;
-    std::size_t first, count;  ///< of m_visited
-    std::uint32_t next;        ///< in the list of its features
-  };
-
-  /// An edge that may be hooked. kind: of its mesh's vertices.
-  struct HookSearch {
-    ContactKind kind;
-    Segment edge;
-    std::uint32_t course;  ///< near which it is searched
-    auto operator<=>(const HookSearch&) const = default;
-  };
-  /// A triangle that an edge pierces.
-  struct Pierced {
-    double place;  ///< on the edge, in [0, 1]
-    std::uint32_t triangle;
-    int side;  ///< of the edge's second end
-    auto operator<=>(const Pierced&) const = default;
-  };
-
-  std::size_t listOf(const Crossing&) const;
-  template <class F>
-  bool anyCourse(const Crossing& features, F&&) const;
-  const Side* sideOf(ContactKind, std::uint32_t vertex) const;
   PartSide sideOf(const MeshPair&, ContactKind, const Part&) const;
   void turnPassed(const MeshPair&, Contents&) const;
-  bool contains(const MeshPair&, const Course&, const Side&, bool* isSame = nullptr) const;
-  bool hasPassedEnd(const Crossing&) const;
-  void add(const MeshPair&, const Side&, double time);
-  void take(const MeshPair&, const Crossing&);
-  bool isOfPassedBody(const MeshPair&, const Course&) const;
-  void searchHooked(const MeshPair&, std::uint32_t course);
-  void addHooked(const MeshPair&, const HookSearch&);
-  void addHooked(const MeshPair&, const VertexSide&, const Segment& edge, const Pierced&,
-                 double direction);
 
   static constexpr std::uint64_t kNoStep = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t m_step = kNoStep, m_version = 0;
   Buffer<Side> m_start, m_end;
   // Of follow():
   Buffer<Side> m_next;
-  Buffer<Side> m_here;       ///< those of m_start that last, at the step's start
-  Buffer<Course> m_courses;  ///< first those of m_here
-  Buffer<Side> m_visited;
-  Buffer<std::uint32_t> m_heads;  ///< of lists of m_courses: by the vertex, the last one of edges
+  SideCourses m_courses;
+  HookedEdges m_hooked;
   Buffer<std::uint32_t> m_order;
-  Buffer<std::uint32_t> m_region;    ///< triangles near an edge
-  Buffer<std::uint32_t> m_searched;  ///< per triangle: the last search that came to it
-  std::uint32_t m_search = 0;
-  Buffer<HookSearch> m_searches;
-  Buffer<Pierced> m_pierced;
-  ContactKind m_ofSecond = ContactKind::TriangleVertex;  ///< of the second mesh's vertices
 };
 
 }  // namespace palpate
