@@ -317,11 +317,12 @@ void OctreeBasedCD::Implementation::followSides() {
     SidesMemory& memory = record->memory.sides;
     const PairMoment moment = record->momentIn(geometries.stepNumber());
     memory.startStep(moment);
-    if (!memory.sides || record->isCurrent()) continue;
+    if (!memory.sides) continue;
     if (!SidesMemory::isWanted(moment)) {
       memory.commit(moment);
       continue;
     }
+    if (record->isCurrent()) continue;
     if (count == unfollowed.size()) unfollowed.push_back(std::make_unique<SeparateSearch>());
     SeparateSearch& own = *unfollowed[count++];
     own.set(*record, passagesOf(record->pair.settings), false);

@@ -25,7 +25,7 @@ namespace palpate {
 struct PairState {
   BodyState a, b;
   Revision settings;        ///< with the predicate
-  std::uint64_t sides = 0;  ///< SideMemory::version()
+  std::uint64_t sides = 0;  ///< SideMemory::version(); 0 without PairSettings::rememberSides
   friend bool operator==(const PairState&, const PairState&) = default;
 };
 
@@ -53,7 +53,8 @@ struct PairRecord : CountedObject {
   PairMemory memory;
 
   PairState state() const {
-    return {a->body.state(), b->body.state(), settingsRevision, memory.sides.version()};
+    return {a->body.state(), b->body.state(), settingsRevision,
+            pair.settings.rememberSides ? memory.sides.version() : 0};
   }
   bool isCurrent() const { return last.version.isCurrent(state()); }  ///< the last answer
   bool collides() const { return a->meets(*b); }

@@ -579,6 +579,22 @@ TEST_F(OnePoint, ADetectionWithoutTheSettingOrThePairEndsNothingWithinItsStep) {
   EXPECT_EQ(remembered(), 0u);
 }
 
+TEST_F(OnePoint, AnAnswerWithoutTheSettingLasts) {
+  pass();
+  m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+  stepTo({0.43, 0.47, -0.1});
+  for (int step = 0; step < 3; ++step) {
+    EXPECT_TRUE(m_collisions.detectCollision(std::chrono::microseconds(0))) << "step " << step;
+    EXPECT_EQ(data().validity().reason, MethodReason::Requested);
+    m_collisions.advance();
+    m_collisions.setPairSettings(m_tip, m_sheet, remembering(0.02));
+    EXPECT_EQ(remembered(), 0u);
+    m_collisions.setPairSettings(m_tip, m_sheet, {.method = Method::Continuous});
+    m_collisions.detectCollision();
+    m_collisions.advance();
+  }
+}
+
 TEST_F(OnePoint, MemoryLastsThroughATopologyThatKeepsTheVertices) {
   pass();
   std::vector<Triangle> turned(mesh.triangles.rbegin(), mesh.triangles.rend());
