@@ -56,13 +56,15 @@ double displacementLimitOf(const PairSettings& settings, const GeometryInStep& a
                                              : settings.thickness;
 }
 
-/// Whether no two enabled triangles share a vertex, and some would if equal positions were joined.
+/// Whether no two enabled triangles share a vertex, and some would if positions that were equal
+/// when the topology was set were joined. Those that move to the same place later are not one
+/// vertex.
 bool isUnwelded(const TriangleMesh& mesh) {
   const MeshTopology& topology = mesh.topology;
   if (!topology.hasFaces()) return false;
   for (std::uint32_t v = 0; v < topology.vertexCount; ++v)
     if (topology.vertexTriangles[v].size() > 1) return false;
-  const Welded welded = weld(mesh.now.all(), topology.elements);
+  const Welded welded = weld(mesh.rest, topology.elements);
   std::vector<std::uint32_t> holders(welded.positions.size(), kNoElement);
   for (std::uint32_t t = 0; t < welded.triangles.size(); ++t) {
     if (!topology.isEnabled(t)) continue;

@@ -51,7 +51,8 @@ struct Validity {
   bool startedApart = false;
   /// The opposite of `trusted`. By Intersection it is false, although no side is certified.
   bool sideMayBeWrong = true;
-  /// A mesh with itself has equal positions, but its triangles share no vertex: not trusted.
+  /// A mesh with itself had equal positions when its topology was set, but its triangles share no
+  /// vertex: not trusted.
   bool unwelded = false;
 
   /// The main method, to which the laws refer. Auto: Proximity and Continuous, by feature.

@@ -225,6 +225,25 @@ TEST(Validity, OfAnUnweldedMeshWithItselfIsNotTrusted) {
   EXPECT_TRUE(detection.collisionData(apart, apart).validity().trusted);
 }
 
+/// Vertices that meet or part later do not count, whether the mesh was detected before or not.
+TEST(Validity, AMeshIsUnweldedByItsPositionsAtRest) {
+  const std::vector<Eigen::Vector3d> apart{{0, 0, 0}, {1, 0, 0}, {0, 1, 0},
+                                           {2, 0, 0}, {3, 1, 0}, {2, 1, 0}},
+      joined{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  const std::vector<Triangle> triangles{{0, 1, 2}, {3, 4, 5}};
+  for (const bool isJoinedAtRest : {false, true})
+    for (const bool wasDetected : {false, true}) {
+      OctreeBasedCD detection;
+      const GeometryId mesh = detection.addTriangleMesh(isJoinedAtRest ? joined : apart, triangles);
+      detection.addCollisionPair(mesh, mesh, {.method = Method::Proximity, .thickness = 0.01});
+      if (wasDetected) detection.detectCollision();
+      detection.setPositions(mesh, isJoinedAtRest ? apart : joined);
+      detection.detectCollision();
+      EXPECT_EQ(detection.collisionData(mesh, mesh).validity().unwelded, isJoinedAtRest)
+          << (wasDetected ? "detected before" : "not detected before");
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Validity, ValidityOfMethod,
     ::testing::Values(MethodCase{"Intersection", {Method::Intersection}},
