@@ -578,7 +578,7 @@ void Lockstep::restore() {
         Positions now = own.now;
         for (Vector3d& p : now) p = p * 1.25;
         m.object.setPositions(id, now);
-        if (m_trouble() % 4 == 0 && own.elements() > 0)
+        if (m_trouble() % 4 == 0 && !own.ids().empty())
           m.object.setDisabledElements(id, Ids{own.ids().front()});
         if (m_trouble() % 4 == 0 && own.isMesh() && own.tetrahedra.empty() && !own.ids().empty())
           m.object.replaceTriangles(id, Ids{own.ids().front()}, {}, {});
