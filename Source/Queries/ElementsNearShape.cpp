@@ -38,8 +38,9 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
   const bool wholeStep = &before != &now;
   const OctreeFrame frame(geometry);
   const Vector3d& origin = frame.origin();
-  const double error = kShapeBoundError * (before.magnitude() + now.magnitude() + maxDistance +
-                                           2.0 * origin.cwiseAbs().maxCoeff());
+  const double error =
+      2.0 * kShapeBoundError *
+      (before.magnitude() + now.magnitude() + maxDistance + 2.0 * origin.cwiseAbs().maxCoeff());
   Eigen::AlignedBox3d swept;
   for (const Shape* shape : {&before, &now})
     for (const Vector3d& corner : shape->corners()) swept.extend(corner - origin);
@@ -49,8 +50,13 @@ void findElementsNear(const Body& geometry, const Shape& before, const Shape& no
   findBoxes(geometry, frame, wholeStep, out, [&](const Eigen::AlignedBox3d& box) {
     if (wholeStep && now.isPlane())
       return step.mayComeNear({box.min() + origin, box.max() + origin}, maxDistance);
+    if (wholeStep) {
+      // What ShapeStep::firstTimeWithin() allows features of this size, and the roundings here.
+      const Vector3d margin = Vector3d::Constant(
+          4.0 * kShapeBoundError * box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff());
+      return swept.intersects({box.min() - margin, box.max() + margin});
+    }
     if (!now.isPlane() && !swept.intersects(box)) return false;  // costs less than a distance
-    if (wholeStep) return true;
     const Vector3d centre = box.center() + origin;
     const PointShapeDistance at = now.signedDistance(centre);
     const double size = centre.cwiseAbs().maxCoeff() + box.sizes().sum();

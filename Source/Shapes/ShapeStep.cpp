@@ -242,8 +242,11 @@ bool ShapeStep::mayComeNear(const Eigen::AlignedBox3d& box, double distance) con
   double extent = 0;
   for (const Vector3d& normal : n)
     extent = std::max(extent, 0.5 * normal.cwiseAbs().dot(box.sizes()));
-  const double error = kShapeBoundError * (m_before.magnitude() + m_now.magnitude() +
-                                           largest(box.min()) + largest(box.max()) + distance);
+  // What firstTimeWithin() allows a point that has the largest coordinates at both ends, and the
+  // roundings here.
+  const double size = m_before.magnitude() + m_now.magnitude() +
+                      2.0 * std::max(largest(box.min()), largest(box.max())) + distance;
+  const double error = 2.0 * kShapeBoundError * size;
   return !areBeyond(heightsOf(n, start, end), distance + extent + error, m_before.isTwoSided());
 }
 

@@ -419,5 +419,37 @@ TEST(ShapeSteps, HalfTurnsHaveNoFalseNegatives) {
   EXPECT_NEAR(only(particle({0, 0.75, 0}, {0, 0.25, 0}), can, 0).timeOfImpact, 0.5, 1e-6);
 }
 
+/// Features touch within roundings of their size. Boxes of elements allow as much.
+TEST(ShapeSteps, OctreesFindWhatTouchesWithinRoundings) {
+  const std::array<AnalyticalGeometry, 5> shapes{
+      Plane{.twoSided = true}, Plane{}, Box{{0, 0, -1}, {1, 1, 1}},
+      Cylinder{{0, 0, -2}, {0, 0, 0}, 1},
+      ConvexHull{Positions{{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}, {0, 0, -1}}}};
+  std::size_t touching = 0, apart = 0;
+  for (const AnalyticalGeometry& shape : shapes)
+    for (const double way : {0.0, 100.0})
+      for (int i = 1; i < 64; ++i) {
+        const double gap = std::ldexp(way > 0 ? 0.5 * way * i : 1.0 * i, -48);
+        const Positions now{{1, 0, gap}, {0, 0, gap}, {0, 1, gap}};
+        Positions before = now;
+        for (Vector3d& p : before) p[0] += way;
+        const auto contactsBy = [&](Engine engine) {
+          OctreeBasedCD detection(settingsOf(engine));
+          const GeometryId mesh = detection.addTriangleMesh(now, std::vector<Triangle>{{0, 1, 2}}),
+                           tool = detection.addAnalyticalGeometry(shape);
+          detection.addCollisionPair(mesh, tool,
+                                     {.method = Method::Continuous, .contacts = Contacts::All});
+          detection.setPositions(mesh, before, now);
+          detection.detectCollision();
+          return detection.collisionData(mesh, tool).shape().size();
+        };
+        const std::size_t truth = contactsBy(Engine::BruteForce);
+        EXPECT_EQ(contactsBy(Engine::Octree), truth) << "gap " << gap << ", way " << way;
+        ++(truth > 0 ? touching : apart);
+      }
+  EXPECT_GT(touching, 20u);
+  EXPECT_GT(apart, 20u);
+}
+
 }  // namespace
 }  // namespace palpate::testing
