@@ -15,7 +15,7 @@ namespace palpate {
 /// changes nothing, rounding included.
 inline bool excludesDirection(const TriangleMesh& mesh, const Segment& feature,
                               const Eigen::Vector3d& direction, double time) {
-  const auto& [p, q] = std::minmax(feature[0], feature[1]);
+  const std::uint32_t p = std::min(feature[0], feature[1]), q = std::max(feature[0], feature[1]);
   const MeshTopology& topology = mesh.topology;
   const auto at = [&](std::uint32_t v) -> Eigen::Vector3d {
     return (1.0 - time) * mesh.before[v] + time * mesh.now[v];
