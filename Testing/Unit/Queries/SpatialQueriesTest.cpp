@@ -305,10 +305,12 @@ TEST(QueryErrors, Shapes) {
               {InvalidTransform, "rotation", ball, {2 * unit, zero}},
               {InvalidTransform, "rotation", ball, {-unit, zero}},
               {InvalidTransform, "translation", ball, {unit, {0, 0, kInfinity}}}};
-  for (const auto& [code, words, shape, pose] : rows) {
-    const std::string all = "the query's shape: " + words;
-    expectRefused(code, all, [&] { queries.overlapping(scene.ball, shape, pose, elements); });
-    expectRefused(code, all, [&] { queries.contacts(scene.ball, shape, pose, 0.1, contacts); });
+  for (const auto& row : rows) {
+    const std::string all = "the query's shape: " + row.words;
+    expectRefused(row.code, all,
+                  [&] { queries.overlapping(scene.ball, row.shape, row.pose, elements); });
+    expectRefused(row.code, all,
+                  [&] { queries.contacts(scene.ball, row.shape, row.pose, 0.1, contacts); });
   }
   for (const double thickness : {-1.0, kNan, kInfinity})
     expectRefused(InvalidSettings, "thickness is",
