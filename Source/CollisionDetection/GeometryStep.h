@@ -72,9 +72,8 @@ class GeometryStep {
   /// Puts the end `now` back to what it was in this step, with its revisions.
   void restoreNow(TriangleMesh&, PlacedShape*, const Positions& now) noexcept;
 
-  void releaseMemory() {
-    m_bodies.releaseMemory();
-  }  ///< frees arrays that only the next calls need
+  /// Frees arrays that only the next calls need.
+  void releaseMemory() { m_bodies.releaseMemory(); }
 
   /// A detection has used the end `now`.
   void recordDetection(const TriangleMesh& mesh) noexcept {
