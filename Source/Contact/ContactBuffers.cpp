@@ -61,6 +61,7 @@ void ContactBuffers::clear() {
   crossings.clear();
   crossingsAtStart.clear();
   pierced.clear();
+  beyondBorder.clear();
   shapes.clear();
   featurePairs = exactDecisions = validityPairs = 0;
   facts.clear();

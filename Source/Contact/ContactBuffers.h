@@ -80,6 +80,13 @@ struct PiercedPair {
   std::uint8_t edgesOfA, edgesOfB;
 };
 
+/// A vertex behind a surface, and the direction in which it leaves it.
+struct LeavingVertex {
+  bool ofB;  ///< the vertex is of MeshPair::b
+  std::uint32_t vertex, triangle;
+  Eigen::Vector3d outward;
+};
+
 /// What one worker found. Unsorted; cleared and filled again each frame.
 struct ContactBuffers {
   ShapeContactBuffers shapes;  ///< of pairs with shapes, fields and proxies
@@ -90,6 +97,7 @@ struct ContactBuffers {
   Buffer<EdgeCrossing> crossings;         ///< Intersection: of all batches
   Buffer<EdgeCrossing> crossingsAtStart;  ///< Auto, where the step begins in intersection
   Buffer<PiercedPair> pierced;            ///< Intersection: triangles that pierce each other
+  Buffer<LeavingVertex> beyondBorder;     ///< Intersection: instead of contacts of the vertices
   FeaturePairs features;                  ///< scratch: of the present batch
   Buffer<ElementPair> part, calm, fast;   ///< scratch: some pairs of the present batch
   Buffer<PossibleIntersection> possible;  ///< scratch: of the present batch

@@ -1,6 +1,7 @@
 #include "Contact/Filters.h"
 
 #include "Math/ClosestPoint.h"
+#include "Math/Tolerances.h"
 #include "Core/Assert.h"
 #include "Core/Stopping.h"
 
@@ -54,6 +55,15 @@ class Surface {
         return direction.dot(normalOf(feature.id)) < 0.0;
     }
     return false;
+  }
+  bool isBeyondBorder(std::uint32_t triangle, const MeshFeature& closest,
+                      const Vector3d& way) const {
+    const MeshTopology& topology = m_mesh.topology;
+    const bool isOnBorder =
+        closest.kind == MeshFeature::Kind::Edge
+            ? topology.edgeTriangles[closest.id].size() == 1
+            : closest.kind == MeshFeature::Kind::Vertex && topology.hasClosedStar[closest.id] == 0;
+    return isOnBorder && way.cross(normalOf(triangle)).norm() > kTouchAngle;
   }
 
  private:
@@ -134,6 +144,11 @@ bool rejectsEdges(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
 bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vector3d& direction,
                double time) {
   return Surface(mesh, time).isBelow(feature, direction);
+}
+
+bool isBeyondBorder(const TriangleMesh& mesh, std::uint32_t triangle, const MeshFeature& closest,
+                    const Vector3d& way, double time) {
+  return Surface(mesh, time).isBeyondBorder(triangle, closest, way);
 }
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,

@@ -65,6 +65,12 @@ class ContactsOfTriangles {
     return true;
   }
 
+  void addCrossed(std::uint32_t edgeA, std::uint32_t edgeB) {
+    sort(edgeA, edgeB);
+    const EdgeEdgeDistance at = distanceOf(edgeA, edgeB);
+    addEdges(edgeA, edgeB, at, at.distance > 0.0);
+  }
+
   void addTouching(const TriangleIntersection& intersection) {
     const MeshTopology &topologyA = m_a.mesh.topology, &topologyB = m_b.mesh.topology;
     for (int i = 0; i < 3; ++i) {
@@ -166,6 +172,13 @@ bool addIfCrossed(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB
   const MeshTriangle a(pair.a, pair.a.topology.edgeTriangles[edgeA][0], pair.a.now),
       b(pair.b, pair.b.topology.edgeTriangles[edgeB][0], pair.b.now);
   return ContactsOfTriangles(pair, a, b, out).addIfCrossed(edgeA, edgeB);
+}
+
+void addCrossed(const MeshPair& pair, std::uint32_t edgeA, std::uint32_t edgeB,
+                ContactBuffers& out) {
+  const MeshTriangle a(pair.a, pair.a.topology.edgeTriangles[edgeA][0], pair.a.now),
+      b(pair.b, pair.b.topology.edgeTriangles[edgeB][0], pair.b.now);
+  ContactsOfTriangles(pair, a, b, out).addCrossed(edgeA, edgeB);
 }
 
 }  // namespace palpate

@@ -60,6 +60,9 @@ void addTouching(const MeshPair&, const MeshTriangle& a, const MeshTriangle& b,
 /// have.
 bool addIfCrossed(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, ContactBuffers& out);
 
+/// Adds the contact of an edge of a and an edge of b that have crossed.
+void addCrossed(const MeshPair&, std::uint32_t edgeA, std::uint32_t edgeB, ContactBuffers& out);
+
 /// Adds the contact of two triangles by rule 4 or 5.
 void addPierced(const MeshPair&, const PiercedPair&, ContactBuffers& out);
 

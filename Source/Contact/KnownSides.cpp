@@ -18,14 +18,19 @@ bool isBehind(const Corners& triangle, const Eigen::Vector3d& position) {
   return orient3d(triangle[0], triangle[1], triangle[2], position, counts) < 0;
 }
 
+bool isBeyondBorder(const TriangleMesh& surface, const VertexTriangleContact& c) {
+  return isBeyondBorder(surface, c.triangle, featureOf(surface.topology, c.triangle, c.feature),
+                        c.normal, c.timeOfImpact);
+}
+
 }  // namespace
 
 void KnownSides::add(const ContactBuffers& found, Buffer<Side>& sides) {
   for (const auto* list : {&found.vertexTriangle, &found.triangleVertex})
     for (const VertexTriangleContact& c : *list)
       if (c.distance < 0.0)
-        sides.push_back(
-            {list == &found.triangleVertex, c.vertex, c.triangle, c.normal, false, false});
+        sides.push_back({{list == &found.triangleVertex, c.vertex, c.triangle, c.normal}});
+  for (const LeavingVertex& vertex : found.beyondBorder) sides.push_back({vertex});
 }
 
 void KnownSides::sort(Buffer<Side>& sides) {
@@ -62,13 +67,15 @@ void KnownSides::findBeside(const MeshPair& pair, bool atStart,
     for (const auto* list : {&found->vertexTriangle, &found->triangleVertex}) {
       const bool ofB = list == &found->triangleVertex;
       const TriangleMesh& surface = pair.meshOf(!ofB);
-      for (const VertexTriangleContact& c : *list)
+      for (const VertexTriangleContact& c : *list) {
         if ((c.timeOfImpact < 1.0) == atStart && sidesAt(known, ofB, c.vertex).empty() &&
             liesBelow(surface, featureOf(surface.topology, c.triangle, c.feature), c.normal,
                       c.timeOfImpact) &&
+            !isBeyondBorder(surface, c) &&
             (atStart ||
              isBehind(cornersOf(c.vertices, surface.now), pair.meshOf(ofB).now[c.vertex])))
-          beside.push_back({ofB, c.vertex, c.triangle, -c.normal, false, false});
+          beside.push_back({{ofB, c.vertex, c.triangle, -c.normal}});
+      }
     }
   if (beside.empty()) return;
   sort(beside);
@@ -121,7 +128,7 @@ bool KnownSides::represents(ContactKind kind, const VertexTriangleContact& c) {
 
 /// Turns a contact that is on the wrong side. Returns true if it is dropped instead.
 template <class Contact>
-bool KnownSides::settle(ContactKind kind, Contact& contact, bool drops) {
+bool KnownSides::settle(const MeshPair& pair, ContactKind kind, Contact& contact, bool drops) {
   const Stencil vertices = stencil(contact);
   Opinion opinion = ask(m_atEnd, kind, vertices, contact.normal);
   if (drops && opinion.isKnown) return true;
@@ -130,6 +137,8 @@ bool KnownSides::settle(ContactKind kind, Contact& contact, bool drops) {
     opinion = ask(m_atStart, kind, vertices, contact.normal);
     if (drops && opinion.isRepresented && !represents(kind, contact)) return true;
   }
+  if constexpr (requires { contact.vertex; })
+    if (isBeyondBorder(pair.meshOf(!isOfB(kind, 0)), contact)) return false;
   if (!opinion.isKnown) {
     Buffer<Side>& beside = isImpact ? m_besideAtStart : m_besideAtEnd;
     if constexpr (requires { contact.vertex; }) {
@@ -173,7 +182,7 @@ void KnownSides::apply(const MeshPair& pair, std::span<ContactBuffers* const> at
     forEachMeshList(*found, [&](ContactKind kind, auto& list) {
       std::erase_if(list, [&](auto& contact) {
         check();
-        return settle(kind, contact, drops);
+        return settle(pair, kind, contact, drops);
       });
     });
 }

@@ -18,8 +18,9 @@ namespace palpate {
 /// of other contacts.
 ///
 /// Sides    a vertex that is behind the other surface leaves it along the normal of its contact
-///          with a negative distance. A contact is on the wrong side if it moves the vertices of
-///          its closest points against that, by the weighted sum.
+///          with a negative distance, or, beyond a border, along the triangle's normal. A contact
+///          is on the wrong side if it moves the vertices of its closest points against that, by
+///          the weighted sum.
 /// Rule     (1) Of vertices that are behind at the step's end: Contacts::Distinct drops all other
 ///          contacts of these vertices, because Intersection's contact stands for them.
 ///          Contacts::All turns those that are on the wrong side: the normal is reversed and the
@@ -29,9 +30,9 @@ namespace palpate {
 ///          for which another one stands: one in which the vertex meets a triangle, and other
 ///          vertices that leave do not disagree.
 ///          (3) Of vertices whose edges cross nothing: each that is next to one of (1) or (2), or
-///          to another one of these, and whose own contact is below the surface, is behind as
-///          well. This contact, at the end or an impact, is turned, and those of its edges are
-///          that are on the wrong side.
+///          to another one of these, and whose own contact is below the surface and not beyond a
+///          border, is behind as well. This contact, at the end or an impact, is turned, and those
+///          of its edges are that are on the wrong side.
 class KnownSides {
  public:
   /// atEnd, atStart: Intersection's contacts.
@@ -39,12 +40,9 @@ class KnownSides {
              std::span<ContactBuffers* const> others);
 
  private:
-  struct Side {
-    bool ofB;
-    std::uint32_t vertex, triangle;
-    Eigen::Vector3d outward;
-    bool isRepresented;  ///< an impact stands for the vertex
-    bool isReached;      ///< by edges from a vertex behind
+  struct Side : LeavingVertex {
+    bool isRepresented = false;  ///< an impact stands for the vertex
+    bool isReached = false;      ///< by edges from a vertex behind
   };
   /// What the sides of a contact's vertices say about it.
   struct Opinion {
@@ -63,7 +61,7 @@ class KnownSides {
   bool represents(ContactKind, const VertexTriangleContact&);
   bool represents(ContactKind, const EdgeEdgeContact&) { return false; }
   template <class Contact>
-  bool settle(ContactKind, Contact&, bool drops);
+  bool settle(const MeshPair&, ContactKind, Contact&, bool drops);
 
   bool m_self = false;
   Buffer<Side> m_atEnd, m_atStart;

@@ -119,6 +119,10 @@ bool areParallel(const Corners& s, const Corners& t) {
          kTouchAngle;
 }
 
+bool isBorder(const MeshTopology& topology, std::uint32_t edge) {
+  return topology.edgeTriangles[edge].size() == 1;
+}
+
 /// Whether two triangles hold an edge, and each is behind the other by more than rounding.
 bool isConvex(const PlacedMesh& mesh, std::uint32_t edge) {
   const auto both = mesh.topology.edgeTriangles[edge];
@@ -228,8 +232,10 @@ class NearestInFront {
  public:
   NearestInFront(const MeshPair& pair, bool ofB, bool atStart, std::uint32_t vertex)
       : m_pair(pair),
+        m_surface(ofB ? pair.a : pair.b),
         m_own(ofB ? pair.b : pair.a, atStart),
-        m_mesh(ofB ? pair.a : pair.b, atStart),
+        m_mesh(m_surface, atStart),
+        m_atStart(atStart),
         m_vertex(vertex),
         m_position(m_own.at[vertex]) {}
 
@@ -294,6 +300,16 @@ class NearestInFront {
       m_contact = nearest;
   }
 
+  bool isBeyondBorder() const {
+    return palpate::isBeyondBorder(m_surface, m_triangle, feature(), contact().normal,
+                                   m_atStart ? 0.0 : 1.0);
+  }
+  /// Of the triangle.
+  Eigen::Vector3d normal() const {
+    const auto [a, b, c] = corners();
+    return windingNormal(a, b, c);
+  }
+
   std::uint32_t triangle() const { return m_triangle; }
   Corners corners() const { return m_mesh.corners(m_triangle); }
   bool exact() const { return m_nearest.exact; }
@@ -323,8 +339,9 @@ class NearestInFront {
       furthest = std::max(furthest, -at.normal.dot(crossing));
     return furthest - at.distance;
   }
-  /// Of the triangles that others, with boxes at most `distance` away, connect with one that the
-  /// edges cross, those that are nearer than `shortest` and behind which the vertex is.
+  /// Of the triangles that others, with boxes at most `distance` away, connect with the present one
+  /// or one that the edges cross, those that are nearer than `shortest` and behind which the vertex
+  /// is.
   void findNearer(double shortest, double distance,
                   std::span<const PiercingContacts::Behind> crossings,
                   PiercingContacts::Scratch& scratch) const {
@@ -359,6 +376,7 @@ class NearestInFront {
       const double found = measure(t).distance;
       if (found < shortest && isAllowed(t)) nearer.push_back({found, t});
     };
+    reach(m_triangle);
     for (const auto& crossing : crossings) reach(crossing.triangle);
     for (std::size_t i = 0; i < reached.size(); ++i)
       for (const std::uint32_t t : topology.vertexTriangles[reached[i]]) reach(t);
@@ -408,7 +426,9 @@ class NearestInFront {
   }
 
   const MeshPair& m_pair;
+  const TriangleMesh& m_surface;
   PlacedMesh m_own, m_mesh;
+  bool m_atStart;
   std::uint32_t m_vertex, m_triangle = 0;
   Eigen::Vector3d m_position;
   VertexTriangleDistance m_nearest{};
@@ -456,7 +476,7 @@ void PiercingContacts::find(const MeshPair& pair, std::span<ContactBuffers* cons
   for (const ContactBuffers* buffers : found)
     for (const PiercedPair& pierced : buffers->pierced) {
       check();
-      if (!hasEndBehind(pair, pierced) && !addBelow(pair, pierced, out))
+      if (!isRepresented(pair, pierced) && !addBelow(pair, pierced, out))
         addPierced(pair, pierced, out);
     }
 }
@@ -469,39 +489,76 @@ void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffer
 }
 
 template <class IsAllowed>
-bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t edge,
-                                std::initializer_list<std::uint32_t> triangles,
-                                const Eigen::Vector3d* wayOut, ContactBuffers& out,
-                                IsAllowed&& isAllowed) {
+std::span<const PiercingContacts::Near> PiercingContacts::findEdgesAbove(
+    const MeshPair& pair, bool ofB, std::uint32_t edge,
+    std::initializer_list<std::uint32_t> triangles, const Eigen::Vector3d* wayOut,
+    IsAllowed&& isAllowed) {
   const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
   const MeshTopology& topology = surface.topology;
   const Segment& ends = own.topology.edges[edge];
   const Eigen::Vector3d p = own.at[ends[0]], q = own.at[ends[1]], along = q - p;
-  Buffer<Near>& ridges = m_scratch.nearer;
-  ridges.clear();
+  Buffer<Near>& above = m_scratch.nearer;
+  above.clear();
   for (const std::uint32_t triangle : triangles)
     for (const std::uint32_t corner : topology.elements[triangle])
       for (const std::uint32_t around : topology.vertexTriangles[corner]) {
         const Triangle& corners = topology.elements[around];
-        const std::uint32_t ridge =
-            topology.triangleEdges[around][std::find(corners.begin(), corners.end(), corner) -
-                                           corners.begin()];
-        if (ridge == kNoEdge) continue;
-        const Segment& both = topology.edges[ridge];
-        if (pair.self() && (holds(ends, both[0]) || holds(ends, both[1]))) continue;
-        const Eigen::Vector3d r = surface.at[both[0]], s = surface.at[both[1]];
-        if (wayOut && leadElsewhere(along, s - r, *wayOut)) continue;
-        const auto up = betweenInteriors(p, q, r, s);
-        if (!up) continue;
-        const double length = stableLength(*up);
-        if (isAllowed(*up, length)) ridges.push_back({length, ridge});
+        const auto out = std::find(corners.begin(), corners.end(), corner) - corners.begin();
+        for (const auto side : {out, (out + 2) % 3}) {
+          const std::uint32_t other = topology.triangleEdges[around][side];
+          // Of an inner edge to the corner, the other triangle has it from the corner.
+          if (other == kNoEdge || (side != out && !isBorder(topology, other))) continue;
+          const Segment& both = topology.edges[other];
+          if (pair.self() && (holds(ends, both[0]) || holds(ends, both[1]))) continue;
+          const Eigen::Vector3d r = surface.at[both[0]], s = surface.at[both[1]];
+          if (wayOut && leadElsewhere(along, s - r, *wayOut)) continue;
+          const auto up = betweenInteriors(p, q, r, s);
+          if (!up) continue;
+          const double length = stableLength(*up);
+          if (isAllowed(other, *up, length)) above.push_back({length, other});
+        }
       }
-  std::sort(ridges.begin(), ridges.end());
-  return std::any_of(ridges.begin(), ridges.end(), [&](const Near& near) {
-    const std::uint32_t ridge = near.id;
-    return isConvex(surface, ridge) &&
-           addIfCrossed(pair, ofB ? ridge : edge, ofB ? edge : ridge, out);
+  std::sort(above.begin(), above.end());
+  return above;
+}
+
+template <class IsAllowed>
+bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t edge,
+                                std::initializer_list<std::uint32_t> triangles,
+                                const Eigen::Vector3d* wayOut, ContactBuffers& out,
+                                IsAllowed&& isAllowed) {
+  const PlacedMesh surface(ofB ? pair.a : pair.b, false);
+  const auto ridges = findEdgesAbove(pair, ofB, edge, triangles, wayOut,
+                                     [&](std::uint32_t, const Eigen::Vector3d& up, double length) {
+                                       return isAllowed(up, length);
+                                     });
+  return std::any_of(ridges.begin(), ridges.end(), [&](const Near& ridge) {
+    return isConvex(surface, ridge.id) &&
+           addIfCrossed(pair, ofB ? ridge.id : edge, ofB ? edge : ridge.id, out);
   });
+}
+
+bool PiercingContacts::addBorders(const MeshPair& pair, std::span<const Behind> crossings,
+                                  const VertexTriangleContact& nearest,
+                                  const Eigen::Vector3d& normal, ContactBuffers& out) {
+  const bool isOfB = crossings.front().ofB;
+  const MeshTopology& topology = (isOfB ? pair.a : pair.b).topology;
+  bool any = false;
+  for (int i = 0; i < 3; ++i)
+    any |=
+        nearest.weights[i] != 0.0 && !behindOf(!isOfB && !pair.self(), nearest.vertices[i]).empty();
+  for (const auto& [ofB, vertex, triangle, edge] : crossings) {
+    const auto borders = findEdgesAbove(
+        pair, ofB, edge, {triangle, nearest.triangle}, nullptr,
+        [&](std::uint32_t border, const Eigen::Vector3d& up, double length) {
+          return isBorder(topology, border) && length <= -nearest.distance && up.dot(normal) > 0.0;
+        });
+    if (borders.empty()) continue;
+    const std::uint32_t border = borders.front().id;
+    addCrossed(pair, ofB ? border : edge, ofB ? edge : border, out);
+    any = true;
+  }
+  return any;
 }
 
 void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuffers& out) {
@@ -517,6 +574,11 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
     nearest.walk();
     nearest.shorten({begin, first}, m_scratch);
     out.exactDecisions += nearest.exact();
+    if (nearest.isBeyondBorder() &&
+        (atStart || addBorders(pair, {begin, first}, nearest.contact(), nearest.normal(), out))) {
+      out.beyondBorder.push_back({ofB, vertex, nearest.triangle(), nearest.normal()});
+      continue;
+    }
     if (!atStart) {
       if (rejectsVertex(pair, vertex, nearest.triangle(), ofB)) continue;
       const auto [a, b, c] = nearest.corners();
@@ -561,22 +623,35 @@ void PiercingContacts::findBehind(const MeshPair& pair, bool atStart, ContactBuf
   m_behind.erase(std::unique(m_behind.begin(), m_behind.end()), m_behind.end());
 }
 
-bool PiercingContacts::isBehind(bool ofB, std::uint32_t vertex) const {
-  const auto place = std::lower_bound(m_behind.begin(), m_behind.end(), Behind{ofB, vertex, 0, 0});
-  return place != m_behind.end() && place->ofB == ofB && place->vertex == vertex;
+std::span<const PiercingContacts::Behind> PiercingContacts::behindOf(bool ofB,
+                                                                     std::uint32_t vertex) const {
+  const auto first = std::lower_bound(m_behind.begin(), m_behind.end(), Behind{ofB, vertex, 0, 0});
+  return {first, std::find_if(first, m_behind.end(), [&](const Behind& behind) {
+            return behind.ofB != ofB || behind.vertex != vertex;
+          })};
 }
 
-bool PiercingContacts::hasEndBehind(const MeshPair& pair, const PiercedPair& pierced) const {
-  const auto isEndBehind = [&](bool ofB, const TriangleMesh& mesh, std::uint32_t triangle,
-                               unsigned edges) {
-    const Triangle& corners = mesh.topology.elements[triangle];
-    for (int i = 0; i < 3; ++i)
-      if (edges >> i & 1 && (isBehind(ofB, corners[i]) || isBehind(ofB, corners[(i + 1) % 3])))
+bool PiercingContacts::isRepresented(const MeshPair& pair, const PiercedPair& pierced) const {
+  const auto isByCorner = [&](bool ofB, std::uint32_t triangle, unsigned edges,
+                              std::uint32_t pierces) {
+    const TriangleMesh &own = ofB ? pair.b : pair.a, &surface = ofB ? pair.a : pair.b;
+    const Triangle &corners = own.topology.elements[triangle],
+                   &other = surface.topology.elements[pierces];
+    for (int i = 0; i < 3; ++i) {
+      const std::span<const Behind> behind = behindOf(ofB && !pair.self(), corners[i]);
+      const bool isEnd = (edges >> i & 1) != 0 || (edges >> (i + 2) % 3 & 1) != 0;
+      if (!behind.empty() &&
+          (isEnd || std::any_of(behind.begin(), behind.end(), [&](const Behind& b) {
+             const Triangle& crossed = surface.topology.elements[b.triangle];
+             return std::any_of(crossed.begin(), crossed.end(),
+                                [&](std::uint32_t v) { return containsVertex(other, v); });
+           })))
         return true;
+    }
     return false;
   };
-  return isEndBehind(false, pair.a, pierced.triangles.a, pierced.edgesOfA) ||
-         isEndBehind(!pair.self(), pair.b, pierced.triangles.b, pierced.edgesOfB);
+  const auto& [a, b] = pierced.triangles;
+  return isByCorner(false, a, pierced.edgesOfA, b) || isByCorner(true, b, pierced.edgesOfB, a);
 }
 
 std::span<const EdgeCrossing> PiercingContacts::crossingsOf(bool ofB, std::uint32_t edge) const {
@@ -597,7 +672,8 @@ bool PiercingContacts::addBelow(const MeshPair& pair, const PiercedPair& pierced
     const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
     const auto& elements = surface.topology.elements;
     for (const std::uint32_t v : elements[here.triangle])
-      any |= containsVertex(elements[there.triangle], v) && isBehind(!ofB && !pair.self(), v);
+      any |=
+          containsVertex(elements[there.triangle], v) && !behindOf(!ofB && !pair.self(), v).empty();
     const std::uint32_t end = own.topology.edges[here.edge][0];
     const double apart = stableLength(crossingFrom(end, own, here.edge, surface, here.triangle) -
                                       crossingFrom(end, own, here.edge, surface, there.triangle));

@@ -45,11 +45,11 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          shorter exit distance. Of this feature and all others from which the search goes no
 ///          further, the one with the shortest exit distance has the contact; of those that differ
 ///          by rounding, the first one, and then the nearest. Triangles whose boxes are at most 1.5
-///          times the first exit distance from the vertex must connect the feature with one that
-///          such an edge crosses: the vertex does not leave through another sheet.
-/// Pairs    triangles that pierce each other have the contact of IntersectionContacts.h, unless an
-/// end of
-///          one of the crossing edges is behind: that end's contact then stands for the pair.
+///          times the first exit distance from the vertex must connect the feature with the first
+///          one, or one that such an edge crosses: the vertex does not leave through another sheet.
+/// Pairs    triangles that pierce each other have the contact of IntersectionContacts.h, unless one
+///          of a vertex behind stands for them. Such a vertex is an end of one of the crossing
+///          edges, or a corner of which an edge crosses the surface next to the other triangle.
 /// Ridges   the convex edges at the corners of a crossed triangle. An edge is below the nearest one
 ///          that it has crossed, if both closest points are between the ends.
 /// Below    an edge that enters the surface through one triangle and leaves it through another one
@@ -62,6 +62,12 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          point as the vertex, the edge has a contact with the ridge that it is below. The ridge
 ///          must be at most 1.5 times that depth away, and lead out within 45 degrees of the
 ///          vertex' normal.
+/// Border   a vertex behind an open surface may be beyond its border: this is nearest, and not
+///          along the triangle's normal. A box that hangs over the edge of a sheet has corners
+///          there, and the way to the border is as long as they hang over. If the vertex' edges
+///          that cross the surface pass below a border, no further away than the vertex, their
+///          contacts with it stand for that of the vertex. If the border's vertices are behind the
+///          other surface, theirs do.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
 ///          most 1.5 times its first exit distance from it. Scratch memory of 4 bytes for each
@@ -99,10 +105,23 @@ class PiercingContacts {
   void collect(std::span<ContactBuffers* const> found, Buffer<EdgeCrossing> ContactBuffers::*list);
   void findBehind(const MeshPair&, bool atStart, ContactBuffers& out);
   void addDepths(const MeshPair&, bool atStart, ContactBuffers& out);
-  bool isBehind(bool ofB, std::uint32_t vertex) const;
-  bool hasEndBehind(const MeshPair&, const PiercedPair&) const;
+  /// Of m_behind.
+  std::span<const Behind> behindOf(bool ofB, std::uint32_t vertex) const;
+  /// Whether contacts of vertices stand for a pair of triangles (Pairs).
+  bool isRepresented(const MeshPair&, const PiercedPair&) const;
   std::span<const EdgeCrossing> crossingsOf(bool ofB, std::uint32_t edge) const;
   bool addBelow(const MeshPair&, const PiercedPair&, ContactBuffers& out);
+  /// The contacts of a vertex' edges with a border that it is beyond. Returns whether there are
+  /// any.
+  bool addBorders(const MeshPair&, std::span<const Behind>, const VertexTriangleContact& nearest,
+                  const Eigen::Vector3d& normal, ContactBuffers& out);
+  /// Edges at corners of the triangles, the nearest first, whose closest points to the edge are
+  /// between the ends of both. isAllowed(other edge, from the edge to it, its length) chooses among
+  /// these. ofB, wayOut: see addRidge().
+  template <class IsAllowed>
+  std::span<const Near> findEdgesAbove(const MeshPair&, bool ofB, std::uint32_t edge,
+                                       std::initializer_list<std::uint32_t> triangles,
+                                       const Eigen::Vector3d* wayOut, IsAllowed&& isAllowed);
   /// Adds the contact of an edge and the nearest ridge that it is below, of the ridges at corners
   /// of the triangles. isAllowed(from the edge to the ridge, its length) chooses among these.
   /// Returns whether there is one. ofB: the edge is of MeshPair::b, and the ridge is not. wayOut:

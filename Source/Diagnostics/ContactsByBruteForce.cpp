@@ -380,6 +380,7 @@ void findIntersections(const MeshPair& pair, const FeatureLists& lists, ContactB
   append(pierced.vertexTriangle, out.vertexTriangle);
   append(pierced.triangleVertex, out.triangleVertex);
   append(pierced.edgeEdge, out.edgeEdge);
+  append(pierced.beyondBorder, out.beyondBorder);
   out.facts.add(pierced.facts);
   out.exactDecisions += pierced.exactDecisions;
 }

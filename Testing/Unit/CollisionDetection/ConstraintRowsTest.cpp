@@ -470,7 +470,7 @@ TEST(ConstraintRows, StepToAGapGivesThatSignedDistance) {
   }
   EXPECT_GT(compared, 1000u);
   EXPECT_GE(behind, 50u);
-  EXPECT_GE(outOfEdges, 20u);
+  EXPECT_GE(outOfEdges, 10u);
 }
 
 TEST(ConstraintRows, RowsOfImpactsHaveTheirGapWhereFeaturesTouch) {

@@ -2,6 +2,7 @@
 #include "NarrowPhase/NarrowPhase.h"
 
 #include "Common/DegenerateCases.h"
+#include "Common/RandomMeshes.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -75,17 +76,76 @@ TEST(Piercing, ATipBelowAnInteriorFeatureHasItsDepth) {
   }
 }
 
-/// The tip is beyond the border, and the sides of the pyramid pierce the plate.
-TEST(Piercing, ATipBelowAndBeyondTheBorderLeavesTowardsIt) {
-  const VertexTriangleContact edge = contactOfTip({2.3, -0.03, -0.04}, 2);
-  EXPECT_EQ(edge.feature, TriangleFeature::EdgeAB);
-  EXPECT_NEAR(edge.distance, -0.05, 1e-16);
-  EXPECT_TRUE(edge.normal.isApprox(Vector3d(0, 0.6, 0.8), 1e-14));
-  const VertexTriangleContact corner = contactOfTip({-0.02, -0.01, -0.02}, 2);
-  EXPECT_EQ(corner.feature, TriangleFeature::CornerA);
-  EXPECT_EQ(corner.vertices[0], 0u);
-  EXPECT_NEAR(corner.distance, -0.03, 1e-16);
-  EXPECT_TRUE(corner.normal.isApprox(Vector3d(2, 1, 2) / 3, 1e-14));
+/// The tip is beyond the border, and the edges at the tip that cross the plate pass below it.
+TEST(Piercing, OfATipBeyondTheBorderTheEdgesLeaveOverIt) {
+  const Mesh a = pyramid({2.3, -0.03, -0.04}, 1, 2), b = plate();
+  const ContactBuffers found = piercingContacts(a, b);
+  EXPECT_TRUE(found.vertexTriangle.empty());
+  EXPECT_EQ(found.edgeEdge.size(), 2u);
+  for (const EdgeEdgeContact& c : found.edgeEdge) {
+    EXPECT_EQ(c.edgeA[0], 0u);
+    EXPECT_EQ(c.edgeB, (Segment{2, 3}));
+    // The edge is along (+-2, 2, 1), the border along x.
+    EXPECT_TRUE(c.normal.isApprox(Vector3d(0, -1, 2).normalized(), 1e-12));
+    EXPECT_NEAR(c.distance, -0.05 / std::sqrt(5.0), 1e-12);
+  }
+}
+
+/// How far a body must be lifted to be above the part of z = 0 with x <= 0 and |y| <= 4: from the
+/// lowest place of its triangles above that.
+double liftOf(const Mesh& body) {
+  double lift = 0;
+  for (const auto& [i, j, k] : body.triangles) {
+    std::vector<Vector3d> corners{body.positions[i], body.positions[j], body.positions[k]};
+    for (const Eigen::Vector4d& side : {Eigen::Vector4d(1, 0, 0, 0), {0, 1, 0, 4}, {0, -1, 0, 4}}) {
+      std::vector<Vector3d> left;
+      for (std::size_t c = 0; c < corners.size(); ++c) {
+        const Vector3d &p = corners[c], &q = corners[(c + 1) % corners.size()];
+        const double above = side.head<3>().dot(p) - side[3],
+                     next = side.head<3>().dot(q) - side[3];
+        if (above <= 0) left.push_back(p);
+        if (above * next < 0) left.push_back(p + above / (above - next) * (q - p));
+      }
+      corners = left;
+    }
+    for (const Vector3d& p : corners) lift = std::max(lift, -p.z());
+  }
+  return lift;
+}
+
+/// Tilted boxes and prisms hang over the border of a sheet, and are a little deep in it: no contact
+/// asks for more than the lift, although they hang over by up to their whole width.
+TEST(Piercing, OfABodyOverABorderNothingIsDeeperThanTheLift) {
+  std::size_t tried = 0;
+  for (int seed = 0; seed < 400; ++seed) {
+    testing::Random random(seed);
+    const auto any = [&](double low, double high) { return testing::uniform(random, low, high); };
+    const int cells = 1 + seed % 7;
+    Mesh sheet = testing::flat(cells, 0);
+    for (Vector3d& p : sheet.positions) p = 8.0 * p - Vector3d(8, 4, 0);
+    Mesh body = seed % 2 == 0 ? testing::dividedBox({0, 0, 0}, {any(0.5, 3), any(0.5, 3), 1}, 2)
+                              : testing::insideOut(pyramid({0, 0, 0}, -1, any(0.5, 2)));
+    const Vector3d axis = Eigen::AngleAxisd(any(0, 6), Vector3d::UnitZ()) * Vector3d::UnitX();
+    body = turned(turned(body, any(0, 6), Vector3d::UnitZ()), std::pow(10, any(-9, -1)), axis);
+    Eigen::AlignedBox3d box;
+    for (const Vector3d& p : body.positions) box.extend(p);
+    const Vector3d to(-any(0.1, 0.9) * box.sizes().x(), any(-1, 4), -std::pow(10, any(-7, -2)));
+    for (Vector3d& p : body.positions)
+      p += to - Vector3d(box.min().x(), box.center().y(), box.min().z());
+    const double lift = liftOf(body);
+    const ContactBuffers found = piercingContacts(sheet, body);
+    if (found.intersectingTriangles.empty()) continue;
+    ++tried;
+    const auto expectShallow = [&](const auto& contacts) {
+      for (const auto& c : contacts) EXPECT_GE(c.distance, -1.01 * lift - 1e-12) << seed;
+    };
+    expectShallow(found.vertexTriangle);
+    expectShallow(found.triangleVertex);
+    expectShallow(found.edgeEdge);
+    EXPECT_FALSE(found.vertexTriangle.empty() && found.triangleVertex.empty() &&
+                 found.edgeEdge.empty());
+  }
+  EXPECT_GE(tried, 200u);
 }
 
 /// All four edges at the tip cross the plate in edges and vertices of it.
