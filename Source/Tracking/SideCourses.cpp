@@ -21,6 +21,12 @@ bool isNear(const Segment& edge, const Segment& other, bool& isTurned) {
   return false;
 }
 
+/// Whether both passages are of one vertex.
+bool isOfVertex(const Crossing& l, const Crossing& r) {
+  const bool ofB = r.kind == ContactKind::TriangleVertex;
+  return l.kind == r.kind && l.ids[ofB] == r.ids[ofB];
+}
+
 bool shareCorner(const Triangle& s, const Triangle& t) {
   return std::any_of(s.begin(), s.end(), [&](std::uint32_t v) { return containsVertex(t, v); });
 }
@@ -36,9 +42,20 @@ void SideCourses::clear() noexcept {
 void SideCourses::start(const MeshPair& pair, std::span<const PassedSide> sides,
                         std::size_t passages) {
   clear();
+  Buffer<Crossing> returned;
   for (PassedSide side : sides)
-    if (locate(pair, side)) m_here.push_back(side);
+    if (locate(pair, side))
+      m_here.push_back(side);
+    else if (!isEdges(side.passage) && isThere(pair, side))
+      returned.push_back(side.passage);
   sortUnique(m_here);
+  // A vertex that is in front of one wall of a body again has left the body by another one.
+  for (const Crossing& passage : returned) {
+    const auto other = std::find_if(m_here.begin(), m_here.end(), [&](const PassedSide& side) {
+      return isOfVertex(side.passage, passage) && side.passage.forward != passage.forward;
+    });
+    if (other != m_here.end()) m_here.erase(other);
+  }
   m_ofSecond = pair.self() ? ContactKind::VertexTriangle : ContactKind::TriangleVertex;
   m_heads.assign(std::bit_ceil(m_here.size() + passages + 1) + 1, kNoElement);
   for (const PassedSide& side : m_here) add(pair, side, 0.0);
@@ -97,6 +114,44 @@ void SideCourses::add(const MeshPair& pair, const PassedSide& side, double time)
   m_courses.push_back(course);
 }
 
+bool SideCourses::takeByEdges(const MeshPair& pair, const PassedSide& side) {
+  bool isKnown = false, isSame = false;
+  anyCourse(side.passage, [&](std::uint32_t i) {
+    if (contains(pair, m_courses[i], side, &isSame)) {
+      m_courses[i].hasPassed = isSame;
+      isKnown = true;
+    }
+    return false;
+  });
+  return isKnown;
+}
+
+/// Changes one course of the vertex: the one that it goes back here, or goes on again. A vertex
+/// that passes here in the direction in which it had passed has come back elsewhere.
+bool SideCourses::takeByVertex(const MeshPair& pair, const PassedSide& side) {
+  bool isKnown = false, isSame = false;
+  const auto isHere = [&](std::uint32_t i) {
+    return contains(pair, m_courses[i], side, &isSame) && (isKnown = true);
+  };
+  const auto isOpposite = [&](std::uint32_t i) {
+    return m_courses[i].side.passage.forward != side.passage.forward;
+  };
+  const auto takeFirst = [&](bool hasPassed, auto&& isTaken) {
+    return anyCourse(side.passage, [&](std::uint32_t i) {
+      if (m_courses[i].hasPassed == hasPassed || !isTaken(i)) return false;
+      m_courses[i].hasPassed = hasPassed;
+      return true;
+    });
+  };
+  if (takeFirst(false, [&](std::uint32_t i) { return isHere(i) && !isSame; }) ||
+      takeFirst(true, [&](std::uint32_t i) { return isHere(i) && isSame; }))
+    return true;
+  if (!isKnown) return false;
+  return takeFirst(false, isOpposite) || anyCourse(side.passage, [&](std::uint32_t i) {
+           return m_courses[i].hasPassed && isHere(i);
+         });
+}
+
 void SideCourses::take(const MeshPair& pair, const Crossing& passage) {
   PALPATE_ASSERT(passage.kind <= ContactKind::EdgeEdge);
   PassedSide side{passage, {}};
@@ -105,15 +160,8 @@ void SideCourses::take(const MeshPair& pair, const Crossing& passage) {
     const VertexSide of(pair, passage.kind);
     side.corners = of.triangles.topology.elements[of.triangleOf(passage)];
   }
-  bool isKnown = false, isSame = false;
-  anyCourse(passage, [&](std::uint32_t i) {
-    if (contains(pair, m_courses[i], side, &isSame)) {
-      m_courses[i].hasPassed = isSame;
-      isKnown = true;
-    }
-    return false;
-  });
-  if (isKnown || (isEdges(passage) && hasPassedEnd(passage))) return;
+  if (isEdges(passage) ? takeByEdges(pair, side) : takeByVertex(pair, side)) return;
+  if (isEdges(passage) && hasPassedEnd(passage)) return;
   add(pair, side, passage.time);
 }
 

@@ -68,6 +68,9 @@ class SideCourses {
   std::size_t listOf(const Crossing&) const;
   bool contains(const MeshPair&, const Course&, const PassedSide&, bool* isSame = nullptr) const;
   bool hasPassedEnd(const Crossing&) const;
+  /// Returns whether the passage is one of courses that are known.
+  bool takeByEdges(const MeshPair&, const PassedSide&);
+  bool takeByVertex(const MeshPair&, const PassedSide&);
   void add(const MeshPair&, const PassedSide&, double time);
 
   Buffer<PassedSide> m_here;  ///< those at the step's start that last

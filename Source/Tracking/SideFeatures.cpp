@@ -97,8 +97,7 @@ bool findTriangle(const MeshTopology& topology, const Triangle& corners, std::ui
 bool locateVertex(const MeshPair& pair, PassedSide& side) {
   const VertexSide of(pair, side.passage.kind);
   const std::uint32_t vertex = of.vertexOf(side.passage);
-  if (!findFeatures(pair, side) || !mayTouch(pair, of, vertex, of.triangleOf(side.passage)))
-    return false;
+  if (!isThere(pair, side)) return false;
   const VertexTriangleDistance measured = distanceOf(of, vertex, side.corners, false);
   const MeshFeature feature =
       featureOf(of.triangles.topology, of.triangleOf(side.passage), measured.feature);
@@ -236,12 +235,28 @@ bool findFeatures(const MeshPair& pair, PassedSide& side) {
          findTriangle(of.triangles.topology, side.corners, side.passage.ids[!of.swapped]);
 }
 
+bool isThere(const MeshPair& pair, PassedSide& side) {
+  const VertexSide of(pair, side.passage.kind);
+  return findFeatures(pair, side) &&
+         mayTouch(pair, of, of.vertexOf(side.passage), of.triangleOf(side.passage));
+}
+
 void sortUnique(Buffer<PassedSide>& sides) {
   std::sort(sides.begin(), sides.end(), comesBefore);
-  sides.erase(
-      std::unique(sides.begin(), sides.end(),
-                  [](const PassedSide& l, const PassedSide& r) { return !comesBefore(l, r); }),
-      sides.end());
+  auto last = sides.begin();
+  for (auto first = sides.begin(); first != sides.end();) {
+    const auto end = std::upper_bound(first, sides.end(), *first, comesBefore);
+    const auto forward =
+        std::count_if(first, end, [](const PassedSide& side) { return side.passage.forward; });
+    const auto most = 2 * forward - (end - first);
+    const auto kept =
+        isEdges(first->passage) ? first : std::find_if(first, end, [&](const PassedSide& side) {
+          return side.passage.forward ? most > 0 : most < 0;
+        });
+    if (kept != end) *last++ = *kept;
+    first = end;
+  }
+  sides.erase(last, sides.end());
 }
 
 bool locate(const MeshPair& pair, PassedSide& side) {

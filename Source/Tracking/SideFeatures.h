@@ -57,7 +57,10 @@ bool slideEdges(const MeshPair&, bool now, PassedSide&);
 
 /// Finds the features of a side. Returns whether both are there.
 bool findFeatures(const MeshPair&, PassedSide&);
-/// Sorts sides by their features, and keeps one of each features.
+/// Whether a vertex and its triangle, which it finds, are there and may touch.
+bool isThere(const MeshPair&, PassedSide&);
+/// Sorts sides by their features, and keeps one of each features: of a vertex and a triangle in the
+/// direction in which it passed more often, or none.
 void sortUnique(Buffer<PassedSide>&);
 /// Brings a side to the positions at the step's start. Returns whether it lasts.
 bool locate(const MeshPair&, PassedSide&);

@@ -451,6 +451,55 @@ TEST(SideMemory, InAClosedBodyLeadsBackTheWayThatAPointCame) {
     }
 }
 
+/// Points jump about boxes and plates: through both walls at once, in again through another wall,
+/// on a lattice and elsewhere. What they remember is whether they are in or out, as they were not
+/// at first; so nothing leads a point into a body in which it was not.
+TEST(SideMemory, OfABoxIsTheChangeOfInAndOut) {
+  std::size_t remembered = 0, outAgain = 0;
+  for (int walk = 0; walk < 60; ++walk) {
+    Random random(walk);
+    const bool onLattice = walk % 3 == 0;
+    const Mesh body = dividedBox({-3, -3, walk % 2 == 0 ? -4 : -0.5}, {3, 3, 0}, 1 + walk % 4);
+    const auto anywhere = [&] {
+      Vector3d p = randomPoint(random, -6, 6);
+      return onLattice ? Vector3d(p.array().round()) : p;
+    };
+    Positions points(6);
+    std::ranges::generate(points, anywhere);
+    OctreeBasedCD collisions;
+    const GeometryId set = collisions.addPointSet(points),
+                     box = collisions.addTriangleMesh(body.positions, body.triangles);
+    PairSettings settings = remembering(0.2);
+    settings.method = walk % 5 == 0 ? Method::Auto : Method::Continuous;
+    collisions.addCollisionPair(set, box, settings);
+    const auto areIn = [&] {
+      std::vector<int> in;
+      for (const Vector3d& p : points) in.push_back(collisions.queries().contains(box, p));
+      return in;
+    };
+    const std::vector<int> first = areIn();
+    for (int step = 0; step < 20; ++step) {
+      const std::vector<int> in = areIn();
+      collisions.advance();
+      for (Vector3d& p : points)
+        p = walk % 4 == 0 ? Vector3d(p + randomPoint(random, -2, 2)) : anywhere();
+      collisions.setPositions(set, points);
+      collisions.detectCollision();
+      std::vector<int> sum(points.size());
+      for (const Crossing& side : collisions.collisionData(set, box).rememberedSides()) {
+        sum[side.ids[0]] += side.forward ? 1 : -1;
+        ++remembered;
+      }
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        EXPECT_EQ(sum[i], first[i] - in[i]) << walk << ' ' << step << ' ' << i;
+        outAgain += step > 0 && first[i] + in[i] == 0;
+      }
+    }
+  }
+  EXPECT_GT(remembered, 1000u);
+  EXPECT_GT(outAgain, 1000u);
+}
+
 /// A needle in a plate that is as thin as the thickness: its far wall does not lead it out.
 TEST(SideMemory, InAPlateNoRowLeadsThroughTheFarWall) {
   const Mesh plate = dividedBox({-3, -3, -0.2}, {3, 3, 0}, 4);
