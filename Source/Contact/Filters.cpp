@@ -56,14 +56,14 @@ class Surface {
     }
     return false;
   }
-  bool isBeyondBorder(std::uint32_t triangle, const MeshFeature& closest,
-                      const Vector3d& way) const {
-    const MeshTopology& topology = m_mesh.topology;
-    const bool isOnBorder =
-        closest.kind == MeshFeature::Kind::Edge
-            ? topology.edgeTriangles[closest.id].size() == 1
-            : closest.kind == MeshFeature::Kind::Vertex && topology.hasClosedStar[closest.id] == 0;
-    return isOnBorder && way.cross(normalOf(triangle)).norm() > kTouchAngle;
+  bool isBeyondBorder(const MeshFeature& closest, const Vector3d& way) const {
+    const auto around = holdersOf(m_mesh.topology, closest);
+    const bool isOnBorder = closest.kind == MeshFeature::Kind::Vertex
+                                ? m_mesh.topology.hasClosedStar[closest.id] == 0
+                                : around.size() == 1;
+    return isOnBorder && std::none_of(around.begin(), around.end(), [&](std::uint32_t t) {
+             return way.cross(normalOf(t)).norm() <= kTouchAngle;
+           });
   }
 
  private:
@@ -146,9 +146,9 @@ bool liesBelow(const TriangleMesh& mesh, const MeshFeature& feature, const Vecto
   return Surface(mesh, time).isBelow(feature, direction);
 }
 
-bool isBeyondBorder(const TriangleMesh& mesh, std::uint32_t triangle, const MeshFeature& closest,
-                    const Vector3d& way, double time) {
-  return Surface(mesh, time).isBeyondBorder(triangle, closest, way);
+bool isBeyondBorder(const TriangleMesh& mesh, const MeshFeature& closest, const Vector3d& way,
+                    double time) {
+  return Surface(mesh, time).isBeyondBorder(closest, way);
 }
 
 bool pointsInward(const MeshPair& pair, const std::array<MeshFeature, 2>& features,

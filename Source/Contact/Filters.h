@@ -45,9 +45,9 @@ bool liesBelow(const TriangleMesh&, const MeshFeature&, const Eigen::Vector3d& d
                double time = 1.0);
 
 /// Whether a vertex is beyond the border of a surface: its closest point is on the border, and the
-/// way from there to the vertex is not along the triangle's normal, to either side.
-bool isBeyondBorder(const TriangleMesh&, std::uint32_t triangle, const MeshFeature& closest,
-                    const Eigen::Vector3d& way, double time = 1.0);
+/// way from there to the vertex is not along the normal of a triangle there, to either side.
+bool isBeyondBorder(const TriangleMesh&, const MeshFeature& closest, const Eigen::Vector3d& way,
+                    double time = 1.0);
 
 /// pointsInward() at the step's end, for features with a measured distance. Features at distance 0
 /// have no direction, and never point inward.

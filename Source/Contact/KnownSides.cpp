@@ -19,8 +19,8 @@ bool isBehind(const Corners& triangle, const Eigen::Vector3d& position) {
 }
 
 bool isBeyondBorder(const TriangleMesh& surface, const VertexTriangleContact& c) {
-  return isBeyondBorder(surface, c.triangle, featureOf(surface.topology, c.triangle, c.feature),
-                        c.normal, c.timeOfImpact);
+  return isBeyondBorder(surface, featureOf(surface.topology, c.triangle, c.feature), c.normal,
+                        c.timeOfImpact);
 }
 
 }  // namespace

@@ -104,9 +104,10 @@ std::optional<Eigen::Vector3d> betweenInteriors(const Eigen::Vector3d& p, const 
 bool leadElsewhere(const Eigen::Vector3d& u, const Eigen::Vector3d& v,
                    const Eigen::Vector3d& direction) {
   const Eigen::Vector3d normal = u.cross(v);
-  const double along = normal.dot(direction);
-  return along * along < (1.0 - 0x1p-10) * kSameWayOut * kSameWayOut * normal.squaredNorm() &&
-         normal.squaredNorm() > 0x1p-30 * u.squaredNorm() * v.squaredNorm();
+  const double along = normal.dot(direction), most = u.squaredNorm() * v.squaredNorm();
+  return most > kSmallestSquare && most < kLargestSquare &&
+         along * along < (1.0 - 0x1p-10) * kSameWayOut * kSameWayOut * normal.squaredNorm() &&
+         normal.squaredNorm() > 0x1p-30 * most;
 }
 
 /// Whether the normals of two triangles are the same or opposite ones, up to kTouchAngle.
@@ -301,14 +302,18 @@ class NearestInFront {
   }
 
   bool isBeyondBorder() const {
-    return palpate::isBeyondBorder(m_surface, m_triangle, feature(), contact().normal,
-                                   m_atStart ? 0.0 : 1.0);
+    return palpate::isBeyondBorder(m_surface, feature(), contact().normal, m_atStart ? 0.0 : 1.0);
   }
-  /// Of the triangle.
-  Eigen::Vector3d normal() const {
-    const auto [a, b, c] = corners();
-    return windingNormal(a, b, c);
+  /// The mean normal of the triangles at the feature, an edge or a vertex.
+  Eigen::Vector3d outward() const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const std::uint32_t t : holdersOf(m_mesh.topology, feature())) {
+      const auto [a, b, c] = m_mesh.corners(t);
+      sum += windingNormal(a, b, c);
+    }
+    return sum.stableNormalized();
   }
+  MeshFeature feature() const { return featureOf(m_mesh.topology, m_triangle, m_nearest.feature); }
 
   std::uint32_t triangle() const { return m_triangle; }
   Corners corners() const { return m_mesh.corners(m_triangle); }
@@ -321,7 +326,6 @@ class NearestInFront {
   }
 
  private:
-  MeshFeature feature() const { return featureOf(m_mesh.topology, m_triangle, m_nearest.feature); }
   /// From the vertex to where its edges cross the surface.
   void findCrossings(std::span<const PiercingContacts::Behind> crossings,
                      Buffer<Eigen::Vector3d>& found) const {
@@ -490,9 +494,8 @@ void PiercingContacts::findAtStart(const MeshPair& pair, std::span<ContactBuffer
 
 template <class IsAllowed>
 std::span<const PiercingContacts::Near> PiercingContacts::findEdgesAbove(
-    const MeshPair& pair, bool ofB, std::uint32_t edge,
-    std::initializer_list<std::uint32_t> triangles, const Eigen::Vector3d* wayOut,
-    IsAllowed&& isAllowed) {
+    const MeshPair& pair, bool ofB, std::uint32_t edge, std::span<const std::uint32_t> triangles,
+    const Eigen::Vector3d* wayOut, IsAllowed&& isAllowed) {
   const PlacedMesh own(ofB ? pair.b : pair.a, false), surface(ofB ? pair.a : pair.b, false);
   const MeshTopology& topology = surface.topology;
   const Segment& ends = own.topology.edges[edge];
@@ -528,7 +531,7 @@ bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t ed
                                 const Eigen::Vector3d* wayOut, ContactBuffers& out,
                                 IsAllowed&& isAllowed) {
   const PlacedMesh surface(ofB ? pair.a : pair.b, false);
-  const auto ridges = findEdgesAbove(pair, ofB, edge, triangles, wayOut,
+  const auto ridges = findEdgesAbove(pair, ofB, edge, {triangles.begin(), triangles.size()}, wayOut,
                                      [&](std::uint32_t, const Eigen::Vector3d& up, double length) {
                                        return isAllowed(up, length);
                                      });
@@ -540,23 +543,28 @@ bool PiercingContacts::addRidge(const MeshPair& pair, bool ofB, std::uint32_t ed
 
 bool PiercingContacts::addBorders(const MeshPair& pair, std::span<const Behind> crossings,
                                   const VertexTriangleContact& nearest,
-                                  const Eigen::Vector3d& normal, ContactBuffers& out) {
+                                  const Eigen::Vector3d& outward, ContactBuffers& out) {
   const bool isOfB = crossings.front().ofB;
   const MeshTopology& topology = (isOfB ? pair.a : pair.b).topology;
   bool any = false;
   for (int i = 0; i < 3; ++i)
     any |=
         nearest.weights[i] != 0.0 && !behindOf(!isOfB && !pair.self(), nearest.vertices[i]).empty();
-  for (const auto& [ofB, vertex, triangle, edge] : crossings) {
-    const auto borders = findEdgesAbove(
-        pair, ofB, edge, {triangle, nearest.triangle}, nullptr,
-        [&](std::uint32_t border, const Eigen::Vector3d& up, double length) {
-          return isBorder(topology, border) && length <= -nearest.distance && up.dot(normal) > 0.0;
-        });
-    if (borders.empty()) continue;
-    const std::uint32_t border = borders.front().id;
-    addCrossed(pair, ofB ? border : edge, ofB ? edge : border, out);
-    any = true;
+  const auto addAbove = [&](std::uint32_t edge, std::span<const std::uint32_t> triangles) {
+    const auto borders =
+        findEdgesAbove(pair, isOfB, edge, triangles, &outward,
+                       [&](std::uint32_t border, const Eigen::Vector3d& up, double length) {
+                         return isBorder(topology, border) && length <= -nearest.distance &&
+                                up.dot(outward) >= kSameWayOut * length;
+                       });
+    for (const Near& border : borders)
+      addCrossed(pair, isOfB ? border.id : edge, isOfB ? edge : border.id, out);
+    any |= !borders.empty();
+  };
+  const auto around = holdersOf(topology, featureOf(topology, nearest.triangle, nearest.feature));
+  for (const Behind& crossing : crossings) {
+    addAbove(crossing.edge, around);
+    addAbove(crossing.edge, {&crossing.triangle, 1});
   }
   return any;
 }
@@ -575,8 +583,8 @@ void PiercingContacts::addDepths(const MeshPair& pair, bool atStart, ContactBuff
     nearest.shorten({begin, first}, m_scratch);
     out.exactDecisions += nearest.exact();
     if (nearest.isBeyondBorder() &&
-        (atStart || addBorders(pair, {begin, first}, nearest.contact(), nearest.normal(), out))) {
-      out.beyondBorder.push_back({ofB, vertex, nearest.triangle(), nearest.normal()});
+        (atStart || addBorders(pair, {begin, first}, nearest.contact(), nearest.outward(), out))) {
+      out.beyondBorder.push_back({ofB, vertex, nearest.triangle(), nearest.outward()});
       continue;
     }
     if (!atStart) {

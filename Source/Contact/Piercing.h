@@ -63,11 +63,13 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          must be at most 1.5 times that depth away, and lead out within 45 degrees of the
 ///          vertex' normal.
 /// Border   a vertex behind an open surface may be beyond its border: this is nearest, and not
-///          along the triangle's normal. A box that hangs over the edge of a sheet has corners
-///          there, and the way to the border is as long as they hang over. If the vertex' edges
-///          that cross the surface pass below a border, no further away than the vertex, their
-///          contacts with it stand for that of the vertex. If the border's vertices are behind the
-///          other surface, theirs do.
+///          along the normal of a triangle there. A box that hangs over the edge of a sheet has
+///          corners there, and the way to the border is as long as they hang over. If the vertex'
+///          edges that cross the surface pass below borders at corners of the crossed triangles and
+///          of those that hold the nearest feature, their contacts with these stand for that of the
+///          vertex: such a border is no further away than the vertex, and leads out within 45
+///          degrees of the mean normal at the feature. If vertices of the nearest feature are
+///          behind the other surface, theirs do.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
 ///          most 1.5 times its first exit distance from it. Scratch memory of 4 bytes for each
@@ -114,13 +116,13 @@ class PiercingContacts {
   /// The contacts of a vertex' edges with a border that it is beyond. Returns whether there are
   /// any.
   bool addBorders(const MeshPair&, std::span<const Behind>, const VertexTriangleContact& nearest,
-                  const Eigen::Vector3d& normal, ContactBuffers& out);
+                  const Eigen::Vector3d& outward, ContactBuffers& out);
   /// Edges at corners of the triangles, the nearest first, whose closest points to the edge are
   /// between the ends of both. isAllowed(other edge, from the edge to it, its length) chooses among
   /// these. ofB, wayOut: see addRidge().
   template <class IsAllowed>
   std::span<const Near> findEdgesAbove(const MeshPair&, bool ofB, std::uint32_t edge,
-                                       std::initializer_list<std::uint32_t> triangles,
+                                       std::span<const std::uint32_t> triangles,
                                        const Eigen::Vector3d* wayOut, IsAllowed&& isAllowed);
   /// Adds the contact of an edge and the nearest ridge that it is below, of the ridges at corners
   /// of the triangles. isAllowed(from the edge to the ridge, its length) chooses among these.

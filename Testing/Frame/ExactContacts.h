@@ -34,11 +34,12 @@ class ExactContacts {
         m_b{self ? scene.a : scene.b, self ? scene.aBefore : scene.bBefore},
         m_self(self) {
     if (settings.method != Method::Intersection) return;
-    Crossings ofA, ofB;
-    m_depthsOfA = depths(m_a, m_b, ofA);
-    if (!self) m_depthsOfB = depths(m_b, m_a, ofB);
-    addRims(m_a, m_b, false, m_depthsOfA, ofA);
-    addRims(m_b, m_a, true, m_depthsOfB, ofB);
+    m_depthsOfA = depths(m_a, m_b, m_crossingsOfA);
+    if (!self) m_depthsOfB = depths(m_b, m_a, m_crossingsOfB);
+    addBorders(m_a, m_b, false);
+    addBorders(m_b, m_a, true);
+    addRims(m_a, m_b, false);
+    addRims(m_b, m_a, true);
   }
 
   Answer has(const Ids& ids) const {
@@ -131,6 +132,11 @@ class ExactContacts {
 
   // ---- Intersection ----
 
+  /// For each vertex behind the other mesh, the triangle of its contact.
+  using Depths = std::map<std::uint32_t, std::uint32_t>;
+  /// For each vertex behind, its edges that cross a triangle of the other mesh.
+  using Crossings = std::map<std::uint32_t, std::set<std::pair<Segment, std::uint32_t>>>;
+
   /// How two triangles intersect, in rationals: touching features, and edges that cross the other.
   struct Meeting {
     bool cornersOfA[3] = {}, cornersOfB[3] = {}, edges[3][3] = {};  ///< touch
@@ -164,14 +170,25 @@ class ExactContacts {
       const int x = side(p, q, a, b), y = side(p, q, b, c), z = side(p, q, c, a);
       return x != 0 && x == y && y == z;
     }
-    /// Of two triangles that pierce each other: an end of a crossing edge is behind the other mesh.
+    /// Of two triangles that pierce each other: an end of a crossing edge is behind the other mesh,
+    /// or a corner of which an edge crosses a triangle at a vertex of the other one.
     bool isBehind(const ExactContacts& scene, std::uint32_t s, std::uint32_t t) const {
-      const Depths &ofA = scene.m_depthsOfA, &ofB = scene.m_self ? ofA : scene.m_depthsOfB;
       const Triangle &a = scene.m_a.triangles()[s], &b = scene.m_b.triangles()[t];
+      const auto stands = [](const Crossings& crossings, const Moving& others, std::uint32_t corner,
+                             bool isEnd, const Triangle& other) {
+        const auto found = crossings.find(corner);
+        return found != crossings.end() &&
+               (isEnd || std::ranges::any_of(found->second, [&](const auto& crossing) {
+                  return std::ranges::any_of(others.triangles()[crossing.second],
+                                             [&](std::uint32_t v) { return holds(other, v); });
+                }));
+      };
       bool found = false;
-      for (int i = 0; i < 3; ++i)
-        for (const int end : {i, (i + 1) % 3})
-          found |= (throughB[i] && ofA.contains(a[end])) || (throughA[i] && ofB.contains(b[end]));
+      for (int i = 0; i < 3; ++i) {
+        const int last = (i + 2) % 3;
+        found |= stands(scene.m_crossingsOfA, scene.m_b, a[i], throughB[i] || throughB[last], b) ||
+                 stands(scene.crossingsOf(true), scene.m_a, b[i], throughA[i] || throughA[last], a);
+      }
       return found;
     }
     static int count(const bool (&edges)[3]) { return edges[0] + edges[1] + edges[2]; }
@@ -335,9 +352,6 @@ class ExactContacts {
     return isConvex ? below == around.size() : below > 0;
   }
 
-  /// For each vertex behind the other mesh, the triangle of its contact.
-  using Depths = std::map<std::uint32_t, std::uint32_t>;
-
   /// A triangle and the corners of its feature that holds a point.
   struct Place {
     std::uint32_t triangle;
@@ -393,22 +407,128 @@ class ExactContacts {
     return star.holds(p) || star.holds(q) ? 0 : sense;
   }
 
-  /// For each vertex behind, its edges that cross a triangle of the other mesh.
-  using Crossings = std::map<std::uint32_t, std::set<std::pair<Segment, std::uint32_t>>>;
+  const Depths& depthsOf(bool ofB) const { return ofB && !m_self ? m_depthsOfB : m_depthsOfA; }
+  const Crossings& crossingsOf(bool ofB) const {
+    return ofB && !m_self ? m_crossingsOfB : m_crossingsOfA;
+  }
+  static Answer isAbove(const mpf_class& value, double limit, double error) {
+    if (abs(value - limit) <= error) return Answer::Either;
+    return value > limit ? Answer::Yes : Answer::No;
+  }
+  static Answer both(Answer l, Answer r) {
+    if (l == Answer::No || r == Answer::No) return Answer::No;
+    return l == Answer::Yes ? r : l;
+  }
+
+  /// The triangles at a feature on the border of a surface; none at another feature.
+  static std::vector<std::uint32_t> atBorder(const Moving& surface,
+                                             const std::set<std::uint32_t>& feature) {
+    if (feature.size() == 3) return {};
+    const std::uint32_t p = *feature.begin(), q = *feature.rbegin();
+    if (feature.size() == 2) {
+      const std::vector<std::uint32_t> around = at(surface, Segment{p, q});
+      return around.size() == 1 ? around : std::vector<std::uint32_t>{};
+    }
+    const oracle::StarTruth star(surface.triangles(), {p},
+                                 [&](std::uint32_t v) { return surface[v]; });
+    return star.isClosed() ? std::vector<std::uint32_t>{} : at(surface, p);
+  }
+
+  /// The contacts of edges from vertices beyond a border with borders that these pass below.
+  void addBorders(const Moving& vertices, const Moving& others, bool ofB) {
+    if (ofB && m_self) return;
+    using namespace oracle;
+    for (const auto& [vertex, all] : crossingsOf(ofB)) {
+      const Vector3d& p = vertices[vertex];
+      const std::uint32_t nearest = depthsOf(ofB).at(vertex);
+      const auto [a, b, c] = others.triangles()[nearest];
+      const oracle::Closest foot = oracle::vertexTriangle(p, others[a], others[b], others[c]);
+      const std::set<std::uint32_t> feature = place(p, others, nearest).feature;
+      const std::vector<std::uint32_t> around = atBorder(others, feature);
+      if (around.empty()) continue;
+      Answer isBeyond = Answer::Yes;
+      std::array<mpf_class, 3> outward{mpf_class(0, 400), mpf_class(0, 400), mpf_class(0, 400)};
+      const mpf_class depth = root(foot.square);
+      for (const std::uint32_t t : around) {
+        const auto [i, j, k] = others.triangles()[t];
+        const Vector from = toRational(others[i]),
+                     normal = cross(toRational(others[j]) - from, toRational(others[k]) - from),
+                     aside = cross(foot.difference, normal);
+        const mpf_class size = root(dot(normal, normal));
+        if (size == 0) {  // every way is along it
+          isBeyond = Answer::No;
+          break;
+        }
+        isBeyond = both(isBeyond, isAbove(root(dot(aside, aside)) / size / depth, kTouchAngle,
+                                          1e-6 * kTouchAngle));
+        for (int x = 0; x < 3; ++x) outward[x] += mpf_class(normal[x], 400) / size;
+      }
+      if (isBeyond == Answer::No) continue;
+      const mpf_class size = sqrt(
+          mpf_class(outward[0] * outward[0] + outward[1] * outward[1] + outward[2] * outward[2]));
+      Answer stands = Answer::No;
+      for (const std::uint32_t v : feature)
+        if (depthsOf(!ofB).contains(v)) stands = Answer::Yes;
+      for (const auto& [edge, triangle] : all) {
+        std::set<std::uint32_t> corners(others.triangles()[triangle].begin(),
+                                        others.triangles()[triangle].end());
+        for (const std::uint32_t t : around)
+          corners.insert(others.triangles()[t].begin(), others.triangles()[t].end());
+        for (const Segment& border : bordersAt(others, corners)) {
+          const Segment &e = ofB ? border : edge, &f = ofB ? edge : border;
+          if ((m_self && (holds({border[0], border[1], border[1]}, edge[0]) ||
+                          holds({border[0], border[1], border[1]}, edge[1]))) ||
+              certainlyNotBetweenEnds(m_a[e[0]], m_a[e[1]], m_b[f[0]], m_b[f[1]]))
+            continue;
+          const oracle::Closest points =
+              oracle::edgeEdge(m_a[e[0]], m_a[e[1]], m_b[f[0]], m_b[f[1]]);
+          if (!points.interior || points.square == 0) continue;
+          const mpf_class length = root(points.square);
+          mpf_class up(0, 400);
+          for (int x = 0; x < 3; ++x)
+            up += outward[x] * mpf_class(points.difference[x], 400) * (ofB ? 1 : -1);
+          const Answer isBelow = both(isAbove(up / size / length, 0.7, 1e-9),
+                                      isAbove((depth - length) / depth, 0.0, 1e-9));
+          const Answer has = both(isBeyond, isBelow);
+          if (has == Answer::Yes) m_borders.edges.insert({e, f});
+          if (has == Answer::Either) m_unsureBorders.edges.insert({e, f});
+          if (stands != Answer::Yes && isBelow != Answer::No) stands = isBelow;
+        }
+      }
+      (ofB ? m_beyondOfB : m_beyondOfA)[vertex] = both(isBeyond, stands);
+    }
+  }
+  static std::set<Segment> bordersAt(const Moving& m, const std::set<std::uint32_t>& corners) {
+    std::set<Segment> borders;
+    for (const std::uint32_t corner : corners)
+      for (const std::uint32_t t : at(m, corner))
+        for (const std::uint32_t other : m.triangles()[t])
+          if (other != corner && at(m, Segment{corner, other}).size() == 1)
+            borders.insert(sorted(corner, other));
+    return borders;
+  }
+  /// Whether contacts with borders stand for that of a vertex behind.
+  Answer isBeyond(bool ofB, std::uint32_t vertex) const {
+    const auto& all = ofB && !m_self ? m_beyondOfB : m_beyondOfA;
+    const auto found = all.find(vertex);
+    return found == all.end() ? Answer::No : found->second;
+  }
 
   /// The contacts of edges from vertices behind, with ridges that these are below.
-  void addRims(const Moving& vertices, const Moving& others, bool ofB, const Depths& depths,
-               const Crossings& crossings) {
-    for (const auto& [vertex, all] : crossings) {
+  void addRims(const Moving& vertices, const Moving& others, bool ofB) {
+    if (ofB && m_self) return;
+    for (const auto& [vertex, all] : crossingsOf(ofB)) {
+      const Answer isBeyondBorder = isBeyond(ofB, vertex);
+      if (isBeyondBorder == Answer::Yes) continue;
       const Vector3d& p = vertices[vertex];
-      const auto [a, b, c] = others.triangles()[depths.at(vertex)];
+      const auto [a, b, c] = others.triangles()[depthsOf(ofB).at(vertex)];
       const oracle::Closest foot = oracle::vertexTriangle(p, others[a], others[b], others[c]);
       for (const auto& [edge, triangle] : all) {
         const Vector3d& q = vertices[edge[edge[0] == vertex]];
         const Rational along = oracle::dot(foot.difference, crossing(p, q, others, triangle));
         const double share = Rational(along / foot.square + 1).get_d();  // of the vertex' depth
         if (share < 0.5 - 1e-9) continue;
-        Below& below = share > 0.5 + 1e-9 ? m_rims : m_unsureRims;
+        Below& below = share > 0.5 + 1e-9 && isBeyondBorder == Answer::No ? m_rims : m_unsureRims;
         using namespace oracle;
         const Vector wayOut = Rational(-1) * foot.difference;
         addRidge(others, ofB, edge, {triangle}, 1.5 * share * root(foot.square), wayOut, below);
@@ -513,7 +633,7 @@ class ExactContacts {
     std::vector<Place> places;
     for (std::uint32_t t = 0; t < count; ++t)
       if (mayHold(t)) places.push_back(place(p, others, t));
-    // Which triangles connect with those that the edges cross.
+    // Which triangles connect with the nearest one, or one that the edges cross.
     const mpf_class reach = exitAt(triangle) * 1.5;
     std::set<std::uint32_t> inReach, reached;
     for (std::uint32_t t = 0; t < count; ++t)
@@ -522,6 +642,7 @@ class ExactContacts {
         inReach.insert(t);
     for (const std::uint32_t t : starts)
       if (inReach.contains(t)) reached.insert(t);
+    reached.insert(triangle);
     for (std::size_t last = 0; last != reached.size();) {
       last = reached.size();
       for (const std::uint32_t t : inReach)
@@ -595,7 +716,16 @@ class ExactContacts {
     const std::uint32_t v = ids[1], t = ids[2];
     switch (m_settings.method) {
       case Method::Intersection:
-        return isDepth(ids) ? Answer::Yes : cornerMeets(vertices, ids);
+        if (!isDepth(ids)) return cornerMeets(vertices, ids);
+        switch (isBeyond(ids[0] != PlainContact::VertexTriangle, v)) {
+          case Answer::No:
+            return Answer::Yes;
+          case Answer::Either:
+            return Answer::Either;
+          case Answer::Yes:
+            return cornerMeets(vertices, ids);
+        }
+        return Answer::Either;
       case Method::Proximity: {
         if (m_settings.contacts == Contacts::Distinct) return distinct(vertices, triangles, ids);
         const auto positions = positionsOf(vertices, v, triangles, t);
@@ -611,7 +741,7 @@ class ExactContacts {
   }
 
   bool isDepth(const Ids& ids) const {
-    const Depths& depths = ids[0] == PlainContact::VertexTriangle ? m_depthsOfA : m_depthsOfB;
+    const Depths& depths = depthsOf(ids[0] != PlainContact::VertexTriangle);
     const auto found = depths.find(ids[1]);
     return found != depths.end() && found->second == ids[2];
   }
@@ -640,8 +770,9 @@ class ExactContacts {
   Answer edges(const Segment& p, const Segment& q) const {
     switch (m_settings.method) {
       case Method::Intersection: {
-        if (holdsEither(m_rims, p, q)) return Answer::Yes;
-        Answer answer = m_rims.unsure || m_unsureRims.unsure || holdsEither(m_unsureRims, p, q)
+        if (holdsEither(m_rims, p, q) || holdsEither(m_borders, p, q)) return Answer::Yes;
+        Answer answer = m_rims.unsure || m_unsureRims.unsure || holdsEither(m_unsureRims, p, q) ||
+                                holdsEither(m_unsureBorders, p, q)
                             ? Answer::Either
                             : Answer::No;
         for (const std::uint32_t s : at(m_a, p))
@@ -711,7 +842,9 @@ class ExactContacts {
   Moving m_a, m_b;
   bool m_self;
   Depths m_depthsOfA, m_depthsOfB;
-  Below m_rims, m_unsureRims;
+  Crossings m_crossingsOfA, m_crossingsOfB;
+  std::map<std::uint32_t, Answer> m_beyondOfA, m_beyondOfB;  ///< isBeyond()
+  Below m_rims, m_unsureRims, m_borders, m_unsureBorders;
 };
 
 }  // namespace palpate::testing
