@@ -22,7 +22,11 @@ LEVEL = {'||': 1, '&&': 2, '|': 3, '^': 4, '&': 5, '==': 6, '!=': 6, '<': 7, '>'
          '<<': 9, '+': 10, '-': 10}
 # Contents of these are no expressions at run time.
 UNEVALUATED = {'static_assert', 'PALPATE_ASSERT', 'alignas', 'decltype', 'sizeof', 'noexcept', 'HWY_EXPORT', 'requires'}
-BOUND_CALLS = {'roundedDown', 'roundedUp', 'outward', 'down', 'up', 'nextDown', 'nextUp'}
+# A bound that is missing changes an answer only within one rounding, and most bounds have room for several. The fault
+# therefore is a bound on the wrong side.
+OPPOSITE = {'roundedDown': 'roundedUp', 'roundedUp': 'roundedDown', 'down': 'up', 'up': 'down', 'nextDown': 'nextUp',
+            'nextUp': 'nextDown'}
+BOUND_CALLS = {*OPPOSITE, 'outward'}
 BOUND_NAME = re.compile(r'k\w*(Error|Slack|Margin|Guard|Underflow|Absolute|Relative)\w*$'
                         r'|(error|slack|margin|tiny)$|\w+(Error|Slack|Margin)$')
 
@@ -237,12 +241,15 @@ class File:
                 yield Site(kind, first, self.tokens[last].end, f'{scope}::{other}({args})')
         if args is not None and text in BOUND_CALLS and scope in (None, 'OutwardRounding') and \
                 self.at(i - 1) not in ('.', '->') and not self.is_declared(i):
-            yield Site('bound', first, self.tokens[last].end, args)
+            opposite = OPPOSITE.get(text)
+            yield Site('bound', first, self.tokens[last].end,
+                       f"{'OutwardRounding::' if scope else ''}{opposite}({args})" if opposite else args)
         if BOUND_NAME.match(text) and self.at(i + 1) not in ASSIGN | {'(', '{', '[', '::', '++'} and \
                 self.at(i - 1) not in ('.', '->', '[') and self.at(i + 1) != ']' and \
                 not (self.at(i - 1) == ',' and self.at(i + 1) in (';', ',')) and not self.is_declared(i):
             whole = text if scope is None else f'{scope}::{text}'
-            without = f'{whole} * 0x1p1000' if 'OverflowGuard' in text else f'{whole} - {whole}'
+            without = f'{whole} * 0x1p1000' if 'OverflowGuard' in text else \
+                f'{whole} - {whole} - {whole}'
             yield Site('bound', first, self.tokens[i].end, without)
 
     def is_declared(self, i):
