@@ -182,6 +182,25 @@ TEST(FieldContacts, FindASpikeInATriangle) {
   EXPECT_LT(contacts[0].point.head<2>().norm(), 0.05);
 }
 
+/// A short way from one end, a long segment is nearest to a small ball. Neither end is a contact.
+TEST(FieldContacts, FindABallNearEitherEndOfASegment) {
+  const Mesh ball = sphere(16, 24, Vector3d::Zero(), 0.05);
+  const Field field = fieldOf(ball, 0.002);
+  for (const bool isReversed : {false, true}) {
+    std::vector<Vector3d> ends{{-0.05, 0.055, 0}, {0.4, 0.055, 0}};
+    if (isReversed) std::swap(ends[0], ends[1]);
+    const CollisionData data =
+        contactsWith(field, {},
+                     [&](OctreeBasedCD& detection) {
+                       return detection.addLineMesh(ends, std::vector<Segment>{{0, 1}});
+                     },
+                     {.method = Method::DistanceField, .thickness = 0.01});
+    ASSERT_EQ(data.shape().size(), 1u);
+    EXPECT_NEAR(data.shape()[0].distance, 0.005, 0.002);
+    EXPECT_NEAR(data.shape()[0].point.x(), 0.0, 0.02);
+  }
+}
+
 /// A row's gap is the distance at the step's end. The body's side is left empty.
 TEST(FieldContacts, MakeRows) {
   const Mesh mesh = ballAtWall();
