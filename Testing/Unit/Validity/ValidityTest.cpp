@@ -1,6 +1,8 @@
 #include "Common/DegenerateCases.h"
 #include "Common/TestGeometry.h"
 
+#include <numeric>
+
 // Validity::trusted is never true for a wrong answer. The reference is exact: impacts of
 // Method::Continuous at thickness 0, and Method::Intersection of the positions at the step's start.
 
@@ -257,20 +259,21 @@ INSTANTIATE_TEST_SUITE_P(
                       MethodCase{"AutoWithoutThickness", {Method::Auto, 0}}),
     [](const auto& test) { return test.param.name; });
 
-/// Of those that move further than the limit, the first.
+/// Of those that move further than the limit, the first. A motion of both meshes does not count.
 TEST(Validity, NamesFastVertices) {
   const Mesh low = flat(12, 0), high = flat(12, 1);
-  for (const std::uint32_t every : {1u, 2u}) {
-    PairRun run(settingsOf(Engine::Octree), high, low, {Method::Proximity, 0.01}, false);
-    Positions now = high.positions;
-    std::vector<std::uint32_t> fast;
-    for (std::uint32_t v = 0; v < now.size(); v += every) {
-      now[v].x() += 0.5;
-      if (fast.size() < Validity::kMaxFastVertices) fast.push_back(v);
+  for (const Vector3d& common : {Vector3d(0, 0, 0), Vector3d(0, 0.5, 1)})
+    for (const std::uint32_t every : {1u, 2u, 60u}) {
+      PairRun run(settingsOf(Engine::Octree), high, low, {Method::Proximity, 0.01}, false);
+      Positions now = moved(high, common).positions;
+      std::vector<std::uint32_t> fast;
+      for (std::uint32_t v = 0; v < now.size(); v += every) {
+        now[v].x() += 0.5;
+        if (fast.size() < Validity::kMaxFastVertices) fast.push_back(v);
+      }
+      run.step(high.positions, now, low.positions, moved(low, common).positions);
+      EXPECT_EQ(run.data().validity().untrustedVerticesA, fast);
     }
-    run.step(high.positions, now, low.positions, low.positions);
-    EXPECT_EQ(run.data().validity().untrustedVerticesA, fast);
-  }
 }
 
 /// Two sheets, the second one within the thickness above the first one.
@@ -299,6 +302,129 @@ TEST(StartedApart, IsFalseAfterACorrectionBeyondTheRemainingDistance) {
   sheets.collisions.setPositions(sheets.b, sheets.high, sheets.high);
   sheets.collisions.detectCollision();
   EXPECT_FALSE(sheets.validity().startedApart);
+}
+
+/// Moves a mesh over two large triangles, which may be part of it, by these steps, the first from
+/// where it is. No step is said to start apart if brute force finds that the previous one ended in
+/// a touch. Returns whether the last one is.
+bool startsApart(const PairSettings& settings, bool self, const Mesh& mesh,
+                 std::initializer_list<Vector3d> steps) {
+  const Mesh floor = flat(1, 0);
+  PairRun run(settingsOf(Engine::Octree), self ? joined(mesh, floor) : mesh,
+              self ? moved(floor, {9, 9, 9}) : floor, settings, self),
+      truth(settingsOf(Engine::BruteForce), mesh, floor, {Method::Intersection}, false);
+  const auto data = [&]() -> const CollisionData& {
+    return run.detection().collisionData(run.a(), self ? run.a() : run.b());
+  };
+  Positions positions = mesh.positions;
+  bool isApart = true;
+  for (const Vector3d& step : steps) {
+    for (Vector3d& p : positions) p += step;
+    truth.detection().setPositions(truth.a(), positions);
+    run.detection().setPositions(run.a(),
+                                 self ? joined({positions, {}}, floor).positions : positions);
+    for (PairRun* each : {&run, &truth}) each->detect(), each->detection().advance();
+    EXPECT_TRUE(isApart || !data().validity().startedApart);
+    EXPECT_TRUE(settings.method == Method::Auto || data().intersectingTriangles().empty());
+    const FrameStatistics& counts = run.detection().statistics();
+    EXPECT_LE(counts.exactDecisions, 64 * (counts.candidatePairs + counts.validityPairs));
+    isApart = truth.data().intersectingTriangles().empty();
+  }
+  return data().validity().startedApart;
+}
+
+/// The spike pierces the triangle further than the thickness from its edges, or comes to stand on
+/// it. The flat mesh comes to lie on it.
+TEST(StartedApart, IsFalseAfterAStepThatEndsInATouchOrAPiercing) {
+  const Mesh tip = spike({0.7, 0.3, 0.125}, 0.5);
+  const Vector3d rest = Vector3d::Zero(), down(0, 0, -0.125), side(0.03125, 0, 0), up(0, 0, 0.25);
+  for (const bool self : {false, true})
+    for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto})
+      for (const double thickness : {0.0625, 0.25, 0.5}) {
+        SCOPED_TRACE(::testing::Message() << toString(method) << " " << thickness << " " << self);
+        PairSettings settings{method, thickness};
+        settings.continuous.timeTolerance = 0x1p-50;
+        const auto after = [&](const Mesh& mesh, std::initializer_list<Vector3d> steps) {
+          return startsApart(settings, self, mesh, steps);
+        };
+        EXPECT_TRUE(after(tip, {rest, side, rest, 0.5 * down, rest}));
+        EXPECT_FALSE(after(tip, {rest, down, rest, rest}));
+        EXPECT_FALSE(after(tip, {rest, 2 * down, rest, rest, side, side, rest}));
+        EXPECT_FALSE(after(tip, {rest, 2 * down, side, rest, side, rest}));
+        EXPECT_FALSE(after(flat(2, 1), {rest, 7 * down, down, rest}));
+        EXPECT_FALSE(after(flat(2, 1), {rest, 8 * down, rest, rest}));
+        after(tip, {rest, 2 * down, up, rest, down, side, up, rest});
+      }
+}
+
+/// Sheets that come near each other in every second step, and never as near as they move. One of
+/// them has a small triangle that flies through the other one, so that the step itself does not
+/// tell.
+TEST(StartedApart, IsKnownOfMotionsShorterThanTheDistance) {
+  const Mesh low = flat(8, 0), high = flat(8, 0.15),
+             fly = moved(flat(1, 0), {0.52, 0.53, 0.5}, 0.0625);
+  PairRun run(settingsOf(Engine::Octree), joined(high, fly), low, {Method::Continuous, 0.1}, false);
+  for (int frame = 0; frame < 40; ++frame) {
+    const bool isDown = frame % 2;
+    run.detection().setPositions(run.a(), joined(moved(high, {0, 0, isDown ? -0.07 : 0.0}),
+                                                 moved(fly, {0, 0, isDown ? -1.0 : 0.0}))
+                                              .positions);
+    run.detect();
+    EXPECT_TRUE(run.data().validity().startedApart) << frame;
+    EXPECT_TRUE(frame == 0 || run.data().validity().atImpact > 32) << frame;
+    run.detection().advance();
+  }
+}
+
+TEST(StartedApart, IsFalseOfPointsAtOnePlace) {
+  for (const double distance : {0.0, 0.0625})
+    for (const Method method : {Method::Proximity, Method::Continuous}) {
+      OctreeBasedCD collisions;
+      const GeometryId a = collisions.addPointSet(Positions{{1, 2, 3}}),
+                       b = collisions.addPointSet(Positions{{1, 2, 3 + distance}});
+      collisions.addCollisionPair(a, b, {.method = method, .thickness = 0.125});
+      collisions.detectCollision();
+      EXPECT_EQ(collisions.collisionData(a, b).validity().startedApart, distance > 0.0);
+    }
+}
+
+/// A cut adds a triangle to one of two meshes that were apart.
+TEST(StartedApart, IsFalseAfterACutAddsATriangleThatPierces) {
+  const Mesh floor = flat(4, 0);
+  Mesh other = flat(4, 0.25);
+  const auto first = static_cast<std::uint32_t>(other.positions.size());
+  for (const Vector3d& p : {Vector3d(0.55, 0.3, -0.1), {0.6, 0.32, 0.2}, {0.5, 0.32, 0.2}})
+    other.positions.push_back(p);
+  for (const bool isSwapped : {false, true})
+    for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
+      PairRun run(settingsOf(Engine::Octree), isSwapped ? floor : other, isSwapped ? other : floor,
+                  {method, 0.01}, false);
+      run.detect();
+      EXPECT_TRUE(run.data().validity().startedApart);
+      run.detection().advance();
+      run.detection().replaceTriangles(isSwapped ? run.b() : run.a(), {},
+                                       std::vector<Triangle>{{first, first + 1, first + 2}}, {});
+      run.detect();
+      EXPECT_FALSE(run.data().validity().startedApart);
+    }
+}
+
+/// Of a body, all triangles are cut out in another one.
+TEST(StartedApart, IsTrueOfABodyWithoutTriangles) {
+  for (const bool isSwapped : {false, true}) {
+    const Mesh body = cube(0, 1), inner = cube(0.25, 0.75);
+    PairRun run(settingsOf(Engine::Octree), isSwapped ? inner : body, isSwapped ? body : inner,
+                {Method::Auto, 0.1}, false);
+    std::vector<std::uint32_t> all(inner.triangles.size());
+    std::iota(all.begin(), all.end(), 0u);
+    run.detection().replaceTriangles(isSwapped ? run.a() : run.b(), all, {}, {});
+    for (int frame = 0; frame < 3; ++frame) {
+      run.detect();
+      EXPECT_TRUE(run.data().validity().startedApart);
+      EXPECT_EQ(run.detection().statistics().contacts, 0u);
+      run.detection().advance();
+    }
+  }
 }
 
 /// A check that no detection finished was not made.
