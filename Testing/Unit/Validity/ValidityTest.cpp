@@ -388,13 +388,14 @@ TEST(StartedApart, IsFalseOfPointsAtOnePlace) {
     }
 }
 
-/// A cut adds a triangle to one of two meshes that were apart.
+/// A cut adds two triangles, one that is apart and one that is not, to one of two meshes.
 TEST(StartedApart, IsFalseAfterACutAddsATriangleThatPierces) {
   const Mesh floor = flat(4, 0);
   Mesh other = flat(4, 0.25);
   const auto first = static_cast<std::uint32_t>(other.positions.size());
-  for (const Vector3d& p : {Vector3d(0.55, 0.3, -0.1), {0.6, 0.32, 0.2}, {0.5, 0.32, 0.2}})
-    other.positions.push_back(p);
+  for (const double down : {0.0, 0.3})
+    for (const Vector3d& p : {Vector3d(0.55, 0.3, 0.3), {0.6, 0.32, 0.5}, {0.5, 0.32, 0.5}})
+      other.positions.push_back(p - Vector3d(0, 0, down));
   for (const bool isSwapped : {false, true})
     for (const Method method : {Method::Proximity, Method::Continuous, Method::Auto}) {
       PairRun run(settingsOf(Engine::Octree), isSwapped ? floor : other, isSwapped ? other : floor,
@@ -402,8 +403,10 @@ TEST(StartedApart, IsFalseAfterACutAddsATriangleThatPierces) {
       run.detect();
       EXPECT_TRUE(run.data().validity().startedApart);
       run.detection().advance();
-      run.detection().replaceTriangles(isSwapped ? run.b() : run.a(), {},
-                                       std::vector<Triangle>{{first, first + 1, first + 2}}, {});
+      run.detection().replaceTriangles(
+          isSwapped ? run.b() : run.a(), {},
+          std::vector<Triangle>{{first, first + 1, first + 2}, {first + 3, first + 4, first + 5}},
+          {});
       run.detect();
       EXPECT_FALSE(run.data().validity().startedApart);
     }
