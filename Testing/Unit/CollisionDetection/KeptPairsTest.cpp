@@ -1,3 +1,4 @@
+#include "Common/DegenerateCases.h"
 #include "Common/TestGeometry.h"
 
 // Candidates that are kept from one detection to the next save tests of features, also of bodies of
@@ -70,6 +71,10 @@ class KeptAndSearched {
     const Vector3d together = randomPoint(random, -length, length);
     for (Vector3d& p : m_positions[body])
       p += together + randomPoint(random, -0.2 * length, 0.2 * length);
+    forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
+  }
+  void shift(std::size_t body, const Vector3d& by) {
+    for (Vector3d& p : m_positions[body]) p += by;
     forBoth([&](OctreeBasedCD& object) { object.setPositions(m_ids[body], m_positions[body]); });
   }
   /// Removes up to four triangles of a random body, with consecutive ids, and mostly adds them
@@ -184,6 +189,29 @@ TEST(KeptPairs, ListsAreMadeAlongWithSearches) {
   }
   EXPECT_GT(searches, 8);
   EXPECT_LT(searches, 25);
+}
+
+/// Features that were far apart when lists were made come near, though each step is short.
+TEST(KeptPairs, OneSheetSlidesOverHalfOfAnother) {
+  for (const std::size_t body : {0, 1}) {
+    SlowScene scene = twoSheets();
+    scene.edge = 1.0 / 24;
+    for (TestGeometry& each : scene.bodies) each = testGeometry(flat(24, 0.5));
+    for (Vector3d& p : scene.bodies[body].positions) p += Vector3d(0.5, 0, 0.2 * scene.edge);
+    scene.settings.thickness = 0.25 * scene.edge;
+    KeptAndSearched both(scene, 1);
+    both.setAsksStatistics(false);
+    std::size_t fewer = 0;
+    for (int frame = 0; frame < 100; ++frame) {
+      both.advance();
+      both.shift(body, scene.edge * Vector3d(-0.035, 0.003, 0));
+      both.detect();
+      if (HasFailure()) return;
+      fewer += both.testsFewer();
+    }
+    EXPECT_GT(both.contacts(), 0u);
+    EXPECT_GT(fewer, 30u);
+  }
 }
 
 /// Two sheets of several parts, with each other and the upper one with itself.
