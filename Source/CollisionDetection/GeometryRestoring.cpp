@@ -201,10 +201,7 @@ void GeometryTable::Restored::apply() noexcept {
   geometry->freeMotion = std::move(freeMotion);
 }
 
-void GeometryTable::prepareToRestore(std::size_t count) {
-  m_geometries.reserve(count);
-  m_changed.reserve(2 * count + 1);  // so that no frame allocates
-}
+void GeometryTable::prepareToRestore(std::size_t count) { m_geometries.reserve(count); }
 
 void GeometryTable::restore(std::span<Restored> all, std::uint32_t nextId,
                             std::uint64_t stepNumber) noexcept {

@@ -1,6 +1,5 @@
 #include "CollisionDetection/GeometryTable.h"
 
-#include "Search/KeptPairs.h"
 #include "CollisionDetection/GeometryChecks.h"
 #include "Bodies/InputChecks.h"
 #include "Mesh/TetrahedraCut.h"
@@ -18,11 +17,6 @@ namespace palpate {
 
 namespace {
 
-/// Below this many triangles one thread updates a geometry, beside threads that update others.
-constexpr std::size_t kSmall = 16384;
-/// If fewer triangles than this are updated in all, one thread updates all geometries: cores take
-/// longer to hand over the data than to compute them.
-constexpr std::size_t kSmallRefit = 24576;
 PlacedShape* shapeOf(Geometry& geometry) {
   return geometry.body.shape ? &*geometry.body.shape : nullptr;
 }
@@ -70,16 +64,6 @@ void SmallestHeight::remove(double height) {
   count -= height == value;
 }
 
-/// L: how far the octree's boxes may lag behind the positions; 0: not at all.
-static double lagFor(const Geometry& geometry) {
-  if (!geometry.mayLag || geometry.shortEdge == 0.0) return 0.0;
-  MotionRange all;
-  for (const MotionRange& range : geometry.pieces.ranges()) all.add(range);
-  const double speed = all.lower.cwiseAbs().cwiseMax(all.upper.cwiseAbs()).maxCoeff();
-  if (!(speed <= KeptReach::kMostSpeed * geometry.shortEdge)) return 0.0;
-  return 0.5 * KeptReach::of(0.0, speed, geometry.shortEdge).lists;
-}
-
 GeometryId GeometryTable::nextId() const {
   if (m_nextId == 0xffffffffu)
     throw Error(ErrorCode::TooLarge, "no geometry id is left: 2^32 - 1 geometries were added");
@@ -106,8 +90,6 @@ std::unique_ptr<Geometry> GeometryTable::make(CountedVector<Eigen::Vector3d> res
 }
 
 GeometryId GeometryTable::add(std::unique_ptr<Geometry> geometry) {
-  if (m_changed.capacity() == m_geometries.size())  // so that no frame allocates
-    m_changed.reserve(2 * m_geometries.size() + 1);
   PALPATE_ASSERT(m_geometries.empty() || m_geometries.back()->body.id < geometry->body.id);
   m_geometries.push_back(std::move(geometry));
   ++m_nextId;
@@ -576,51 +558,6 @@ void GeometryTable::setTags(GeometryId id, std::span<const std::uint32_t> tags) 
   }
   body.mesh.tags = std::move(given);
   body.revisions.filter = body.revisions.counter.next();
-}
-
-void GeometryTable::updateOctrees(const OctreeSettings& settings, const Threads& threads,
-                                  Trace* trace, bool (*isDue)(const Geometry&)) {
-  double spread = 0;
-  for (const auto& geometry : m_geometries)
-    spread = std::max(spread, geometry->body.tree.sampleFrame(
-                                  geometry->body.mesh, geometry->body.revisions.elements.topology));
-  const double scale = frameScale(spread);
-  m_changed.clear();
-  for (const auto& geometry : m_geometries) {
-    const Body& body = geometry->body;
-    const Revision topology = body.revisions.elements.topology;
-    if (!geometry->skipsOctree && (!isDue || isDue(*geometry)) &&
-        !(geometry->mayLag && body.tree.laggedTo(body.mesh, topology, scale)) &&
-        (!body.tree.isCurrent(body.mesh, topology, scale) ||
-         body.tree.needsDops(body.mesh, settings.bounds)))
-      m_changed.push_back(geometry.get());
-  }
-  // Geometries are updated in parallel, the largest first, and large ones use several threads each.
-  // The serial parts of one update thus run beside the work on other geometries.
-  const auto size = [](const Geometry* geometry) {
-    return geometry->body.mesh.topology.elements.size();
-  };
-  std::sort(m_changed.begin(), m_changed.end(), [&](const Geometry* l, const Geometry* r) {
-    return size(l) != size(r) ? size(l) > size(r) : l->body.id < r->body.id;
-  });
-  if (m_changed.empty()) return;
-  std::size_t total = 0;
-  for (const Geometry* geometry : m_changed) total += size(geometry);
-  const Threads one(1);
-  m_wasUpdatedByOneThread = settings.update == OctreeUpdate::Auto && total < kSmallRefit;
-  const std::size_t firstEvent = trace ? trace->reserve(m_changed.size()) : 0;
-  (m_wasUpdatedByOneThread ? one : threads).forEach(m_changed.size(), [&](std::size_t i) {
-    Geometry& geometry = *m_changed[i];
-    const TraceSpan span(trace, firstEvent + i, {.name = "octree", .a = geometry.body.id});
-    const Threads& shared = size(&geometry) < kSmall ? one : threads;
-    Body& body = geometry.body;
-    const Revision topology = body.revisions.elements.topology;
-    const double lag = lagFor(geometry);
-    if (!body.tree.isCurrent(body.mesh, topology, scale))
-      body.tree.update(body.mesh, topology, scale, settings, shared,
-                       {lag > 0.0 ? &geometry.pieces : nullptr, lag});
-    body.tree.updateDops(body.mesh, settings.bounds, shared);
-  });
 }
 
 }  // namespace palpate

@@ -7,7 +7,6 @@
 
 #include "CollisionDetection/Geometry.h"
 #include "Core/Threads.h"
-#include "Core/Trace.h"
 
 #include <array>
 #include <cstdint>
@@ -101,12 +100,6 @@ class GeometryTable {
   Geometry& at(GeometryId) const;    ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  /// Updates the octrees to the positions now, or to the whole step (GeometryOctree::setSwept()).
-  void updateOctrees(const OctreeSettings&, const Threads&, Trace* = nullptr,
-                     bool (*isDue)(const Geometry&) = nullptr);
-  /// Whether one thread made the last update. Its cache then has the data.
-  bool wasUpdatedByOneThread() const { return m_wasUpdatedByOneThread; }
-
   GeometryId nextId() const;  ///< of what is added next; throws if there are no more
 
   /// A geometry of a saved state, checked. It is one of the table, which keeps what follows from
@@ -142,8 +135,6 @@ class GeometryTable {
 
   CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;
-  CountedVector<Geometry*> m_changed;
-  bool m_wasUpdatedByOneThread = false;
   std::uint64_t m_stepNumber = 0, m_state = 1;
   /// Counts restore(). Ids are then used again, so that revisions must differ from all before.
   std::uint64_t m_restores = 0;

@@ -2,7 +2,6 @@
 
 #include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
-#include "Search/BruteForce.h"
 #include "DistanceField/FieldContacts.h"
 #include "Bodies/InputChecks.h"
 #include "Core/Stopping.h"
@@ -137,7 +136,7 @@ void OctreeBasedCD::removeGeometry(GeometryId geometry) {
   all->countCandidates();
   all->pairs.removeAllOf(geometry);
   all->geometries.remove(geometry);
-  all->updateOctreeView();
+  all->octrees.updateView();
 }
 
 void OctreeBasedCD::advance() {
@@ -178,7 +177,7 @@ void OctreeBasedCD::setTransform(GeometryId geometry, const Pose& before, const 
 void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                  std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->changeTopology(geometry, [&](const auto& prepare) {
+  all->changeTopology<MeshTopology>(geometry, [&](const auto& prepare) {
     all->geometries.setTriangles(geometry, positions, triangles, prepare);
     return true;
   });
@@ -187,7 +186,7 @@ void OctreeBasedCD::setTriangles(GeometryId geometry, std::span<const Eigen::Vec
 void OctreeBasedCD::setTetrahedra(GeometryId geometry, std::span<const Eigen::Vector3d> positions,
                                   std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  all->changeTopology(geometry, [&](const auto& prepare) {
+  all->changeTopology<MeshTopology>(geometry, [&](const auto& prepare) {
     all->geometries.setTetrahedra(geometry, positions, tetrahedra, prepare);
     return true;
   });
@@ -197,7 +196,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTriangles(
     GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Triangle> added,
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->cutTopology(geometry, [&](const auto& prepare) {
+  return all->changeTopology<EdgeChange>(geometry, [&](const auto& prepare) {
     return all->geometries.replaceTriangles(geometry, removed, added, {newPositions, rest},
                                             prepare);
   });
@@ -207,7 +206,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTetrahedra(
     GeometryId geometry, std::span<const std::uint32_t> removed, std::span<const Tetrahedron> added,
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->cutTopology(geometry, [&](const auto& prepare) {
+  return all->changeTopology<EdgeChange>(geometry, [&](const auto& prepare) {
     return all->geometries.replaceTetrahedra(geometry, removed, added, {newPositions, rest},
                                              prepare);
   });
@@ -320,7 +319,7 @@ Eigen::AlignedBox3d OctreeBasedCD::bounds(GeometryId geometry) const {
 
 void OctreeBasedCD::update() {
   const Implementation::ChangeGuard all(m_implementation);
-  all->withinLimit([&] { all->update(Implementation::UpdateFor::User); });
+  all->withinLimit([&] { all->update(SceneOctrees::UpdateFor::User); });
 }
 
 void OctreeBasedCD::detectCollision() {
@@ -332,41 +331,28 @@ bool OctreeBasedCD::detectCollision(std::chrono::microseconds budget) {
   if (!m_implementation) throwMovedFrom();
   // The first exception of a process takes 0.1 ms more than later ones.
   [[maybe_unused]] static const bool hasThrown = !endsInTime(throwOutOfTime);
-  const Deadline::Clock& clock = m_implementation->clock;
+  auto& [isCancelled, clock] = m_implementation->timed;
   const Deadline::Time start = Deadline::now(clock);
   const Implementation::ChangeGuard all(m_implementation);
-  all->isCancelled = false;
-  const Deadline deadline(Deadline::after(start, budget), all->isCancelled, clock);
+  isCancelled = false;
+  const Deadline deadline(Deadline::after(start, budget), isCancelled, clock);
   return all->withinLimit([&] { return all->detect(&deadline); });
 }
 
 void OctreeBasedCD::cancelDetection() const {
   if (!m_implementation) throwMovedFrom();
-  m_implementation->isCancelled.store(true, std::memory_order_relaxed);
+  m_implementation->timed.isCancelled.store(true, std::memory_order_relaxed);
 }
 
 void OctreeBasedCD::forEachCandidateBatch(const CollisionPair* only, BatchFunction function,
                                           void* context) {
   const Implementation::ChangeGuard all(m_implementation);
   const MemoryScope memory(MemoryStage::Pairs);
-  std::vector<PairRecord*>& selectedPairs = all->selectedPairs;
-  selectedPairs.clear();
-  if (only) {
-    selectedPairs.push_back(&all->pairs.at(all->geometries, only->a, only->b));
-    checkCandidates(*selectedPairs.front());
-  } else {
-    for (const auto& record : all->pairs.records()) selectedPairs.push_back(record.get());
-  }
-  all->withinLimit([&] { all->update(); });
-  std::erase_if(selectedPairs, [](const PairRecord* record) { return !record->collides(); });
-  if (all->settings.engine == Engine::Octree)
-    return all->frame.forEach(selectedPairs, all->threadsFor(selectedPairs), function, context);
-  Buffer<ElementPair> candidates;
-  for (const PairRecord* record : selectedPairs) {
-    if (!record->hasCandidates()) continue;
-    findCandidatesByBruteForce(record->meshes(), candidates);
-    if (!candidates.empty()) function(context, record->pair, candidates);
-  }
+  const PairRecord* const record =
+      only ? &all->pairs.at(all->geometries, only->a, only->b) : nullptr;
+  if (record) checkCandidates(*record);
+  all->withinLimit([&] { all->update(SceneOctrees::UpdateFor::Queries); });
+  all->detection.forEachCandidateBatch(record, function, context);
 }
 
 std::vector<ElementPair> OctreeBasedCD::candidatePairs(GeometryId a, GeometryId b) {
@@ -452,8 +438,8 @@ std::span<const double> OctreeBasedCD::freeMotion(GeometryId id) const {
 const LooseOctree& OctreeBasedCD::octree() const {
   read();
   const StandardFloatingPoint standard;
-  m_implementation->querySource->updateLagging();
-  return m_implementation->shownOctrees.view;
+  m_implementation->querySource->updateOctrees(true);
+  return m_implementation->octrees.view();
 }
 
 const FrameStatistics& OctreeBasedCD::statistics() const {

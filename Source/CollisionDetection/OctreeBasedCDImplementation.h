@@ -3,31 +3,20 @@
 #include <palpate/OctreeBasedCD.h>
 
 #include "CollisionDetection/BurstMemory.h"
+#include "CollisionDetection/Detection.h"
 #include "CollisionDetection/DiagnosticsInterface.h"
-#include "CollisionDetection/Frame.h"
-#include "CollisionDetection/FreeMotionSearch.h"
-#include "CollisionDetection/GeometryTable.h"
-#include "CollisionDetection/PairTable.h"
-#include "CollisionDetection/Planning.h"
 #include "CollisionDetection/StepSource.h"
 #include "Queries/QuerySource.h"
 #include "Queries/SnapshotPool.h"
-#include "Octree/Forest.h"
-#include "Core/Stopping.h"
 #include "Core/FloatingPoint.h"
 #include "Core/MemoryBudget.h"
-#include "Core/Threads.h"
-#include "Core/Trace.h"
 
 #include <atomic>
-#include <cstddef>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
+#include <type_traits>
 #include <utility>
-#include <vector>
 
 namespace palpate {
 
@@ -42,32 +31,26 @@ struct OctreeBasedCD::Implementation {
 
   Settings settings;
   const std::shared_ptr<MemoryBudget> budget;
-  Threads threads, singleThread{1};
+  Threads threads;
   GeometryTable geometries;
   PairTable pairs;
-  Frame frame;
-  FreeMotionSearch freeMotions;
+  SceneOctrees octrees{settings, threads, geometries, pairs};
+  Detection detection{settings, threads, geometries, pairs, octrees};
+  UnfollowedSides unfollowed;
   FrameStatistics statistics;  ///< of the last frame or explicit update
-  FrameStatistics updates;     ///< of the updates since the last frame
-  bool hasUpdates = false;
-  LooseOctree::State shownOctrees;  ///< what octree() shows
-  std::vector<PairRecord*> selectedPairs;
-  std::vector<UnfinishedPair> unfinishedPairs;  ///< of the detection that runs
   BurstMemory burst;
   AuditRecord audit;
   std::optional<Trace> trace;  ///< with Settings::traceFrames
   std::shared_ptr<QuerySource> querySource;
   std::shared_ptr<GuardSource> guardSource;  ///< null before there is a StepGuard
-  std::vector<Search> outdatedSearches;      ///< of the SeparateSearches that are detected
-  std::vector<std::unique_ptr<SeparateSearch>> unfollowed;  ///< scratch of followSides()
   LatestSnapshot latestSnapshot;
-  /// geometries.state() for which all octrees hold; 0: for none.
-  std::atomic<std::uint64_t> octreesState = 0;
   std::mutex filling;                ///< locked while a const call fills what it returns
   bool holdsSpare = false;           ///< there was a call since the last releaseMemory()
   std::atomic<bool> isBusy = false;  ///< a call that changes the object has not returned
-  mutable std::atomic<bool> isCancelled = false;  ///< the detection with a budget that runs
-  Deadline::Clock clock;                          ///< of tests; empty: the system's
+  struct {
+    std::atomic<bool> isCancelled = false;
+    Deadline::Clock clock;  ///< of tests; empty: the system's
+  } timed;                  ///< the detection with a budget that runs
 
   /// Adds the counts of geometries to the statistics, and makes them visible.
   void setStatistics(FrameStatistics next);
@@ -93,34 +76,20 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
-  /// Returns call(prepare), which sets the topology of a geometry.
-  template <class F>
+  /// Returns call(prepare), which sets the topology of a geometry, or cuts it. Change: what is
+  /// prepared, MeshTopology or EdgeChange.
+  template <class Change, class F>
   auto changeTopology(GeometryId geometry, F&& call) {
     return withinLimit([&] {
-      countCandidates();
-      IndexLists near;
-      GeometryTable::Preparation prepare;
-      if (pairs.needsNearAtRest(geometry))
-        prepare = [&](const MeshTopology& topology, std::span<const Eigen::Vector3d> rest) {
-          near = pairs.nearAtRest(geometry, topology, rest, threads);
-        };
-      auto result = call(prepare);
-      if (prepare) pairs.setNearAtRest(geometry, std::move(near));
-      return result;
-    });
-  }
-  /// The same for a cut.
-  template <class F>
-  auto cutTopology(GeometryId geometry, F&& call) {
-    return withinLimit([&] {
-      if (const Geometry* changed = geometries.find(geometry);
-          changed && !changed->step.continuesCuts(changed->body.revisions.elements))
+      const Geometry* const changed = geometries.find(geometry);
+      if (std::is_same_v<Change, MeshTopology> ||
+          (changed && !changed->step.continuesCuts(changed->body.revisions.elements)))
         countCandidates();
-      ChangedLists near;
-      GeometryTable::CutPreparation prepare;
+      decltype(pairs.nearAtRest(geometry, std::declval<const Change&>(), {}, threads)) near;
+      std::function<void(const Change&, std::span<const Eigen::Vector3d>)> prepare;
       if (pairs.needsNearAtRest(geometry))
-        prepare = [&](const EdgeChange& change, std::span<const Eigen::Vector3d> rest) {
-          near = pairs.changeNearAtRest(geometry, change, rest, threads);
+        prepare = [&](const Change& change, std::span<const Eigen::Vector3d> rest) {
+          near = pairs.nearAtRest(geometry, change, rest, threads);
         };
       auto result = call(prepare);
       if (prepare) pairs.setNearAtRest(geometry, near);
@@ -128,56 +97,13 @@ struct OctreeBasedCD::Implementation {
     });
   }
 
-  /// Why octrees are updated. The user's explicit call publishes the statistics at once, which then
-  /// count as rebuilt or refitted only the trees that it changed. The statistics of a frame include
-  /// updates for queries.
-  enum class UpdateFor : std::uint8_t { Queries, User, Frame, Separate };
-  /// Updates the octrees. expectPlans(): asks what boxes have to enclose. traced: of a detection,
-  /// or null.
-  void update(UpdateFor, const std::function<void()>& expectPlans, Trace* traced = nullptr);
-  /// The same with the expected plans of the table's pairs. Only those of a frame include the
-  /// motion of all; others include the motion on which candidates depend.
-  void update(UpdateFor = UpdateFor::Queries, Trace* traced = nullptr);
-
-  bool needsNoOctree(const PairRecord& record) const {
-    return record.pair.settings.freeMotionReach == 0.0 &&
-           (record.support->kind == PairKind::Proxy || mayUseProxy(record));
-  }
-
-  /// A detection does not need the octrees of point sets of which all pairs use proxies. Queries
-  /// update them later.
-  void markSkippedOctrees(bool maySkip);
-
-  void expectPlansAndLag(UpdateFor, const std::function<void()>& expectPlans, Trace*);
-  void updateOctreeView();
-  bool anyOctreeLags() const;
-
-  /// Pairs whose result is outdated. Pairs that do not collide are not among them: their result is
-  /// empty.
-  std::span<PairRecord* const> outdatedPairs();
-
-  /// Returns `singleThread` if one thread has refitted the octrees and few candidates are expected:
-  /// other threads would wait for the data longer than they could help.
-  const Threads& threadsFor(std::span<PairRecord* const> records) const;
-
-  bool updateProxies(std::span<PairRecord* const> records);
-
+  /// Updates the octrees. An explicit call of the user publishes the statistics at once.
+  void update(SceneOctrees::UpdateFor);
   /// Results and statistics of the table's pairs stay as they are.
   void detect(SeparateSearches);
-
   /// Returns whether everything was finished. The token ends the search for contacts and for free
   /// motions, and nothing else.
   bool detect(StopScope::Token);
-
-  /// Completes the plans of pairs. Those for which no time is left become Urgency::isUnfinished.
-  void completePlans(std::span<PairRecord* const> records, StopScope::Token);
-  Frame::Context context(FrameStatistics&, Trace*) const;
-  void findContacts(std::span<PairRecord* const> records, FrameStatistics&, Trace*);
-  /// records: all that had to be found, in the order of urgency. The first call lists those that
-  /// are unfinished, and may throw; the second keeps their last answers.
-  void listUnfinished(std::span<PairRecord* const> records);
-  void keepUnfinished(std::span<PairRecord* const> records, FrameStatistics&) noexcept;
-  void commit(std::span<PairRecord* const> records) noexcept;
   /// Gives back what only earlier detections needed, after many that needed much less.
   void reviewMemory();
 
@@ -223,25 +149,21 @@ class OctreeBasedCD::Implementation::QuerySource : public SpatialQueries::Source
       : Source(std::make_shared<Pool>(all.budget)), m_all(&all) {}
 
   void close() { m_all = nullptr; }  ///< called when the OctreeBasedCD is destroyed
-  /// Updates the octrees unless they are up to date with the positions now.
-  void updateOctrees() {
+  /// Updates the octrees unless they hold for the positions now. onlyLagging: unless no boxes lag
+  /// behind the positions.
+  void updateOctrees(bool onlyLagging = false) {
     const auto lock = lockOctrees();
     const MemoryScope memory(budget(), MemoryStage::Octrees);
-    if (m_all->octreesState != m_all->geometries.state()) m_all->update();
-  }
-  /// The same if the boxes of an octree lag behind the positions.
-  void updateLagging() {
-    const auto lock = lockOctrees();
-    const MemoryScope memory(budget(), MemoryStage::Octrees);
-    if (m_all->anyOctreeLags()) m_all->update();
+    const SceneOctrees& held = m_all->octrees;
+    if (onlyLagging ? held.anyLags() : !held.areCurrent())
+      m_all->update(SceneOctrees::UpdateFor::Queries);
   }
   std::unique_lock<std::mutex> lockOctrees() { return std::unique_lock(m_octreesMutex); }
 
   std::uint64_t state() const override {
     if (!m_all) return 0;
     if (m_all->isBusy.load(std::memory_order_relaxed)) throwBusy();
-    const std::uint64_t now = m_all->geometries.state();
-    return m_all->octreesState == now ? now : 0;
+    return m_all->octrees.areCurrent() ? m_all->geometries.state() : 0;
   }
   const Body& at(GeometryId id) const override { return searchable(m_all->geometries.at(id).body); }
   std::size_t geometryCount() const override { return m_all->geometries.all().size(); }

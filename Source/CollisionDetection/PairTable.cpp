@@ -234,13 +234,12 @@ IndexLists PairTable::nearAtRest(GeometryId id, const MeshTopology& topology,
                         threads);
 }
 
-void PairTable::setNearAtRest(GeometryId id, IndexLists lists) noexcept {
+void PairTable::setNearAtRest(GeometryId id, IndexLists& lists) noexcept {
   m_byIds.find(keyOf(id, id))->second->filters.nearAtRest = std::move(lists);
 }
 
-ChangedLists PairTable::changeNearAtRest(GeometryId id, const EdgeChange& change,
-                                         std::span<const Eigen::Vector3d> rest,
-                                         const Threads& threads) {
+ChangedLists PairTable::nearAtRest(GeometryId id, const EdgeChange& change,
+                                   std::span<const Eigen::Vector3d> rest, const Threads& threads) {
   PairRecord& record = *m_byIds.at(keyOf(id, id));
   IndexLists& now = record.filters.nearAtRest;
   ChangedLists changed = verticesWithinAfterCut(record.a->body.mesh.topology, change, rest,

@@ -110,10 +110,10 @@ class PairTable {
   /// If so: the vertices that are near at rest, in a new topology. Throws TooLarge.
   IndexLists nearAtRest(GeometryId, const MeshTopology&, std::span<const Eigen::Vector3d> rest,
                         const Threads&) const;
-  void setNearAtRest(GeometryId, IndexLists) noexcept;
+  void setNearAtRest(GeometryId, IndexLists&) noexcept;
   /// If so: how a cut of the topology now changes them. rest: with new vertices. Throws TooLarge.
-  ChangedLists changeNearAtRest(GeometryId, const EdgeChange&,
-                                std::span<const Eigen::Vector3d> rest, const Threads&);
+  ChangedLists nearAtRest(GeometryId, const EdgeChange&, std::span<const Eigen::Vector3d> rest,
+                          const Threads&);
   void setNearAtRest(GeometryId, ChangedLists&) noexcept;
   void setPredicate(const GeometryTable&, GeometryId a, GeometryId b, ContactPredicate);
   /// Throws if there is a pair of the geometry with itself.

@@ -1,6 +1,7 @@
 // Part of CollisionDetection/OctreeBasedCDImplementation.h: saved states.
 #include "CollisionDetection/OctreeBasedCDImplementation.h"
 
+#include "CollisionDetection/Planning.h"
 #include "CollisionDetection/ProblemDescription.h"
 #include "Validity/TrustDescription.h"
 #include "Tracking/TrackingDescription.h"
@@ -318,7 +319,7 @@ std::vector<std::byte> OctreeBasedCD::Implementation::save() const {
     pairLine(file, pair, kVersion);
     describePair(file, *record, {revisionsOf(*record->a), revisionsOf(*record->b)});
   }
-  std::vector<FreeMotionSearch::Known> known = freeMotions.known();
+  std::vector<FreeMotionSearch::Known> known = detection.freeMotions().known();
   describeKnown(
       file, known, [&](const CollisionPair& pair) { return pairs.find(pair.a, pair.b); },
       [](const PairRecord& record) -> PairStates {
@@ -442,30 +443,22 @@ void OctreeBasedCD::Implementation::restore(std::span<const std::byte> state) {
   StateReader read(state, geometries, pairs, threads);
   FrameStatistics& next = read.statistics;
   geometries.prepareToRestore(read.geometries.size());
-  shownOctrees.trees.reserve(read.geometries.size());
+  octrees.reserve(read.geometries.size());
   const bool anyMade = std::any_of(read.geometries.begin(), read.geometries.end(),
                                    [](const auto& each) { return bool{each.made}; });
   auto pool = anyMade ? latestSnapshot.newPool(budget) : nullptr;
 
   // Nothing below throws.
-  selectedPairs.clear();
   for (const auto& [former, record] : read.successors) record->takeOver(*former);
   std::swap(pairs, read.pairs);
   geometries.restore(read.geometries, read.lastId, read.stepNumber);
   if (pool) latestSnapshot.setPool(std::move(pool));
-  for (const auto& record : pairs.records()) {
-    record->ask(planWithoutMotion(*record));
-    const CollisionData& data = record->last.data;
-    record->found.statistics.contacts = data.validity().atImpact + data.validity().atEnd;
-    next.contacts += record->found.statistics.contacts;
-    next.intersectingTriangles += data.intersectingTriangles().size();
-  }
-  freeMotions.restore(read.known);
+  for (const auto& record : pairs.records()) record->ask(planWithoutMotion(*record));
+  detection.countContacts(next);
+  detection.freeMotions().restore(read.known);
   audit.failures.clear();
   audit.frame = read.auditFrame;
-  octreesState = 0;
-  hasUpdates = false;
-  updateOctreeView();
+  octrees.restart();
   setStatistics(std::move(next));
 }
 

@@ -2,9 +2,11 @@
 
 #include "CollisionDetection/PairTable.h"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace palpate {
 
@@ -29,5 +31,23 @@ struct SeparateSearch : CountedObject {
 
 /// In the order of the table's pairs.
 using SeparateSearches = std::span<const std::unique_ptr<SeparateSearch>>;
+
+/// The pairs whose sides (PairSettings::rememberSides) do not know the crossings of a step that
+/// ends: something changed since the pair's last detection. Results and statistics stay as they
+/// are.
+class UnfollowedSides {
+ public:
+  /// Finds the pairs of this step. The caller detects the searches and calls follow().
+  SeparateSearches find(const PairTable&, std::uint64_t step);
+  /// The sides follow the crossings of the searches that were found last.
+  void follow(const PairTable&);
+  void releaseMemory() { m_searches.clear(); }
+
+ private:
+  SeparateSearches found() const { return std::span(m_searches).first(m_count); }
+
+  std::vector<std::unique_ptr<SeparateSearch>> m_searches;  ///< the first m_count; scratch
+  std::size_t m_count = 0;
+};
 
 }  // namespace palpate

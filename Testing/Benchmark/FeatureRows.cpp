@@ -36,8 +36,11 @@ class FeatureCandidates {
   void frame(const std::vector<Eigen::Vector3d>& before, const std::vector<Eigen::Vector3d>& now) {
     vertexTriangle = edgeEdge = 0;
     m_table.setPositions(m_id, before, now, m_threads);
-    m_table.updateOctrees({}, m_threads);
-    const GeometryOctree& tree = m_geometry.body.tree;
+    Body& body = m_geometry.body;
+    GeometryOctree& tree = body.tree;
+    const Revision topology = body.revisions.elements.topology;
+    const double scale = frameScale(tree.sampleFrame(body.mesh, topology));
+    tree.update(body.mesh, topology, scale, {}, m_threads);
     TreePair trees{&tree.octree(), &tree.octree()};
     setShift(trees, {0, 0, 0}, 0);
     m_floats = {tree.floats(), tree.floats(), nullptr, nullptr, trees.shiftLower, trees.shiftUpper};

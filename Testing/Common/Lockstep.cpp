@@ -31,13 +31,13 @@ template struct LockstepReach<&OctreeBasedCD::m_implementation>;
 class LooksOfTroubled {
  public:
   LooksOfTroubled(OctreeBasedCD& collisions, std::int64_t cancelAt) : m_collisions(collisions) {
-    insideOf(collisions).clock = [this, cancelAt] {
+    insideOf(collisions).timed.clock = [this, cancelAt] {
       const std::int64_t look = m_looks.fetch_add(1) + 1;
       if (look == cancelAt) m_collisions.cancelDetection();
       return Deadline::Time(std::chrono::microseconds(look));
     };
   }
-  ~LooksOfTroubled() { insideOf(m_collisions).clock = {}; }
+  ~LooksOfTroubled() { insideOf(m_collisions).timed.clock = {}; }
 
  private:
   OctreeBasedCD& m_collisions;

@@ -28,7 +28,7 @@ template struct Reached<&OctreeBasedCD::m_implementation>;
 class LooksClock {
  public:
   explicit LooksClock(OctreeBasedCD& collisions) {
-    implementationOf(collisions).clock = [this] {
+    implementationOf(collisions).timed.clock = [this] {
       return Deadline::Time(microseconds(m_looks.fetch_add(1) + 1));
     };
   }

@@ -29,8 +29,11 @@ struct QueryCase {
   QueryCase(Random& random, std::size_t size, double extent) {
     const Mesh mesh = testing::soup(random, size, extent);
     const GeometryId id = table.add(mesh.positions, mesh.triangles);
-    table.updateOctrees({}, Threads(1));
-    octree = &table.at(id).body.tree.octree();
+    Body& body = table.at(id).body;
+    const Revision topology = body.revisions.elements.topology;
+    const double scale = frameScale(body.tree.sampleFrame(body.mesh, topology));
+    body.tree.update(body.mesh, topology, scale, {}, Threads(1));
+    octree = &body.tree.octree();
     for (int ends = 1; ends <= 2; ++ends) {
       BoxMap& map = maps.emplace_back();
       for (int i = 0; i < ends; ++i) {
