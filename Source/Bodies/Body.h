@@ -36,6 +36,11 @@ struct BodyRevisions {
   ElementsState elements;
   Revision filter;
   Revision field;  ///< of all that is attached to the body
+
+  void changeElements() {
+    for (Revision* revision : {&elements.topology, &elements.enabled, &filter})
+      *revision = counter.next();
+  }
 };
 
 /// A body: elements, with an analytical shape or a distance field in their place where it has no

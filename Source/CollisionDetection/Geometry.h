@@ -67,6 +67,26 @@ struct SmallestHeight {
   bool isKnown() const { return count > 0 || value == std::numeric_limits<double>::infinity(); }
 };
 
+/// L: infinity without area.
+double heightOf(const Triangle&, std::span<const Eigen::Vector3d> rest);
+/// Of all triangles with area. In the body's frame, so that it does not depend on the transform.
+SmallestHeight smallestHeight(const MeshTopology&, std::span<const Eigen::Vector3d> rest) noexcept;
+
+/// The elements of a geometry with its shape at rest, and what follows from them.
+struct RestShape {
+  RestShape(CountedVector<Eigen::Vector3d> rest, MeshTopology, std::unique_ptr<Solid> = {});
+  /// Throws the errors of input.
+  static RestShape ofTetrahedra(const GeometryLabel&, std::span<const Eigen::Vector3d> positions,
+                                std::span<const Tetrahedron>);
+
+  CountedVector<Eigen::Vector3d> rest;
+  MeshTopology topology;
+  std::unique_ptr<Solid> solid;  ///< of a tetrahedral mesh
+  Positions::Body positions;     ///< at rest
+  SmallestHeight smallestHeight;
+  double shortEdge;  ///< L: one edge in 16 is shorter; 0 without edges
+};
+
 /// One geometry of an OctreeBasedCD. Each part has one owner, which keeps it consistent; the parts
 /// below use those above.
 struct Geometry : CountedObject {
@@ -91,6 +111,19 @@ struct Geometry : CountedObject {
   Buffer<RoundBox> elementBoxes;  ///< of the search for free motion that runs, or ran last
   bool skipsOctree = false;       ///< the update that runs, or ran last, leaves the octree outdated
 
+  /// New elements, at rest at both ends of the step.
+  void setElements(RestShape& shape) noexcept {
+    body.mesh.rest = std::move(shape.rest);
+    body.mesh.topology = std::move(shape.topology);
+    body.mesh.tags.clear();
+    body.solid = std::move(shape.solid);
+    body.tree.forgetElements();
+    body.revisions.changeElements();
+    step.start(body.mesh, std::move(shape.positions));
+    smallestHeight = shape.smallestHeight;
+    shortEdge = shape.shortEdge;
+    freeMotion.clear();
+  }
   operator GeometryLabel() const { return body; }
   /// The data for the choice of a method.
   GeometryInStep inStep() const;

@@ -5,16 +5,14 @@
 #include <palpate/OctreeBasedCD.h>
 #include <palpate/Settings.h>
 
-#include "CollisionDetection/Geometry.h"
+#include "CollisionDetection/GeometryBuilder.h"
+#include "CollisionDetection/GeometryCut.h"
 #include "Core/Threads.h"
 
-#include <array>
-#include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
-#include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace palpate {
@@ -24,39 +22,17 @@ struct ProblemGeometries {
   static GeometryId add(OctreeBasedCD&, const CollisionProblem::Geometry&);
 };
 
-/// What a saved state has of a geometry.
-struct SavedGeometry {
-  /// Without a field and a proxy. Positions are in the body's frame.
-  CollisionProblem::Geometry problem;
-  std::optional<std::array<double, 2>> field{};  ///< error bound and band of the one that it has
-  std::optional<SurfaceProxySettings> proxy{};
-  std::array<std::optional<Pose>, 3> poses{};  ///< now, before, detected; none: not placed
-  bool isDetectedOther = false;                ///< its positions are neither those now nor before
-  bool isDetectedBefore = false;               ///< else: they are those before
-  std::vector<Eigen::Vector3d> detected{};     ///< with isDetectedOther
-  bool isNew = false, bodyGiven = false, transformGiven = false;
-  StepSets sets{};
-  std::vector<double> freeMotion{};
-};
+struct RestoredGeometry;
 
 /// Geometries by id. Checks the user's input.
 class GeometryTable {
  public:
-  /// radii: none, one for all, or as many as positions.
-  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Triangle>,
-                 GeometryType = GeometryType::Triangles, std::span<const double> radii = {});
-  GeometryId addLines(std::span<const Eigen::Vector3d> positions, std::span<const Segment>,
-                      std::span<const double> radii);
-  GeometryId addPoints(std::span<const Eigen::Vector3d> positions, std::span<const double> radii);
-  GeometryId add(std::span<const Eigen::Vector3d> positions, std::span<const Tetrahedron>);
-  /// At rest at its positions, without what is attached. Of a tetrahedral mesh after cuts,
-  /// `triangles` is the surface.
-  GeometryId add(const CollisionProblem::Geometry&);
-  GeometryId add(const AnalyticalGeometry&);
-  GeometryId add(std::shared_ptr<const DistanceField>);
+  /// Makes what is added next. Throws if no id is left.
+  GeometryBuilder builder() const;
+  GeometryId add(std::unique_ptr<Geometry>);
   void attach(GeometryId, std::shared_ptr<const DistanceField>);  ///< null: detaches
   void attach(GeometryId, const std::optional<SurfaceProxySettings>&, const Threads&);
-  void remove(GeometryId);
+  std::unique_ptr<Geometry> remove(GeometryId);
   void setPositions(GeometryId, std::optional<std::span<const Eigen::Vector3d>> before,
                     std::span<const Eigen::Vector3d> now, const Threads&);
   void setSomePositions(GeometryId, std::size_t first, std::span<const Eigen::Vector3d> now,
@@ -68,20 +44,17 @@ class GeometryTable {
                     std::span<const Triangle>, const Preparation&);
   void setTetrahedra(GeometryId, std::span<const Eigen::Vector3d> positions,
                      std::span<const Tetrahedron>, const Preparation&);
-  using Ids = std::span<const std::uint32_t>;
-  /// New vertices of a cut, and where they are at rest; empty: there.
-  struct NewVertices {
-    std::span<const Eigen::Vector3d> positions, rest;
-  };
-  /// The same before a cut, with those at rest of new vertices.
-  using CutPreparation =
-      std::function<void(const EdgeChange&, std::span<const Eigen::Vector3d> rest)>;
-  /// Returns the ids of what was added.
-  std::vector<std::uint32_t> replaceTriangles(GeometryId, Ids removed, std::span<const Triangle>,
-                                              const NewVertices&, const CutPreparation&);
-  std::vector<std::uint32_t> replaceTetrahedra(GeometryId, Ids removed,
-                                               std::span<const Tetrahedron>, const NewVertices&,
-                                               const CutPreparation&);
+  /// Returns the ids of what was added: triangles, or tetrahedra of a tetrahedral mesh.
+  template <class Element>
+  std::vector<std::uint32_t> cut(GeometryId id, GeometryCut::Ids removed,
+                                 std::span<const Element> added,
+                                 const GeometryCut::NewVertices& vertices,
+                                 const GeometryCut::Preparation& prepare) {
+    GeometryCut cut(at(id), std::is_same_v<Element, Tetrahedron>, vertices);
+    auto ids = cut.replace(removed, added, prepare);
+    ++m_state;
+    return ids;
+  }
   void setName(GeometryId, std::string name);
   void setFilter(GeometryId, const CollisionFilter&);
   void setDisabled(GeometryId, std::span<const std::uint32_t> elements);
@@ -100,38 +73,15 @@ class GeometryTable {
   Geometry& at(GeometryId) const;    ///< throws UnknownGeometry
   std::span<const std::unique_ptr<Geometry>> all() const { return m_geometries; }
 
-  GeometryId nextId() const;  ///< of what is added next; throws if there are no more
-
-  /// A geometry of a saved state, checked. It is one of the table, which keeps what follows from
-  /// its elements, or a new one.
-  struct Restored {
-    Geometry* geometry = nullptr;
-    std::unique_ptr<Geometry> made{};
-    GeometryStep::State step{};
-    std::string name{};
-    CollisionFilter filter{};
-    CountedVector<std::uint32_t> tags{}, solidTags{};
-    std::optional<MeshTopology> topology{};  ///< where other elements are disabled
-    BodyRevisions revisions{};
-    Buffer<double> freeMotion{};
-    void apply() noexcept;  ///< all but `made`
-  };
-  /// Throws the errors of the calls that add and change geometries. NotAvailable if the table has
-  /// no such field.
-  Restored restored(const SavedGeometry&, const Threads&) const;
+  /// Makes a geometry of a saved state.
+  GeometryBuilder restorer(GeometryId) const;
   /// The table becomes that of a saved state. Call prepareToRestore() before.
-  void prepareToRestore(std::size_t count);
-  void restore(std::span<Restored>, std::uint32_t nextId, std::uint64_t stepNumber) noexcept;
+  void prepareToRestore(std::size_t count) { m_geometries.reserve(count); }
+  void restore(std::span<RestoredGeometry>, std::uint32_t nextId,
+               std::uint64_t stepNumber) noexcept;
 
  private:
-  /// A geometry with its topology, and positions at both ends of the step; not yet in the table.
-  std::unique_ptr<Geometry> make(CountedVector<Eigen::Vector3d> rest, MeshTopology) const;
-  GeometryId add(std::unique_ptr<Geometry>);
-  std::unique_ptr<Geometry> make(const SavedGeometry&, const Threads&) const;
-  static void setTopology(Geometry&, CountedVector<Eigen::Vector3d> rest, MeshTopology,
-                          std::unique_ptr<Solid>, const Preparation&);
-  struct Cut;
-  static void apply(Cut&, const CutPreparation&);
+  void setElements(Geometry&, RestShape, const Preparation&);
 
   CountedVector<std::unique_ptr<Geometry>> m_geometries;  ///< ascending ids
   std::uint32_t m_nextId = 0;

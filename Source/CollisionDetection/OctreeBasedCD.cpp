@@ -62,26 +62,26 @@ OctreeBasedCD::~OctreeBasedCD() = default;
 GeometryId OctreeBasedCD::addTriangleMesh(std::span<const Eigen::Vector3d> positions,
                                           std::span<const Triangle> triangles) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->withinLimit([&] { return all->geometries.add(positions, triangles); });
+  return all->add([&](const auto& build) { return build.triangles(positions, triangles); });
 }
 
 GeometryId OctreeBasedCD::addTetrahedralMesh(std::span<const Eigen::Vector3d> positions,
                                              std::span<const Tetrahedron> tetrahedra) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->withinLimit([&] { return all->geometries.add(positions, tetrahedra); });
+  return all->add([&](const auto& build) { return build.tetrahedra(positions, tetrahedra); });
 }
 
 GeometryId ProblemGeometries::add(OctreeBasedCD& collisions,
                                   const CollisionProblem::Geometry& geometry) {
   const OctreeBasedCD::Implementation::ChangeGuard all(collisions.m_implementation);
-  return all->withinLimit([&] { return all->geometries.add(geometry); });
+  return all->add([&](const auto& build) { return build.problem(geometry); });
 }
 
 GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions,
                                       std::span<const Segment> segments, double radius) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->withinLimit([&] {
-    return all->geometries.addLines(positions, segments, {&radius, 1});
+  return all->add([&](const auto& build) {
+    return build.lines(positions, segments, {&radius, 1});
   });
 }
 
@@ -89,30 +89,34 @@ GeometryId OctreeBasedCD::addLineMesh(std::span<const Eigen::Vector3d> positions
                                       std::span<const Segment> segments,
                                       std::span<const double> radii) {
   const Implementation::ChangeGuard all(m_implementation);
-  checkOnePerVertex(all->geometries.nextId(), positions, radii);
-  return all->withinLimit([&] { return all->geometries.addLines(positions, segments, radii); });
+  return all->add([&](const auto& build) {
+    checkOnePerVertex(build.id(), positions, radii);
+    return build.lines(positions, segments, radii);
+  });
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions, double radius) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->withinLimit([&] { return all->geometries.addPoints(positions, {&radius, 1}); });
+  return all->add([&](const auto& build) { return build.points(positions, {&radius, 1}); });
 }
 
 GeometryId OctreeBasedCD::addPointSet(std::span<const Eigen::Vector3d> positions,
                                       std::span<const double> radii) {
   const Implementation::ChangeGuard all(m_implementation);
-  checkOnePerVertex(all->geometries.nextId(), positions, radii);
-  return all->withinLimit([&] { return all->geometries.addPoints(positions, radii); });
+  return all->add([&](const auto& build) {
+    checkOnePerVertex(build.id(), positions, radii);
+    return build.points(positions, radii);
+  });
 }
 
 GeometryId OctreeBasedCD::addAnalyticalGeometry(const AnalyticalGeometry& geometry) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->withinLimit([&] { return all->geometries.add(geometry); });
+  return all->add([&](const auto& build) { return build.shape(geometry); });
 }
 
 GeometryId OctreeBasedCD::addDistanceField(std::shared_ptr<const DistanceField> field) {
   const Implementation::ChangeGuard all(m_implementation);
-  return all->geometries.add(std::move(field));
+  return all->add([&](const auto& build) { return build.field(field); });
 }
 
 void OctreeBasedCD::attachDistanceField(GeometryId mesh,
@@ -197,8 +201,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTriangles(
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
   return all->changeTopology<EdgeChange>(geometry, [&](const auto& prepare) {
-    return all->geometries.replaceTriangles(geometry, removed, added, {newPositions, rest},
-                                            prepare);
+    return all->geometries.cut(geometry, removed, added, {newPositions, rest}, prepare);
   });
 }
 
@@ -207,8 +210,7 @@ std::vector<std::uint32_t> OctreeBasedCD::replaceTetrahedra(
     std::span<const Eigen::Vector3d> newPositions, std::span<const Eigen::Vector3d> rest) {
   const Implementation::ChangeGuard all(m_implementation);
   return all->changeTopology<EdgeChange>(geometry, [&](const auto& prepare) {
-    return all->geometries.replaceTetrahedra(geometry, removed, added, {newPositions, rest},
-                                             prepare);
+    return all->geometries.cut(geometry, removed, added, {newPositions, rest}, prepare);
   });
 }
 

@@ -76,6 +76,12 @@ struct OctreeBasedCD::Implementation {
     }
   }
 
+  /// Adds the geometry that call(builder) returns.
+  template <class F>
+  GeometryId add(F&& call) {
+    return withinLimit([&] { return geometries.add(call(geometries.builder())); });
+  }
+
   /// Returns call(prepare), which sets the topology of a geometry, or cuts it. Change: what is
   /// prepared, MeshTopology or EdgeChange.
   template <class Change, class F>

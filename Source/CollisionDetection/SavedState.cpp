@@ -3,6 +3,7 @@
 
 #include "CollisionDetection/Planning.h"
 #include "CollisionDetection/ProblemDescription.h"
+#include "CollisionDetection/RestoredGeometry.h"
 #include "Validity/TrustDescription.h"
 #include "Tracking/TrackingDescription.h"
 #include "Contact/ContactLists.h"
@@ -248,7 +249,7 @@ SavedRevisions revisionsOf(const Geometry& geometry) {
 }
 
 /// Of a geometry that restore() will change so.
-SavedRevisions revisionsOf(const GeometryTable::Restored& restored) {
+SavedRevisions revisionsOf(const RestoredGeometry& restored) {
   Geometry& geometry = *restored.geometry;
   SavedRevisions saved = revisionsOf(geometry);
   const BodyRevisions& revisions = restored.revisions;
@@ -359,7 +360,7 @@ class StateReader {
 
   std::uint32_t lastId = 0;
   std::uint64_t stepNumber = 0, auditFrame = 0;
-  std::vector<GeometryTable::Restored> geometries;  ///< ascending ids
+  std::vector<RestoredGeometry> geometries;  ///< ascending ids
   PairTable pairs;
   std::vector<std::pair<PairRecord*, PairRecord*>> successors;  ///< a former pair, and its own
   std::vector<FreeMotionSearch::Known> known;
@@ -388,10 +389,10 @@ class StateReader {
       m_file.need(static_cast<std::uint32_t>(id) < lastId &&
                       (geometries.empty() || geometries.back().geometry->body.id < id),
                   "the id of a geometry is out of order");
-      geometries.push_back(checked([&] { return m_table.restored(saved, m_threads); }));
+      checked([&] { geometries.emplace_back(saved, m_table, m_threads); });
     }
   }
-  const GeometryTable::Restored& find(std::uint32_t id) {
+  const RestoredGeometry& find(std::uint32_t id) {
     const auto found = std::lower_bound(
         geometries.begin(), geometries.end(), GeometryId{id},
         [](const auto& restored, GeometryId i) { return restored.geometry->body.id < i; });

@@ -28,7 +28,8 @@ class FeatureCandidates {
  public:
   FeatureCandidates(const Workload& workload, bool swept)
       : m_threads(1),
-        m_id(m_table.add(workload.frames[0][0], workload.task.meshes[0])),
+        m_id(m_table.add(
+            m_table.builder().triangles(workload.frames[0][0], workload.task.meshes[0]))),
         m_geometry(m_table.at(m_id)) {
     m_geometry.body.tree.setSwept(swept);
   }

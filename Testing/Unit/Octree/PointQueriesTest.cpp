@@ -28,7 +28,7 @@ struct QueryCase {
 
   QueryCase(Random& random, std::size_t size, double extent) {
     const Mesh mesh = testing::soup(random, size, extent);
-    const GeometryId id = table.add(mesh.positions, mesh.triangles);
+    const GeometryId id = table.add(table.builder().triangles(mesh.positions, mesh.triangles));
     Body& body = table.at(id).body;
     const Revision topology = body.revisions.elements.topology;
     const double scale = frameScale(body.tree.sampleFrame(body.mesh, topology));

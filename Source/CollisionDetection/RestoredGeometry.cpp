@@ -1,8 +1,7 @@
-// Part of CollisionDetection/GeometryTable.h: the geometries of a saved state.
-#include "CollisionDetection/GeometryTable.h"
+#include "CollisionDetection/RestoredGeometry.h"
 
-#include "CollisionDetection/GeometryChecks.h"
 #include "CollisionDetection/DiagnosticsInterface.h"
+#include "CollisionDetection/GeometryChecks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -110,82 +109,72 @@ GeometryStep::State restoredStep(const SavedGeometry& saved, Geometry& geometry,
   return step;
 }
 
-}  // namespace
-
-std::unique_ptr<Geometry> GeometryTable::make(const SavedGeometry& saved,
-                                              const Threads& threads) const {
+/// With what is attached.
+std::unique_ptr<Geometry> make(const SavedGeometry& saved, const GeometryTable& table,
+                               const Threads& threads) {
   const CollisionProblem::Geometry& given = saved.problem;
-  const GeometryId id = given.id;
+  const GeometryBuilder build = table.restorer(given.id);
+  const auto field = saved.field ? table.at(given.id).body.field : nullptr;
+  if (given.type == GeometryType::Field) return build.field(field);
   GeometryTable one;
-  one.m_nextId = static_cast<std::uint32_t>(id);
-  one.m_restores = m_restores + 1;
-  std::shared_ptr<const DistanceField> field;
-  if (saved.field) field = find(id)->body.field;
-  if (given.type == GeometryType::Field) {
-    one.add(field);
-  } else {
-    one.add(given);
-    if (field || saved.proxy) {
-      one.setPositions(id, {}, given.now, threads);
-      one.setDisabled(id, given.disabled);
-    }
-    if (field) one.attach(id, field);
-    if (saved.proxy) one.attach(id, saved.proxy, threads);
+  const GeometryId id = one.add(build.problem(given));
+  if (field || saved.proxy) {
+    one.setPositions(id, {}, given.now, threads);
+    one.setDisabled(id, given.disabled);
   }
-  return std::move(one.m_geometries.front());
+  if (field) one.attach(id, field);
+  if (saved.proxy) one.attach(id, saved.proxy, threads);
+  return one.remove(id);
 }
 
-GeometryTable::Restored GeometryTable::restored(const SavedGeometry& saved,
-                                                const Threads& threads) const {
+}  // namespace
+
+RestoredGeometry::RestoredGeometry(const SavedGeometry& saved, const GeometryTable& table,
+                                   const Threads& threads) {
   const CollisionProblem::Geometry& given = saved.problem;
-  Restored result;
-  result.geometry = find(given.id);
+  geometry = table.find(given.id);
   if (saved.field) {
-    const DistanceField* const field =
-        result.geometry ? result.geometry->body.field.get() : nullptr;
+    const DistanceField* const field = geometry ? geometry->body.field.get() : nullptr;
     if (!field || *saved.field != std::array{field->errorBound(), field->band()})
       throw Error(ErrorCode::NotAvailable,
                   "a saved state has no distance fields: " + nameOf(given.id) +
                       " must have the one that it had",
                   given.id);
   }
-  if (!result.geometry || !isSameBody(*result.geometry, saved)) {
-    result.made = make(saved, threads);
-    result.geometry = result.made.get();
+  if (!geometry || !isSameBody(*geometry, saved)) {
+    made = make(saved, table, threads);
+    geometry = made.get();
   }
-  Geometry& geometry = *result.geometry;
-  Body& body = geometry.body;
+  Body& body = geometry->body;
   checkName(body, given.name);
-  checkFilter(geometry, given.filter);
-  checkElements(geometry, given.disabled);
+  checkFilter(*geometry, given.filter);
+  checkElements(*geometry, given.disabled);
   checkTags(body, given.tags.size());
-  result.name = given.name;
-  result.filter = given.filter;
-  result.tags.assign(given.tags.begin(), given.tags.end());
+  name = given.name;
+  filter = given.filter;
+  tags.assign(given.tags.begin(), given.tags.end());
   if (body.solid) {
-    result.solidTags = std::move(result.tags);
-    result.tags = tagsOfSurface(body.solid->topology, result.solidTags);
+    solidTags = std::move(tags);
+    tags = tagsOfSurface(body.solid->topology, solidTags);
   }
   BodyRevisions& now = body.revisions;
-  result.revisions = now;
-  if (!(given.filter == geometry.filter &&
-        haveEqualBits<std::uint32_t>(result.tags, body.mesh.tags) &&
-        (!body.solid || haveEqualBits<std::uint32_t>(result.solidTags, body.solid->tags))))
-    result.revisions.filter = now.counter.next();
+  revisions = now;
+  if (!(given.filter == geometry->filter && haveEqualBits<std::uint32_t>(tags, body.mesh.tags) &&
+        (!body.solid || haveEqualBits<std::uint32_t>(solidTags, body.solid->tags))))
+    revisions.filter = now.counter.next();
   if (!areEqual(given.disabled, body.mesh.topology.disabled)) {
-    result.topology = body.mesh.topology;
-    result.topology->disable(given.disabled);
-    result.revisions.elements.enabled = now.counter.next();
+    topology = body.mesh.topology;
+    topology->disable(given.disabled);
+    revisions.elements.enabled = now.counter.next();
   }
-  result.step = restoredStep(saved, geometry, threads);
-  if (!saved.freeMotion.empty() && saved.freeMotion.size() != geometry.freeMotionCount())
+  step = restoredStep(saved, *geometry, threads);
+  if (!saved.freeMotion.empty() && saved.freeMotion.size() != geometry->freeMotionCount())
     throw Error(ErrorCode::InvalidSettings,
-                nameOf(geometry) + ": the number of free motions is wrong", body.id);
-  result.freeMotion.assign(saved.freeMotion.begin(), saved.freeMotion.end());
-  return result;
+                nameOf(*geometry) + ": the number of free motions is wrong", body.id);
+  freeMotion.assign(saved.freeMotion.begin(), saved.freeMotion.end());
 }
 
-void GeometryTable::Restored::apply() noexcept {
+void RestoredGeometry::apply() noexcept {
   Body& body = geometry->body;
   TriangleMesh& mesh = body.mesh;
   body.name = std::move(name);
@@ -199,25 +188,6 @@ void GeometryTable::Restored::apply() noexcept {
   body.revisions.counter = counter;
   geometry->step.restore(mesh, body.shape ? &*body.shape : nullptr, step);
   geometry->freeMotion = std::move(freeMotion);
-}
-
-void GeometryTable::prepareToRestore(std::size_t count) { m_geometries.reserve(count); }
-
-void GeometryTable::restore(std::span<Restored> all, std::uint32_t nextId,
-                            std::uint64_t stepNumber) noexcept {
-  PALPATE_ASSERT(m_geometries.capacity() >= all.size());
-  for (Restored& each : all) {
-    each.apply();
-    if (!each.made)
-      for (auto& own : m_geometries)
-        if (own.get() == each.geometry) each.made = std::move(own);
-  }
-  m_geometries.clear();
-  for (Restored& each : all) m_geometries.push_back(std::move(each.made));
-  m_nextId = nextId;
-  m_stepNumber = stepNumber;
-  ++m_restores;
-  ++m_state;
 }
 
 }  // namespace palpate
