@@ -54,10 +54,72 @@ void forEachAround(F&& f) {
         }
 }
 
-class Search {
+/// Where two triangles are nearest to each other.
+struct NearestPoints {
+  Vector3d weightsA, weightsB;
+  double distance = kInfinity;
+};
+NearestPoints nearestPoints(const Corners& a, const Corners& b) {
+  NearestPoints best;
+  const auto take = [&](double distance, const Vector3d& ofA, const Vector3d& ofB) {
+    if (distance < best.distance) best = {ofA, ofB, distance};
+  };
+  const auto onEdge = [](int i, double weight) {
+    return Vector3d((1.0 - weight) * Vector3d::Unit(i) + weight * Vector3d::Unit((i + 1) % 3));
+  };
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const VertexTriangleDistance ofA = finiteVertexTriangleDistance(a[k], b[0], b[1], b[2]),
+                                 ofB = finiteVertexTriangleDistance(b[k], a[0], a[1], a[2]);
+    take(ofA.distance, Vector3d::Unit(i), ofA.weights);
+    take(ofB.distance, ofB.weights, Vector3d::Unit(i));
+  }
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const auto k = static_cast<std::size_t>(i), l = static_cast<std::size_t>(j);
+      const EdgeEdgeDistance both =
+          finiteEdgeEdgeDistance(a[k], a[(k + 1) % 3], b[l], b[(l + 1) % 3]);
+      take(both.distance, onEdge(i, both.weightA), onEdge(j, both.weightB));
+    }
+  return best;
+}
+
+/// weights: on the triangle that meets last, in its place before the translation.
+SurfacePoint pointOf(const BodyPair& pair, const Translation& at, bool ofA,
+                     const Vector3d& weights) {
+  const std::uint32_t element = ofA ? at.last.elementA : at.last.elementB;
+  const Body& geometry = pair.geometry(ofA);
+  const Triangle& vertices = geometry.mesh.topology.elements[element];
+  Vector3d position = Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    position += weights[i] * pair.vertices(ofA).positions[vertices[static_cast<std::size_t>(i)]];
+  return {geometry.id, element, vertices, weights, position, at.depth};
+}
+
+/// Along a direction out of the whole hull of b, and `slack` further.
+Translation leavingHull(const BodyPair& pair, Vector3d direction, double slack) {
+  if (direction == Vector3d::Zero()) direction = Vector3d::UnitX();
+  const auto lastOf = [&](bool ofA, const Vector3d& way) {
+    const BodyVertices& own = pair.vertices(ofA);
+    std::uint32_t best = own.parts.front();
+    for (std::uint32_t v = 0; v < own.positions.size(); ++v)
+      if (own.triangleOf[v] != kNoElement &&
+          way.dot(own.positions[v]) > way.dot(own.positions[best]))
+        best = v;
+    return best;
+  };
+  const std::uint32_t a = lastOf(true, -direction), b = lastOf(false, direction);
+  const BodyVertices &ofA = pair.vertices(true), &ofB = pair.vertices(false);
+  return {direction,
+          direction.dot(ofB.positions[b] - ofA.positions[a]) + slack,
+          {ofA.triangleOf[a], ofB.triangleOf[b], direction},
+          true};
+}
+
+class PenetrationSearch {
  public:
-  Search(const BodyPair& pair, OverlapTest& test, PenetrationScratch& scratch,
-         const PenetrationEffort& effort)
+  PenetrationSearch(const BodyPair& pair, OverlapTest& test, PenetrationScratch& scratch,
+                    const PenetrationEffort& effort)
       : m_pair(pair),
         m_test(test),
         m_scratch(scratch),
@@ -87,7 +149,7 @@ class Search {
       findInside(false, m_scratch.insideB);
       searchDirections();
     }
-    if (!m_best.separates) leaveHull(m_hulls.direction);
+    if (!m_best.separates) m_best = leavingHull(m_pair, m_hulls.direction, m_mostSlack);
     Penetration out = result();
     out.minimal = isMinimal();
     return out;
@@ -318,78 +380,20 @@ class Search {
     if (!m_areConvex) m_areConvex = isConvex(m_pair, true) && isConvex(m_pair, false);
     return *m_areConvex;
   }
-  /// Where the triangles that meet last are nearest to each other afterwards.
-  struct NearestPoints {
-    Vector3d weightsA, weightsB;
-    double distance = kInfinity;
-  };
-  NearestPoints nearestPoints() const {
-    const Corners a = m_pair.cornersOfA(m_best.last.elementA, m_best.depth * m_best.direction),
-                  b = m_pair.cornersOfB(m_best.last.elementB);
-    NearestPoints best;
-    const auto take = [&](double distance, const Vector3d& ofA, const Vector3d& ofB) {
-      if (distance < best.distance) best = {ofA, ofB, distance};
-    };
-    const auto onEdge = [](int i, double weight) {
-      return Vector3d((1.0 - weight) * Vector3d::Unit(i) + weight * Vector3d::Unit((i + 1) % 3));
-    };
-    for (int i = 0; i < 3; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const VertexTriangleDistance ofA = finiteVertexTriangleDistance(a[k], b[0], b[1], b[2]),
-                                   ofB = finiteVertexTriangleDistance(b[k], a[0], a[1], a[2]);
-      take(ofA.distance, Vector3d::Unit(i), ofA.weights);
-      take(ofB.distance, ofB.weights, Vector3d::Unit(i));
-    }
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        const auto k = static_cast<std::size_t>(i), l = static_cast<std::size_t>(j);
-        const EdgeEdgeDistance both =
-            finiteEdgeEdgeDistance(a[k], a[(k + 1) % 3], b[l], b[(l + 1) % 3]);
-        take(both.distance, onEdge(i, both.weightA), onEdge(j, both.weightB));
-      }
-    return best;
-  }
-  SurfacePoint pointOf(bool ofA, const Vector3d& weights) const {
-    const std::uint32_t element = ofA ? m_best.last.elementA : m_best.last.elementB;
-    const Body& geometry = m_pair.geometry(ofA);
-    const Triangle& vertices = geometry.mesh.topology.elements[element];
-    Vector3d position = Vector3d::Zero();
-    for (int i = 0; i < 3; ++i)
-      position +=
-          weights[i] * m_pair.vertices(ofA).positions[vertices[static_cast<std::size_t>(i)]];
-    return {geometry.id, element, vertices, weights, position, m_best.depth};
-  }
   Penetration result() {
     if (m_best.last.elementA == kNoElement) {  // the bodies overlap by less than kInset
       const auto& [a, b] = firstIntersecting();
       m_best.last = {a, b, m_best.direction};
     }
-    const NearestPoints points = nearestPoints();
+    const NearestPoints points =
+        nearestPoints(m_pair.cornersOfA(m_best.last.elementA, m_best.depth * m_best.direction),
+                      m_pair.cornersOfB(m_best.last.elementB));
     return {true,
             m_best.direction,
             m_best.depth,
-            pointOf(true, points.weightsA),
-            pointOf(false, points.weightsB),
+            pointOf(m_pair, m_best, true, points.weightsA),
+            pointOf(m_pair, m_best, false, points.weightsB),
             false};
-  }
-  /// Leaves the whole hull of b along a direction.
-  void leaveHull(Vector3d direction) {
-    if (direction == Vector3d::Zero()) direction = Vector3d::UnitX();
-    const auto lastOf = [&](bool ofA, const Vector3d& way) {
-      const BodyVertices& own = m_pair.vertices(ofA);
-      std::uint32_t best = own.parts.front();
-      for (std::uint32_t v = 0; v < own.positions.size(); ++v)
-        if (own.triangleOf[v] != kNoElement &&
-            way.dot(own.positions[v]) > way.dot(own.positions[best]))
-          best = v;
-      return best;
-    };
-    const std::uint32_t a = lastOf(true, -direction), b = lastOf(false, direction);
-    const BodyVertices &ofA = m_pair.vertices(true), &ofB = m_pair.vertices(false);
-    m_best.direction = direction;
-    m_best.depth = direction.dot(ofB.positions[b] - ofA.positions[a]) + m_mostSlack;
-    m_best.last = {ofA.triangleOf[a], ofB.triangleOf[b], direction};
-    m_best.separates = true;
   }
 
   const BodyPair& m_pair;
@@ -428,7 +432,7 @@ Penetration penetrationOf(const BodyPair& pair, PenetrationScratch& scratch,
   OverlapTest test(pair, scratch.overlap);
   if (test.find(Vector3d::Zero(), &scratch.intersecting) == OverlapTest::Result::Apart)
     return apart(pair.geometry(true).id, pair.geometry(false).id);
-  return Search(pair, test, scratch, effort).run();
+  return PenetrationSearch(pair, test, scratch, effort).run();
 }
 
 }  // namespace palpate
