@@ -1,6 +1,5 @@
 #include "Bodies/GeometryOctree.h"
 
-#include "Mesh/TriangleBoxes.h"
 #include "Core/Assert.h"
 #include "Core/MemoryBudget.h"
 #include "Core/Stopwatch.h"
@@ -12,18 +11,6 @@
 namespace palpate {
 
 namespace {
-
-constexpr std::size_t kGrain = 1024;
-constexpr std::size_t kTrianglesPerGroup = 1024;  ///< for bounds(), before there are nodes
-constexpr std::size_t kGroupGrain = 128;
-
-void computeFloats(std::span<const Eigen::Vector3d> positions, const FloatFrame& frame,
-                   Buffer<FloatPoint>& floats, const Threads& threads) {
-  resizeSparingly(floats, positions.size());
-  threads.forChunks(positions.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-    toFloats(positions.subspan(from, to - from), frame, floats.data() + from);
-  });
-}
 
 /// Sets the bounds of the element at a place, from direction 3 on; the first three are its box.
 /// A bound is rounded outward twice. Each coordinate of a vertex has an error of 2^-53 of it, and
@@ -77,7 +64,7 @@ GeometryOctree::Strategy GeometryOctree::strategyFor(const TriangleMesh& mesh, d
                                                      const Lag& lag) const {
   constexpr std::size_t kFew = 8;  // Few are at most one vertex in this many.
   if (settings.update != OctreeUpdate::Auto || !m_isBuilt || m_slices.isLoose() || m_swept ||
-      m_treeSwept || mesh.now.isPlaced() || m_frame.scale != scale)
+      m_floats.isSwept() || mesh.now.isPlaced() || m_frame.scale != scale)
     return Strategy::Whole;
   const auto changed = mesh.now.changesSince(m_lastPositions);
   if (!m_isLagging && changed && changed->size() * kFew <= mesh.now.size())
@@ -141,34 +128,28 @@ void GeometryOctree::cut(std::span<const std::uint32_t> removed,
 void GeometryOctree::fitWhole(const TriangleMesh& mesh, double scale,
                               const OctreeSettings& settings, const Threads& threads,
                               bool keepsOrder) {
-  m_frame = m_floatsFrame = {m_sample.median, scale};
+  m_frame = {m_sample.median, scale};
   m_spread = m_sample.spread;
-  m_treeSwept = m_swept && !mesh.now.hasSameBody(mesh.before);
   Stopwatch watch;
-  computeFloats(mesh.now.body(), m_frame, m_floats, threads);
-  if (m_treeSwept) computeFloats(mesh.before.body(), m_frame, m_floatsBefore, threads);
+  m_floats.set(mesh, m_frame, m_swept && !mesh.now.hasSameBody(mesh.before), threads);
   boxMilliseconds += watch.lap();
+  const OrderedElements::Boxes boxes{m_floats, m_octree, boxMilliseconds, octreeMilliseconds};
   const std::size_t size = mesh.topology.count();
-  if (size == 0) {
-    m_octree.reset(0);
-    m_ordered.start(0);
-  } else {
-    bool fits = false;
-    if (keepsOrder && settings.update == OctreeUpdate::Auto) {
-      fitBoxes(mesh, settings, threads, false);
-      lastUpdate = LooseOctree::Update::Refitted;
-      fits = m_octree.isTight();
-    }
-    if (!fits) {
-      if (!keepsOrder) {
-        m_octree.reset(size, mesh.topology.removed);
-        m_ordered.start(size);
-        m_ordered.fill(mesh.topology, m_octree, 0, size);
-      }
-      rebuild(mesh, settings, threads);
-      fitBoxes(mesh, settings, threads, true);
-      lastUpdate = LooseOctree::Update::Rebuilt;
-    }
+  bool fits = size == 0;
+  if (!keepsOrder || size == 0) {
+    m_octree.reset(size, mesh.topology.removed);
+    m_ordered.start(size);
+    m_ordered.fill(mesh.topology, m_octree, 0, size);
+  } else if (settings.update == OctreeUpdate::Auto) {
+    m_ordered.fit(boxes, settings, threads);
+    lastUpdate = LooseOctree::Update::Refitted;
+    fits = m_octree.isTight();
+  }
+  if (!fits) {
+    m_ordered.build(boxes, m_spread * m_frame.scale, settings, threads);
+    m_cuts.setBuilt();
+    m_ordered.fit(boxes, settings, threads, &mesh.topology);
+    lastUpdate = LooseOctree::Update::Rebuilt;
   }
   m_slices.setFitted();
   ++m_updates;
@@ -179,18 +160,7 @@ void GeometryOctree::fitChanged(const TriangleMesh& mesh, const Threads& threads
   const auto changed = mesh.now.changesSince(m_lastPositions);
   PALPATE_ASSERT(changed.has_value());
   Stopwatch watch;
-  const auto convert = [&](std::size_t begin, std::size_t end) {
-    threads.forChunks(end - begin, kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
-      toFloats(mesh.now.body().subspan(begin + from, to - from), m_frame,
-               m_floats.data() + begin + from);
-    });
-  };
-  const std::size_t known = m_floats.size(), size = mesh.now.size();
-  PALPATE_ASSERT(known <= size);
-  if (m_floats.capacity() < size) m_floats.reserve(withSpare(size));
-  m_floats.resize(size);
-  convert(changed->begin, changed->end);
-  convert(known, size);
+  m_floats.follow(mesh, *changed, threads);
   m_slices.fitChanged(sliced(mesh), *changed);
   lastUpdate = LooseOctree::Update::Refitted;
   ++m_updates;
@@ -200,24 +170,14 @@ void GeometryOctree::fitChanged(const TriangleMesh& mesh, const Threads& threads
 /// Brings the floats up to date, and fits the boxes of some slices.
 void GeometryOctree::fitLagging(const TriangleMesh& mesh, const Lag& allowed,
                                 const Threads& threads) {
-  PALPATE_ASSERT(!m_treeSwept);
+  PALPATE_ASSERT(!m_floats.isSwept());
   Stopwatch watch;
-  m_floatsFrame = {m_sample.median, m_frame.scale};
-  computeFloats(mesh.now.body(), m_floatsFrame, m_floats, threads);
+  m_floats.set(mesh, {m_sample.median, m_frame.scale}, false, threads);
   if (m_slices.fitLagging(sliced(mesh), *allowed.motion, allowed.most) > 0) {
     lastUpdate = LooseOctree::Update::Refitted;
     ++m_updates;
   }
   boxMilliseconds += watch.lap();
-}
-
-double GeometryOctree::reach() const {
-  PALPATE_ASSERT(m_octree.isBuilt());
-  return m_octree.box(0).reach() / m_frame.scale;
-}
-
-bool GeometryOctree::isCompact() const {
-  return m_octree.isBuilt() && reach() <= 0x1p20 * m_spread;
 }
 
 bool GeometryOctree::needsDops(const TriangleMesh& mesh, OctreeBounds bounds) const {
@@ -231,6 +191,7 @@ void GeometryOctree::updateDops(const TriangleMesh& mesh, OctreeBounds bounds,
   if (!needsDops(mesh, bounds)) return;
   const int count = directionCount(bounds);
   OctreeDops& dops = m_octree.startDops(count);
+  constexpr std::size_t kGrain = 1024;
   threads.forChunks(m_ordered.size(), kGrain, [&](std::size_t, std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i)
       setDop(mesh.now.body(), ordered()[i], m_frame, count, i, dops);
@@ -244,10 +205,9 @@ void GeometryOctree::copy(const GeometryOctree& other) {
   const bool isSameLayout = isValid() && m_octree.layout() == other.m_octree.layout();
   m_treeVersion.invalidate();
   m_isBuilt = false;
-  m_frame = m_floatsFrame = other.m_frame;
+  m_frame = other.m_frame;
   m_spread = other.m_spread;
-  resizeSparingly(m_floats, other.m_floats.size());
-  std::copy(other.m_floats.begin(), other.m_floats.end(), m_floats.begin());
+  m_floats.copy(other.m_floats);
   m_octree.copy(other.m_octree);
   if (!isSameLayout) {
     m_ordered.start(other.m_ordered.size());
@@ -261,78 +221,22 @@ void GeometryOctree::releaseMemory() {
   m_stars = {};
   m_cuts.releaseMemory();
   m_slices.releaseMemory();
-  m_bounds = {};
-  if (!m_treeSwept) m_floatsBefore.clear();
-  releaseSpare(m_floats);
-  releaseSpare(m_floatsBefore);
+  m_floats.releaseMemory();
   m_ordered.releaseMemory();
   m_octree.releaseMemory();
-}
-
-/// Computes the boxes of the triangles in m_ordered, and those of the groups. reordered: first
-/// brings m_ordered into the octree's order.
-void GeometryOctree::computeBoxes(const TriangleMesh& mesh, std::span<const std::uint32_t> groups,
-                                  FloatBox* groupBoxes, std::size_t grain, const Threads& threads,
-                                  bool reordered) {
-  PALPATE_ASSERT(groups.front() == 0 && groups.back() == m_ordered.size());
-  threads.forChunks(groups.size() - 1, grain, [&](std::size_t, std::size_t from, std::size_t to) {
-    if (reordered) m_ordered.fill(mesh.topology, m_octree, groups[from], groups[to]);
-    triangleBoxes(m_floats.data(), m_treeSwept ? m_floatsBefore.data() : nullptr,
-                  ordered().data() + groups[from], groups.subspan(from, to - from + 1),
-                  m_octree.boxes(), groupBoxes + from);
-  });
-}
-
-/// Computes the boxes of the triangles in m_ordered, and returns the bounds of all.
-FloatBox GeometryOctree::bounds(const TriangleMesh& mesh, const Threads& threads) {
-  PALPATE_ASSERT(m_ordered.size() == mesh.topology.count());
-  const std::size_t size = m_ordered.size(),
-                    count = (size + kTrianglesPerGroup - 1) / kTrianglesPerGroup;
-  m_bounds.groups.resize(count + 1);
-  for (std::size_t i = 0; i <= count; ++i)
-    m_bounds.groups[i] = static_cast<std::uint32_t>(std::min(i * kTrianglesPerGroup, size));
-  m_bounds.boxes.resize(count);
-  computeBoxes(mesh, m_bounds.groups, m_bounds.boxes.data(), 2, threads, false);
-  FloatBox all;
-  for (const FloatBox& box : m_bounds.boxes) all.add(box);
-  return all;
-}
-
-void GeometryOctree::rebuild(const TriangleMesh& mesh, const OctreeSettings& settings,
-                             const Threads& threads) {
-  Stopwatch watch;
-  const FloatBox all = bounds(mesh, threads);
-  boxMilliseconds += watch.lap();
-  // Triangles in the old order are no longer needed. The keys use their memory.
-  const std::size_t size = m_ordered.size();
-  m_octree.build(all, m_spread * m_frame.scale, settings, m_ordered.startKeys(), threads);
-  m_cuts.setBuilt();
-  m_ordered.start(size);
-  octreeMilliseconds += watch.lap();
-}
-
-void GeometryOctree::fitBoxes(const TriangleMesh& mesh, const OctreeSettings& settings,
-                              const Threads& threads, bool rebuilt) {
-  Stopwatch watch;
-  computeBoxes(mesh, m_octree.groups(), m_octree.groupBoxes(), kGroupGrain, threads, rebuilt);
-  boxMilliseconds += watch.lap();
-  m_octree.fit(threads);
-  if (settings.update == OctreeUpdate::Auto) m_octree.measureLooseness();
-  octreeMilliseconds += watch.lap();
 }
 
 const Triangle* GeometryOctree::findUnfoldedStars(const TriangleMesh& mesh,
                                                   const Threads& threads) {
   PALPATE_ASSERT(isValid() && m_ordered.size() == mesh.topology.count());
   const MemoryScope memory(MemoryStage::Octrees);
-  m_stars.find(mesh.topology, m_octree.order(), ordered(), floatsAtStart(), m_floats.data(),
+  m_stars.find(mesh.topology, m_octree.order(), ordered(), m_floats.atStart(), m_floats.now(),
                threads);
   return m_stars.triangles();
 }
 
 std::size_t GeometryOctree::bytesBesidesOctree() const {
-  return (m_floats.capacity() + m_floatsBefore.capacity()) * sizeof(FloatPoint) + m_cuts.bytes() +
-         m_ordered.bytes() + m_slices.bytes();
+  return m_floats.bytes() + m_cuts.bytes() + m_ordered.bytes() + m_slices.bytes();
 }
 
 }  // namespace palpate

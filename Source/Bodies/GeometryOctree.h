@@ -4,16 +4,13 @@
 #include <palpate/Settings.h>
 
 #include "Bodies/ElementCuts.h"
+#include "Bodies/OctreeFloats.h"
 #include "Bodies/OctreeSlices.h"
 #include "Bodies/OrderedElements.h"
 #include "Octree/Octree.h"
-#include "Mesh/FloatPositions.h"
 #include "Mesh/PieceMotion.h"
 #include "Mesh/Revision.h"
-#include "Mesh/TriangleMesh.h"
 #include "Mesh/UnfoldedStars.h"
-#include "Core/Buffer.h"
-#include "Core/Threads.h"
 
 #include <cstdint>
 #include <span>
@@ -98,18 +95,14 @@ class GeometryOctree {
   bool isValid() const { return m_treeVersion.isValid(); }  ///< no update has failed since
   bool isLagging() const { return m_isLagging; }            ///< the last update was Lagging
   const Octree& octree() const { return m_octree; }
-  const FloatFrame& frame() const { return m_frame; }              ///< of the boxes
-  const FloatFrame& floatsFrame() const { return m_floatsFrame; }  ///< of floats()
-  double spread() const { return m_spread; }                       ///< L: extent of most positions
-  double reach() const;  ///< L: the largest coordinate of the octree's boxes about frame().origin
+  const FloatFrame& frame() const { return m_frame; }      ///< of the boxes
+  const OctreeFloats& floats() const { return m_floats; }  ///< in a frame of their own if it lags
+  double spread() const { return m_spread; }               ///< L: extent of most positions
+  /// L: the largest coordinate of the octree's boxes about frame().origin.
+  double reach() const { return m_octree.box(0).reach() / m_frame.scale; }
   /// Whether rounding errors of the furthest vertices are much smaller than most boxes. It implies
   /// that no position is clamped to the range of floats.
-  bool isCompact() const;
-  const FloatPoint* floats() const { return m_floats.data(); }
-  /// The floats at the step's start if the boxes enclose the step, else those of the positions now.
-  const FloatPoint* floatsAtStart() const {
-    return (m_treeSwept ? m_floatsBefore : m_floats).data();
-  }
+  bool isCompact() const { return m_octree.isBuilt() && reach() <= 0x1p20 * m_spread; }
   /// The cut that the last update followed, if it kept the nodes.
   const ElementCuts::Cut& lastCut() const { return m_cuts.last(); }
   /// Elements in the octree's order, readable BoxArrays::kPadding past their end.
@@ -126,26 +119,21 @@ class GeometryOctree {
     friend bool operator==(const State&, const State&) = default;
   };
   State stateOf(const TriangleMesh&, Revision topology) const;
-  void computeBoxes(const TriangleMesh&, std::span<const std::uint32_t> groups,
-                    FloatBox* groupBoxes, std::size_t grain, const Threads&, bool reordered);
-  FloatBox bounds(const TriangleMesh&, const Threads&);
   Strategy strategyFor(const TriangleMesh&, double scale, const OctreeSettings&, const Lag&) const;
   void fitWhole(const TriangleMesh&, double scale, const OctreeSettings&, const Threads&,
                 bool keepsOrder);
   void fitChanged(const TriangleMesh&, const Threads&);
   void fitLagging(const TriangleMesh&, const Lag&, const Threads&);
-  void rebuild(const TriangleMesh&, const OctreeSettings&, const Threads&);
-  void fitBoxes(const TriangleMesh&, const OctreeSettings&, const Threads&, bool rebuilt);
 
   OctreeSlices::Tree sliced(const TriangleMesh& mesh) {
     return {mesh, m_ordered.triangles(), m_frame, m_octree};
   }
 
-  FloatFrame m_frame, m_floatsFrame;
+  FloatFrame m_frame;
+  OctreeFloats m_floats;
   SampledExtent m_sample;  ///< of the positions of the next update
   double m_spread = 0;
-  bool m_swept = false, m_treeSwept = false;
-  Buffer<FloatPoint> m_floats, m_floatsBefore;
+  bool m_swept = false;
   OrderedElements m_ordered;
   UnfoldedStars m_stars;
   Octree m_octree;
@@ -156,10 +144,6 @@ class GeometryOctree {
   std::uint64_t m_updates = 0;
   bool m_isLagging = false;
   bool m_isBuilt = false;  ///< for the topology of m_treeVersion; the tree can be refitted
-  struct {
-    Buffer<std::uint32_t> groups;
-    Buffer<FloatBox> boxes;
-  } m_bounds;  ///< scratch of a rebuild
 };
 
 }  // namespace palpate

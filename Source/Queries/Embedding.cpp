@@ -15,7 +15,7 @@ void updateTetrahedra(const Body& solid, const OctreeSettings& settings, const T
   if (!prepared.tetrahedra || version.state().topology != now.topology)
     prepared.tetrahedra.emplace();
   version.invalidate();
-  prepared.tetrahedra->update(solid.solid->topology, solid.tree.floats(),
+  prepared.tetrahedra->update(solid.solid->topology, solid.tree.floats().now(),
                               solid.tree.spread() * frame.scale, settings, threads);
   version.commit(now);
 }

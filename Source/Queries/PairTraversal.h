@@ -19,7 +19,7 @@ namespace palpate {
 struct PairSide {
   explicit PairSide(const Body& body, const BoxMap& toCommon = {})
       : octree(body.tree.octree()),
-        floats(body.tree.floats()),
+        floats(body.tree.floats().now()),
         ordered(body.tree.ordered().data()),
         map(toCommon) {}
 

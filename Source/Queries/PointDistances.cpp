@@ -21,7 +21,7 @@ namespace {
 NearestSearch searchOf(const Body& geometry, const Eigen::Vector3d& point) {
   const OctreeFrame frame(geometry);
   const FloatPoint p = FloatFrame::rounded(frame.toFrame(point));
-  NearestSearch search{geometry.tree.octree(), geometry.tree.floats(),
+  NearestSearch search{geometry.tree.octree(), geometry.tree.floats().now(),
                        geometry.tree.ordered().data(), p, frame.slackAt(p)};
   if (!geometry.mesh.radii.empty()) {
     const auto [least, most] =

@@ -251,9 +251,9 @@ void findWithin(const Body& geometry, const Vector3d& point, double distance, bo
       bruteForce || !geometry.mesh.radii.empty() ? std::nullopt : floatsOf(ball, geometry);
   if (!floats) return distances.within(distance, out);
   near.clear();
-  searchOverlapping(
-      {geometry.tree.octree(), geometry.tree.floats(), geometry.tree.ordered().data(), *floats},
-      out, near);
+  searchOverlapping({geometry.tree.octree(), geometry.tree.floats().now(),
+                     geometry.tree.ordered().data(), *floats},
+                    out, near);
   for (const std::uint32_t place : near)
     if (const auto at = distances.at(place); distances.isWithin(at, distance))
       out.push_back(at.element);
@@ -299,8 +299,8 @@ void findOverlapping(const Body& geometry, const AnalyticalGeometry& analytical,
     return;
   }
   const auto& ordered = geometry.tree.ordered();
-  searchOverlapping({geometry.tree.octree(), geometry.tree.floats(), ordered.data(), *floats}, out,
-                    near);
+  searchOverlapping({geometry.tree.octree(), geometry.tree.floats().now(), ordered.data(), *floats},
+                    out, near);
   for (const std::uint32_t place : near) {
     const std::uint32_t element = geometry.tree.octree().order()[place];
     const auto decided = convex->slabCount > 0

@@ -18,13 +18,13 @@ constexpr double kListFactor = 2.0, kClassFactor = 1.6, kLeastMargin = 0.02, kMo
 /// The largest coordinate about the origin of the floats, L.
 double reachOf(const Body& body) {
   const Eigen::AlignedBox3d& bounds = body.mesh.now.bounds();
-  const Eigen::Vector3d& origin = body.tree.floatsFrame().origin;
+  const Eigen::Vector3d& origin = body.tree.floats().frame().origin;
   return std::max((bounds.min() - origin).cwiseAbs().maxCoeff(),
                   (bounds.max() - origin).cwiseAbs().maxCoeff());
 }
 
 Eigen::Vector3d offsetOf(const Body& a, const Body& b) {
-  const FloatFrame &from = b.tree.floatsFrame(), &to = a.tree.floatsFrame();
+  const FloatFrame &from = b.tree.floats().frame(), &to = a.tree.floats().frame();
   return from.scaled(from.origin, to.origin);
 }
 
@@ -41,14 +41,14 @@ KeptReach KeptReach::of(double distance, double speed, double edge) {
 void KeptDetection::start(const Body& a, const Body& b, const KeptReach& reach) {
   PALPATE_ASSERT(reach.distance >= 0.0 && reach.lists >= reach.classes && reach.classes > 0.0);
   m_reach = reach;
-  m_scale = a.tree.floatsFrame().scale;
+  m_scale = a.tree.floats().frame().scale;
   const Eigen::Vector3d offset = offsetOf(a, b);
   const double size = reachOf(a) + reachOf(b) + offset.cwiseAbs().maxCoeff() / m_scale;
   // Each bound of a box is off by less than 2^-21 of it, and so is their difference. Distances of
   // features have errors of doubles.
   m_reach.error =
       0x1p-19 * (size + reach.distance + reach.lists) + OutwardRounding::kAbsolute / m_scale;
-  m_floats = {a.tree.floats(), b.tree.floats(), nullptr, nullptr};
+  m_floats = {a.tree.floats().now(), b.tree.floats().now(), nullptr, nullptr};
   setShift(m_floats.shiftLower, m_floats.shiftUpper, {offset[0], offset[1], offset[2]},
            reach.distance * m_scale);
   // Floats, offset and two differences have errors of 2^-24 each.

@@ -27,11 +27,15 @@ double approachSlack(const Question& question, double thickness) {
 }
 
 FloatPair floatsOf(const Question& question, const TreePair& trees) {
-  FloatPair floats{question.a.tree.floats(), question.b.tree.floats(), nullptr, nullptr,
-                   trees.shiftLower,         trees.shiftUpper};
+  FloatPair floats{question.a.tree.floats().now(),
+                   question.b.tree.floats().now(),
+                   nullptr,
+                   nullptr,
+                   trees.shiftLower,
+                   trees.shiftUpper};
   if (question.plan.swept()) {
-    floats.beforeA = question.a.tree.floatsAtStart();
-    floats.beforeB = question.b.tree.floatsAtStart();
+    floats.beforeA = question.a.tree.floats().atStart();
+    floats.beforeB = question.b.tree.floats().atStart();
   }
   return floats;
 }

@@ -44,8 +44,9 @@ class FeatureCandidates {
     tree.update(body.mesh, topology, scale, {}, m_threads);
     TreePair trees{&tree.octree(), &tree.octree()};
     setShift(trees, {0, 0, 0}, 0);
-    m_floats = {tree.floats(), tree.floats(), nullptr, nullptr, trees.shiftLower, trees.shiftUpper};
-    if (tree.isSwept()) m_floats.beforeA = m_floats.beforeB = tree.floatsAtStart();
+    m_floats = {tree.floats().now(), tree.floats().now(), nullptr, nullptr,
+                trees.shiftLower,    trees.shiftUpper};
+    if (tree.isSwept()) m_floats.beforeA = m_floats.beforeB = tree.floats().atStart();
     startPairs(trees, 1, m_stack);
     m_nodePairs.assign(m_stack.pairs.begin(), m_stack.pairs.end());
     m_sink.start(&receive, this);
