@@ -86,7 +86,7 @@ void ElementCuts::findJoining(const TriangleMesh& mesh, const FloatFrame& frame,
       box.add(FloatBox{{p.x, p.y, p.z, 0}, {p.x, p.y, p.z, 0}});
       changes.vertices.push_back(vertex);
     }
-    changes.joining.push_back({octree.groupNear(box), id});
+    changes.joining.push_back({octree.nodes().groupNear(box), id});
   }
   std::sort(changes.joining.begin(), changes.joining.end(), [](const auto& a, const auto& b) {
     return std::pair(a.group, a.element) < std::pair(b.group, b.element);

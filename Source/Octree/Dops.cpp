@@ -1,6 +1,7 @@
 #include "Octree/Dops.h"
 
 #include "Octree/BoxMap.h"
+#include "Octree/OctreeNodes.h"
 
 #include <cmath>
 #include <limits>
@@ -120,6 +121,43 @@ void setEnd(DopMap::End& end, const OctreeDops& dops,
              length * thickness + size * error);
     ++k;
   }
+}
+
+void OctreeDops::fit(const OctreeNodes& nodes, int count) {
+  constexpr float kInfinity = FloatBox::kEmptyLower;
+  const auto further = static_cast<std::size_t>(count - 3);
+  double leaves = 0;
+  halfWidths.fill(0);
+  // Children come after their parents.
+  for (std::size_t block = nodes.pool.used(); block-- > 0;)
+    for (unsigned slot = 0; slot < kChildren; ++slot) {
+      const auto node = nodeOf(static_cast<std::uint32_t>(block), slot);
+      const bool isUsed = (block > 0 || slot == 0) && !nodes.isEmpty(node);
+      const auto [begin, end] = isUsed ? nodes.ownRange(node) : std::pair(0u, 0u);
+      const std::size_t child = isUsed ? blockOf(nodes.firstChild(node)) : 0;
+      const bool isLeaf = isUsed && child == 0;
+      leaves += isLeaf;
+      for (int k = 0; k < 3 && isLeaf; ++k) {
+        const FloatBox fitted = nodes.box(node);
+        halfWidths[k] += 0.5 * (double{fitted.upper[k]} - fitted.lower[k]);
+      }
+      for (std::size_t k = 0; k < further; ++k) {
+        float least = kInfinity, most = -kInfinity;
+        for (std::uint32_t i = begin; i < end; ++i) {
+          least = std::min(least, lower[k + 3][i]);
+          most = std::max(most, upper[k + 3][i]);
+        }
+        for (unsigned s = 0; child != 0 && s < kChildren; ++s) {
+          least = std::min(least, blocks[child * further + k].lower[s]);
+          most = std::max(most, blocks[child * further + k].upper[s]);
+        }
+        blocks[block * further + k].lower[slot] = least;
+        blocks[block * further + k].upper[slot] = most;
+        if (isLeaf) halfWidths[k + 3] += 0.5 * (double{most} - least);
+      }
+    }
+  for (double& width : halfWidths) width /= leaves;
+  directions = count;
 }
 
 }  // namespace palpate

@@ -23,6 +23,8 @@ constexpr int kMostDirections = 9;
 int directionCount(OctreeBounds);                        ///< of k-DOPs: 7 or 9
 std::span<const DopDirection> dopDirections(int count);  ///< count: 3, 7 or 9
 
+struct OctreeNodes;
+
 /// The bounds of an octree's elements and nodes along the directions after the axes, beside its
 /// boxes.
 struct OctreeDops {
@@ -39,6 +41,8 @@ struct OctreeDops {
   const Siblings* block(std::size_t i) const {
     return blocks.data() + i * static_cast<std::size_t>(directions - 3);
   }
+  /// Of the elements' bounds: computes those of all nodes.
+  void fit(const OctreeNodes&, int directions);
   std::size_t bytes() const;
 };
 

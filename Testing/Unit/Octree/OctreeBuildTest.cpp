@@ -225,7 +225,7 @@ TEST(OctreeReplace, FindsGroupsThatAreNear) {
   tree.build(boxes, {}, Threads(1));
   std::size_t overlapping = 0;
   for (const FloatBox& box : boxes) {
-    const std::uint32_t group = tree.octree.groupNear(box);
+    const std::uint32_t group = tree.octree.nodes().groupNear(box);
     const auto groups = tree.octree.groups();
     ASSERT_LT(group + 1, groups.size());
     ASSERT_LT(groups[group], groups[group + 1]);
