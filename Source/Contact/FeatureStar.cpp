@@ -5,6 +5,7 @@
 #include "Core/Assert.h"
 
 #include <optional>
+#include <utility>
 
 namespace palpate {
 
@@ -56,36 +57,14 @@ bool FeatureStar::hasArea(std::uint32_t triangle) const {
 }
 
 void FeatureStar::join(const Vector3d& p, const Vector3d& q) {
-  std::vector<std::uint32_t> visited;
-  const auto visit = [&](std::uint32_t triangle) {
-    if (std::find(visited.begin(), visited.end(), triangle) != visited.end()) return false;
-    visited.push_back(triangle);
-    return true;
-  };
-  m_joined.push_back(m_feature);
-  for (std::size_t i = 0; i < m_joined.size(); ++i)
-    for (const std::uint32_t t : holdersOf(m_topology, m_joined[i]))
-      if (!hasArea(t) && visit(t)) joinCrossed(t, p, q);
-  const auto corner = std::find_if(m_joined.begin(), m_joined.end(), isVertex);
-  if (corner != m_joined.end()) m_feature = *corner;
-  for (const MeshFeature& feature : m_joined)
-    for (const std::uint32_t t : holdersOf(m_topology, feature))
-      if (visit(t)) addSectors(feature, t);
-}
-
-/// All corners are on a line, so that the segment may cross several edges at one place.
-void FeatureStar::joinCrossed(std::uint32_t triangle, const Vector3d& p, const Vector3d& q) {
-  const Triangle& t = m_topology.elements[triangle];
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::array ends{t[i], t[(i + 1) % 3]};
-    const auto place = placeOfCrossing(at(ends[0]), at(ends[1]), p, q, m_counts);
-    if (!place) continue;
-    const MeshFeature crossed =
-        *place == 2
-            ? MeshFeature{MeshFeature::Kind::Edge, m_topology.triangleEdges[triangle][i]}
-            : MeshFeature{MeshFeature::Kind::Vertex, ends[static_cast<std::size_t>(*place)]};
-    if (crossed.id != kNoEdge && !joins(crossed)) m_joined.push_back(crossed);
-  }
+  JoinedFeatures joined(
+      m_topology, m_feature, [&](std::uint32_t triangle) { return !hasArea(triangle); },
+      [&](std::uint32_t u, std::uint32_t v) {
+        return placeOfCrossing(at(u), at(v), p, q, m_counts);
+      });
+  if (const MeshFeature* const vertex = joined.vertex()) m_feature = *vertex;
+  for (const auto& [triangle, touched] : joined.faces) addSectors(touched, triangle);
+  m_joined = std::move(joined.features);
 }
 
 void FeatureStar::addSectors(const MeshFeature& feature, std::uint32_t triangle) {

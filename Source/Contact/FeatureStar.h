@@ -4,10 +4,7 @@
 #include "Math/TriangleIntersection.h"
 #include "Exact/Predicates.h"
 
-#include <algorithm>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 namespace palpate {
 
@@ -45,7 +42,6 @@ class FeatureStar {
   bool hasArea(std::uint32_t triangle) const;
   /// Finds what triangles without area join.
   void join(const Eigen::Vector3d& p, const Eigen::Vector3d& q);
-  void joinCrossed(std::uint32_t triangle, const Eigen::Vector3d& p, const Eigen::Vector3d& q);
   void addSectors(const MeshFeature&, std::uint32_t triangle);
 
   /// Half-planes or sectors, as from() has them.

@@ -7,11 +7,14 @@
 #include "Mesh/TriangleMesh.h"
 #include "Math/ImpactQuery.h"
 
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <type_traits>
+#include <vector>
 
 namespace palpate {
 
@@ -82,6 +85,55 @@ inline std::span<const std::uint32_t> holdersOf(const MeshTopology& topology,
   if (feature.kind == MeshFeature::Kind::Edge) return topology.edgeTriangles[feature.id];
   return {};
 }
+
+/// The features at one place that triangles without area join, and the triangles with area around
+/// them. A triangle without area is on a line: the place is on several of its edges and corners.
+struct JoinedFeatures {
+  struct Face {
+    std::uint32_t triangle;
+    MeshFeature touched;
+  };
+  std::vector<MeshFeature> features;
+  std::vector<Face> faces;
+
+  /// first: a vertex or an edge; a border without an id joins nothing. isFlat(triangle): it has no
+  /// area. place(u, v): of the place on the edge from u to v: 0 at u, 1 at v, 2 between, or none.
+  template <class IsFlat, class Place>
+  JoinedFeatures(const MeshTopology& topology, const MeshFeature& first, IsFlat&& isFlat,
+                 Place&& place) {
+    const auto add = [&](const MeshFeature& feature) {
+      if (feature.id != kNoEdge && !has(feature)) features.push_back(feature);
+    };
+    std::vector<std::uint32_t> visited;
+    add(first);
+    for (std::size_t i = 0; i < features.size(); ++i)
+      for (const std::uint32_t t : holdersOf(topology, features[i])) {
+        if (std::find(visited.begin(), visited.end(), t) != visited.end()) continue;
+        visited.push_back(t);
+        if (!isFlat(t)) {
+          faces.push_back({t, features[i]});
+          continue;
+        }
+        for (std::size_t k = 0; k < 3; ++k) {
+          const std::array ends{topology.elements[t][k], topology.elements[t][(k + 1) % 3]};
+          const std::optional<int> at = place(ends[0], ends[1]);
+          if (at == 2)
+            add({MeshFeature::Kind::Edge, topology.triangleEdges[t][k]});
+          else if (at)
+            add({MeshFeature::Kind::Vertex, ends[static_cast<std::size_t>(*at)]});
+        }
+      }
+  }
+  bool has(const MeshFeature& feature) const {
+    return std::find(features.begin(), features.end(), feature) != features.end();
+  }
+  /// A vertex among the features; null if there are edges only.
+  const MeshFeature* vertex() const {
+    for (const MeshFeature& each : features)
+      if (each.kind == MeshFeature::Kind::Vertex) return &each;
+    return nullptr;
+  }
+};
 
 inline bool containsVertex(const Triangle& triangle, std::uint32_t vertex) {
   return triangle[0] == vertex || triangle[1] == vertex || triangle[2] == vertex;

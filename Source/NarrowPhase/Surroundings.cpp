@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 namespace palpate {
 
@@ -143,57 +142,39 @@ void findVertexSectors(const TriangleMesh& mesh, std::uint32_t vertex, TouchSurr
   }
 }
 
-/// The features at a touched edge or corner that triangles without area join. Such a triangle is on
-/// a line: the touching vertex is on several of its edges and corners.
+/// What surrounds a touched edge or corner that triangles without area join to others.
 class FlatJoints {
  public:
   FlatJoints(const TriangleMesh& mesh, std::uint32_t own, std::size_t border,
              const PlaceOnSegment& place)
-      : m_mesh(mesh), m_topology(mesh.topology), m_own(own), m_border(border), m_place(place) {}
+      : m_mesh(mesh),
+        m_topology(mesh.topology),
+        m_own(own),
+        m_border(border),
+        m_place(place),
+        m_joined(
+            mesh.topology, featureOf(mesh.topology, own, static_cast<TriangleFeature>(border)),
+            [&](std::uint32_t triangle) { return isFlat(mesh.topology.elements[triangle]); },
+            [&](std::uint32_t u, std::uint32_t v) {
+              return place(stepOf(mesh, u), stepOf(mesh, v));
+            }) {}
 
   /// Sets what surrounds the place. Returns false if nothing is joined there, at a border, and
   /// where corners meet only for a moment.
   bool find(TouchSurroundings& around) {
-    add(featureOf(m_topology, m_own, static_cast<TriangleFeature>(m_border)));
-    for (std::size_t i = 0; i < m_features.size(); ++i)
-      for (const std::uint32_t t : holdersOf(m_topology, m_features[i])) visit(t, m_features[i]);
-    if (m_features.size() < 2 ||
-        !std::all_of(m_features.begin(), m_features.end(),
+    const auto& features = m_joined.features;
+    if (features.size() < 2 ||
+        !std::all_of(features.begin(), features.end(),
                      [&](const MeshFeature& feature) { return isClosed(feature); }))
       return false;
-    const auto corner = std::find_if(m_features.begin(), m_features.end(), isCorner);
-    return corner == m_features.end() ? findAtEdges(around) : findAtCorner(corner->id, around);
+    const MeshFeature* const corner = m_joined.vertex();
+    return corner ? findAtCorner(corner->id, around) : findAtEdges(around);
   }
 
  private:
-  struct Face {
-    std::uint32_t triangle;
-    MeshFeature touched;
-  };
+  using Face = JoinedFeatures::Face;
   static bool isCorner(const MeshFeature& feature) {
     return feature.kind == MeshFeature::Kind::Vertex;
-  }
-  void add(const MeshFeature& feature) {
-    if (feature.kind == MeshFeature::Kind::Edge && feature.id == kNoEdge) return;
-    if (std::find(m_features.begin(), m_features.end(), feature) == m_features.end())
-      m_features.push_back(feature);
-  }
-  void visit(std::uint32_t triangle, const MeshFeature& touched) {
-    if (std::find(m_visited.begin(), m_visited.end(), triangle) != m_visited.end()) return;
-    m_visited.push_back(triangle);
-    const Triangle& t = m_topology.elements[triangle];
-    if (!isFlat(t)) {
-      m_faces.push_back({triangle, touched});
-      return;
-    }
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::array ends{t[i], t[(i + 1) % 3]};
-      const auto place = m_place(stepOf(m_mesh, ends[0]), stepOf(m_mesh, ends[1]));
-      if (place == 2)
-        add({MeshFeature::Kind::Edge, m_topology.triangleEdges[triangle][i]});
-      else if (place)
-        add({MeshFeature::Kind::Vertex, ends[static_cast<std::size_t>(*place)]});
-    }
   }
   /// Whether a triangle has no area during the whole step.
   bool isFlat(const Triangle& t) const {
@@ -228,9 +209,9 @@ class FlatJoints {
       return !isCorner(feature) || (m_mesh.before[feature.id] == m_mesh.before[corner] &&
                                     m_mesh.now[feature.id] == m_mesh.now[corner]);
     };
-    if (!std::all_of(m_features.begin(), m_features.end(), isThere)) return false;
+    if (!std::all_of(m_joined.features.begin(), m_joined.features.end(), isThere)) return false;
     around.at[1] = stepOf(m_mesh, corner);
-    for (const Face& face : m_faces) {
+    for (const Face& face : m_joined.faces) {
       addTriangle(face, around);
       if (isCorner(face.touched)) {
         around.sectors.push_back(Fan(m_mesh, face.touched.id).sectorOf(face.triangle));
@@ -252,7 +233,7 @@ class FlatJoints {
     const ImpactQuery::Step end = stepOf(m_mesh, own[(m_border - 2) % 3]);
     around.isEdge = around.isClosed = true;
     around.at[1] = stepOf(m_mesh, own[m_border - 3]);
-    for (const Face& face : m_faces) {
+    for (const Face& face : m_joined.faces) {
       addTriangle(face, around);
       const auto [p, q, opposite] = edgeOf(face);
       const ImpactQuery::Step aside = stepOf(m_mesh, opposite);
@@ -270,9 +251,7 @@ class FlatJoints {
   const std::uint32_t m_own;
   const std::size_t m_border;
   const PlaceOnSegment& m_place;
-  std::vector<MeshFeature> m_features;
-  std::vector<std::uint32_t> m_visited;
-  std::vector<Face> m_faces;
+  const JoinedFeatures m_joined;
 };
 
 }  // namespace
