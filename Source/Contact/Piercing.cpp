@@ -551,12 +551,12 @@ bool PiercingContacts::addBorders(const MeshPair& pair, std::span<const Behind> 
     any |=
         nearest.weights[i] != 0.0 && !behindOf(!isOfB && !pair.self(), nearest.vertices[i]).empty();
   const auto addAbove = [&](std::uint32_t edge, std::span<const std::uint32_t> triangles) {
-    const auto borders =
-        findEdgesAbove(pair, isOfB, edge, triangles, &outward,
-                       [&](std::uint32_t border, const Eigen::Vector3d& up, double length) {
-                         return isBorder(topology, border) && length <= -nearest.distance &&
-                                up.dot(outward) >= kSameWayOut * length;
-                       });
+    const auto borders = findEdgesAbove(
+        pair, isOfB, edge, triangles, &outward,
+        [&](std::uint32_t border, const Eigen::Vector3d& up, double length) {
+          return isBorder(topology, border) && length > 0.0 && length <= -nearest.distance &&
+                 up.dot(outward) >= kSameWayOut * length;
+        });
     for (const Near& border : borders)
       addCrossed(pair, isOfB ? border.id : edge, isOfB ? edge : border.id, out);
     any |= !borders.empty();
