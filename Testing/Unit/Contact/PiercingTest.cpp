@@ -124,13 +124,16 @@ TEST(Piercing, OfABodyOverABorderNothingIsDeeperThanTheLift) {
     const int cells = 1 + seed % 7;
     Mesh sheet = testing::flat(cells, 0);
     for (Vector3d& p : sheet.positions) p = 8.0 * p - Vector3d(8, 4, 0);
-    Mesh body = seed % 2 == 0 ? testing::dividedBox({0, 0, 0}, {any(0.5, 3), any(0.5, 3), 1}, 2)
-                              : testing::insideOut(pyramid({0, 0, 0}, -1, any(0.5, 2)));
-    const Vector3d axis = Eigen::AngleAxisd(any(0, 6), Vector3d::UnitZ()) * Vector3d::UnitX();
-    body = turned(turned(body, any(0, 6), Vector3d::UnitZ()), std::pow(10, any(-9, -1)), axis);
+    const double width = any(0.5, 3), length = any(0.5, 3);
+    Mesh body = seed % 2 == 0 ? testing::dividedBox({0, 0, 0}, {width, length, 1}, 2)
+                              : testing::insideOut(pyramid({0, 0, 0}, -1, width));
+    const double about = any(0, 6), turn = any(0, 6), tilt = std::pow(10, any(-9, -1));
+    const Vector3d axis = Eigen::AngleAxisd(about, Vector3d::UnitZ()) * Vector3d::UnitX();
+    body = turned(turned(body, turn, Vector3d::UnitZ()), tilt, axis);
     Eigen::AlignedBox3d box;
     for (const Vector3d& p : body.positions) box.extend(p);
-    const Vector3d to(-any(0.1, 0.9) * box.sizes().x(), any(-1, 4), -std::pow(10, any(-7, -2)));
+    const double over = any(0.1, 0.9), beside = any(-1, 4), depth = std::pow(10, any(-7, -2));
+    const Vector3d to(-over * box.sizes().x(), beside, -depth);
     for (Vector3d& p : body.positions)
       p += to - Vector3d(box.min().x(), box.center().y(), box.min().z());
     const double lift = liftOf(body);
