@@ -545,9 +545,11 @@ bool PiercingContacts::addBorders(const MeshPair& pair, std::span<const Behind> 
                                   const VertexTriangleContact& nearest,
                                   const Eigen::Vector3d& outward, ContactBuffers& out) {
   const bool isOfB = crossings.front().ofB;
-  const MeshTopology& topology = (isOfB ? pair.a : pair.b).topology;
+  const MeshTopology &own = (isOfB ? pair.b : pair.a).topology,
+                     &topology = (isOfB ? pair.a : pair.b).topology;
   bool any = false;
-  for (int i = 0; i < 3; ++i)
+  // Behind an open surface, they may be beyond its border as well.
+  for (int i = 0; i < 3 && own.hasOnlyClosedStars(); ++i)
     any |=
         nearest.weights[i] != 0.0 && !behindOf(!isOfB && !pair.self(), nearest.vertices[i]).empty();
   const auto addAbove = [&](std::uint32_t edge, std::span<const std::uint32_t> triangles) {

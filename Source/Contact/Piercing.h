@@ -68,8 +68,8 @@ void recordCrossings(const MeshPair&, bool atStart, const ElementPair&, const Tr
 ///          edges that cross the surface pass below borders at corners of the crossed triangles and
 ///          of those that hold the nearest feature, their contacts with these stand for that of the
 ///          vertex: such a border is no further away than the vertex, and leads out within 45
-///          degrees of the mean normal at the feature. If vertices of the nearest feature are
-///          behind the other surface, theirs do.
+///          degrees of the mean normal at the feature. If the other surface is closed, and vertices
+///          of the nearest feature are behind it, theirs do.
 /// Law      the results do not depend on the order of crossings and pairs, nor on repeated ones.
 /// Cost     n log n in the crossings; a vertex behind measures the connected triangles that are at
 ///          most 1.5 times its first exit distance from it. Scratch memory of 4 bytes for each

@@ -75,7 +75,7 @@ TEST_P(Determinism, SimdPathsDoNotChangeABit) {
 const std::map<std::string, std::vector<std::uint64_t>> kExpected{
     {"ProximityDistinct", {0x06c8247d4b6f4146u, 0xd660ee6c3b7737fbu, 0x28518f6f825ead01u}},
     {"ProximityAll", {0x196380ccbb16a948u, 0x291a6629bf849511u, 0xa227e0c80aea4f7fu}},
-    {"Intersection", {0x721c75d04c80192eu, 0x71719df3f684eef0u, 0x5117dd5c33631b0fu}},
+    {"Intersection", {0x6bab33c99d13aeadu, 0x554013af07dd42c8u, 0x65448dabfe64962eu}},
     {"Continuous", {0x45c89b21dd5519edu, 0x0c8210784d8af5a5u, 0x64e2e1819e872c01u}},
     {"ContinuousWithThickness", {0x1b35f8e052d2d1dbu, 0x6e67e63b6b8b0344u, 0xb8e7905aaa07d5c5u}},
     {"ContinuousEarliest", {0xb05355e5d6a61913u, 0x0c8210784d8af5a5u, 0xfc3177c3d8cabcd6u}},

@@ -467,8 +467,9 @@ class ExactContacts {
       const mpf_class size = sqrt(
           mpf_class(outward[0] * outward[0] + outward[1] * outward[1] + outward[2] * outward[2]));
       Answer stands = Answer::No;
-      for (const std::uint32_t v : feature)
-        if (depthsOf(!ofB).contains(v)) stands = Answer::Yes;
+      if (isClosed(vertices))
+        for (const std::uint32_t v : feature)
+          if (depthsOf(!ofB).contains(v)) stands = Answer::Yes;
       for (const auto& [edge, triangle] : all) {
         std::set<std::uint32_t> corners(others.triangles()[triangle].begin(),
                                         others.triangles()[triangle].end());
@@ -497,6 +498,11 @@ class ExactContacts {
       }
       (ofB ? m_beyondOfB : m_beyondOfA)[vertex] = both(isBeyond, stands);
     }
+  }
+  static bool isClosed(const Moving& m) {
+    for (std::uint32_t v = 0; v < m.mesh.positions.size(); ++v)
+      if (!at(m, v).empty() && !atBorder(m, {v}).empty()) return false;
+    return true;
   }
   static std::set<Segment> bordersAt(const Moving& m, const std::set<std::uint32_t>& corners) {
     std::set<Segment> borders;
