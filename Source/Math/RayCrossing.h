@@ -16,6 +16,25 @@ enum class RayCrossing : std::int8_t {
   OnTriangle    ///< the ray starts on it
 };
 
+/// Whether a triangle holds a point of its plane, which every point is of a triangle without area.
+/// Exact for any finite doubles.
+inline bool holdsPoint(const Eigen::Vector3d& p, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                       const Eigen::Vector3d& c, SignCounts& counts) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const double x = p[axis];
+    if ((x < a[axis] && x < b[axis] && x < c[axis]) || (x > a[axis] && x > b[axis] && x > c[axis]))
+      return false;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const int turn = orient2d(axis, a, b, c, counts);
+    if (turn == 0) continue;
+    return turn * orient2d(axis, a, b, p, counts) >= 0 &&
+           turn * orient2d(axis, b, c, p, counts) >= 0 &&
+           turn * orient2d(axis, c, a, p, counts) >= 0;
+  }
+  return exact::compareDistance(p, {a, b, c, exact::closestFeature(p, a, b, c)}, 0.0) == 0;
+}
+
 /// How the ray from p along an axis (0, 1, 2), or against it, crosses triangle (a, b, c).
 ///
 /// Exact for any finite doubles. The ray is moved aside by (e, e²) along the next two axes, in
@@ -41,9 +60,7 @@ inline RayCrossing crossRay(int axis, bool against, const Eigen::Vector3d& p,
   const bool passes = facing != 0 && turn(b, c) == facing && turn(c, a) == facing;
   if (!passes && !isOnEdge) return RayCrossing::None;
   const int side = orient3d(a, b, c, p, counts);
-  if (side == 0 && (!isOnEdge || exact::compareDistance(
-                                     p, {a, b, c, exact::closestFeature(p, a, b, c)}, 0.0) == 0))
-    return RayCrossing::OnTriangle;
+  if (side == 0 && (!isOnEdge || holdsPoint(p, a, b, c, counts))) return RayCrossing::OnTriangle;
   if (!passes || (side == facing) != against) return RayCrossing::None;  // it is behind the start
   return (facing > 0) != against ? RayCrossing::Leaving : RayCrossing::Entering;
 }

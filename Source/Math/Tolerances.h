@@ -289,6 +289,9 @@ constexpr double kInset = 0x1p-36;
 /// Sine of an angle: a motion at less than this to a plane counts as along it. Above the rounding
 /// of a unit vector, and so far below kInset that no such motion leads through an inset.
 constexpr double kAlongPlane = 0x1p-44;
+/// Relative to the largest coordinate: triangles that touch last later by no more than this need no
+/// test, because a translation is longer by kExitSlack. Well above the roundings of coordinates.
+constexpr double kSameTouch = 0x1p-42;
 /// Relative to the largest coordinate: how far beside a point of a surface it is asked whether a
 /// body ends there. Points where triangles intersect are right to some 2^-50, and triangles within
 /// kExitSlack of such a point count as triangles at it.

@@ -2,6 +2,7 @@
 
 #include "Queries/Containment.h"
 #include "Queries/GeometryDistances.h"
+#include "Queries/VertexSearch.h"
 #include "Mesh/Corners.h"
 #include "Math/RayCrossing.h"
 #include "Math/Tolerances.h"
@@ -159,23 +160,34 @@ bool BodyPair::isInB(const Vector3d& p) const {
   return m_scratch.b.box.contains(p) && windingNumberOf(false, p) != 0;
 }
 
-/// Tests every triangle, because no octree holds a where it is moved to. It is rare that a point
-/// must be tested.
+/// The octree of a where it is not moved finds the triangles that a ray from the point may meet.
 bool BodyPair::isInMovedA(const Vector3d& p, const Vector3d& shift) const {
-  // The box of a where it is moved to, with its roundings.
+  // Of a where it is moved to, with its roundings.
   const Vector3d slack =
       Vector3d::Constant(kExitSlack * (m_magnitude + shift.cwiseAbs().maxCoeff()));
   const Eigen::AlignedBox3d box(m_scratch.a.box.min() + shift - slack,
                                 m_scratch.a.box.max() + shift + slack);
   if (!box.contains(p)) return false;
   if (shift.isZero(0.0)) return windingNumberOf(true, p) != 0;
+  const std::span<const std::uint32_t> order = m_a.tree.octree().order();
+  Buffer<std::uint32_t>& found = m_scratch.stack.found;
+  if (m_engine == Engine::BruteForce) {
+    found.resize(order.size());
+    std::iota(found.begin(), found.end(), 0u);
+  } else {
+    const PointFrame frame(m_a);
+    FloatBox ray = frame.boxOf(p - shift - slack);
+    ray.upper = frame.boxOf(p - shift + slack).upper;
+    ray.upper[0] = std::numeric_limits<float>::infinity();
+    findOverlapping(m_a.tree.octree(), frame.map(), ray, m_scratch.stack);
+  }
   SignCounts counts;
   TimeCheck check(256);
   const auto cornersAt = [&](std::size_t i) {
     check();
-    return cornersOfA(m_a.tree.octree().order()[i], shift);
+    return cornersOfA(order[found[i]], shift);
   };
-  const int number = windingNumber(m_a.tree.octree().order().size(), cornersAt, p, counts);
+  const int number = windingNumber(found.size(), cornersAt, p, counts);
   m_scratch.stack.exactDecisions += counts.undecided;
   return number != 0;
 }

@@ -30,8 +30,8 @@ constexpr std::size_t kOperationsPerTriangle = 24, kOperations = 40000;
 constexpr int kMostDescents = 10;
 /// A direction whose translation is longer than the best one by more than this starts no descent.
 constexpr double kWorthDescent = 1.15;
-/// Cosine: normals that are nearer to each other count once.
-constexpr double kSameNormal = 0.98;
+/// Cosines: normals that are nearer to each other count once, and those that equal another seed.
+constexpr double kSameNormal = 0.98, kEqualNormal = 1 - 0x1p-40;
 
 /// A translation along a direction.
 struct Translation {
@@ -142,11 +142,12 @@ class PenetrationSearch {
     if (hasHulls && areConvex()) {
       // No shorter translation separates them.
       const double least = (m_hulls.depth - m_hulls.gap) / m_unit - m_mostSlack;
-      improve(m_hulls.direction, {kInfinity, std::max(least, 0.0), operations()});
+      improve(m_hulls.direction, {kInfinity, std::max(least, 0.0), 4 * operations()});
     }
     if (!isMinimal()) {
-      findInside(true, m_scratch.insideA);
-      findInside(false, m_scratch.insideB);
+      for (const bool ofA : {true, false})
+        findInsideVertices(m_pair, ofA, m_scratch.intersecting, m_effort.inside, m_scratch.regions,
+                           ofA ? m_scratch.insideA : m_scratch.insideB);
       searchDirections();
     }
     if (!m_best.separates) m_best = leavingHull(m_pair, m_hulls.direction, m_mostSlack);
@@ -236,21 +237,6 @@ class PenetrationSearch {
   const CountedVector<std::uint32_t>& insideOf(bool ofA) const {
     return ofA ? m_scratch.insideA : m_scratch.insideB;
   }
-  void findInside(bool ofA, CountedVector<std::uint32_t>& inside) {
-    const BodyVertices& own = m_pair.vertices(ofA);
-    const Eigen::AlignedBox3d& other = m_pair.vertices(!ofA).box;
-    inside.clear();
-    TimeCheck check(1024);
-    for (std::uint32_t v = 0; v < own.positions.size(); ++v) {
-      check();
-      if (own.triangleOf[v] != kNoElement && other.contains(own.positions[v])) inside.push_back(v);
-    }
-    const std::size_t stride = inside.size() / m_effort.inside + 1;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < inside.size(); i += stride)
-      if (m_pair.isInside(ofA, inside[i])) inside[count++] = inside[i];
-    inside.resize(count);
-  }
   /// The inside vertex that starts furthest back.
   std::uint32_t deepest(bool ofA, const Vector3d& direction) const {
     const auto& positions = m_pair.vertices(ofA).positions;
@@ -268,12 +254,15 @@ class PenetrationSearch {
 
   // ---- Directions ----
 
-  /// Follows a direction, and goes on from there if it is worth it.
-  void improve(const Vector3d& direction, const Limits& limits) {
+  /// Follows a direction, and goes on from there if it is worth it. Returns L: no translation along
+  /// it that separates is shorter.
+  double improve(const Vector3d& direction, const Limits& limits) {
     const Translation first = translate(direction, limits, false);
-    if (!first.separates) return;
-    take(first);
-    descend(first, limits.operations);
+    if (first.separates) {
+      take(first);
+      descend(first, limits.operations);
+    }
+    return first.depth;
   }
   void take(const Translation& found, bool orEqual = false) {
     if (!found.separates || found.depth > m_best.depth) return;
@@ -301,28 +290,34 @@ class PenetrationSearch {
     auto& seeds = m_scratch.seeds;
     seeds.clear();
     addSeed(m_hulls.direction);
+    addSeed(directionOfVolume());
     addNormals();
     if (m_effort.aroundTheSphere || seeds.empty())
       forEachAround([&](const Vector3d& direction) { seeds.push_back({direction, seeds.size()}); });
     // Short ways first: one through many layers, or across a hollow, costs more.
     const double most = m_hulls.depth / m_unit;
     for (auto& seed : seeds) seed.bound = boundOf(seed.direction, kWorthDescent * most);
-    std::sort(seeds.begin(), seeds.end(), [](const auto& l, const auto& r) {
-      return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
-    });
-    for (double limit = std::max(kWorthDescent * seeds.front().bound, most / 64);
+    const double least = std::min_element(seeds.begin(), seeds.end(), isEarlier)->bound;
+    for (double limit = std::max(kWorthDescent * least, most / 64);
          limit < most && !m_best.separates && m_sweep.operations() < operations() / 2; limit *= 2)
-      trySeeds(limit, operations() / 2);
+      trySeeds(limit, operations() / 2, 4 * operations());
     if (!m_best.separates) improve(m_hulls.direction, {kInfinity, 0.0, 4 * operations()});
-    trySeeds(kInfinity, std::max(operations(), m_sweep.operations() + operations() / 4));
+    const std::size_t end = std::max(operations(), m_sweep.operations() + operations() / 4);
+    trySeeds(kInfinity, end, end);
   }
-  void trySeeds(double limit, std::size_t operations) {
+  static bool isEarlier(const PenetrationScratch::Seed& l, const PenetrationScratch::Seed& r) {
+    return std::tie(l.bound, l.place) < std::tie(r.bound, r.place);
+  }
+  /// start: after so many operations no further direction is tried. end: the last one ends.
+  void trySeeds(double limit, std::size_t start, std::size_t end) {
+    auto& seeds = m_scratch.seeds;
+    std::sort(seeds.begin(), seeds.end(), isEarlier);
     int translations = 0;
-    for (const auto& seed : m_scratch.seeds) {
+    for (auto& seed : seeds) {
       if (translations++ >= m_effort.translations && m_best.separates) break;
-      const double end = std::min(limit, kWorthDescent * m_best.depth);
-      if (!(seed.bound < std::min(end, m_best.depth)) || m_sweep.operations() > operations) break;
-      improve(seed.direction, {end, seed.bound, operations});
+      const double most = std::min(limit, kWorthDescent * m_best.depth);
+      if (!(seed.bound < std::min(most, m_best.depth)) || m_sweep.operations() > start) break;
+      seed.bound = std::max(seed.bound, improve(seed.direction, {most, seed.bound, end}));
     }
   }
   /// At most the limit.
@@ -335,19 +330,22 @@ class PenetrationSearch {
     return at.depth;
   }
   void addSeed(const Vector3d& direction) {
-    if (direction == Vector3d::Zero()) return;
-    for (const auto& seed : m_scratch.seeds)
-      if (seed.direction.dot(direction) > kSameNormal) return;
-    m_scratch.seeds.push_back({direction, m_scratch.seeds.size()});
+    if (direction != Vector3d::Zero())
+      m_scratch.seeds.push_back({direction, m_scratch.seeds.size()});
   }
+  /// Other seeds that are near a normal do not stand for it: between layers, only the normal does.
   void addNormals() {
+    auto& seeds = m_scratch.seeds;
+    const std::size_t first = seeds.size();
     TimeCheck check(16);
     const auto add = [&](bool ofA, std::uint32_t element) {
       check();
-      if (m_scratch.seeds.size() < kMostFaceNormals)
-        addSeed(ofA ? Vector3d(-normalOf(true, element)) : normalOf(false, element));
+      if (seeds.size() >= kMostFaceNormals) return;
+      const Vector3d direction = (ofA ? -1.0 : 1.0) * normalOf(ofA, element);
+      for (std::size_t i = 0; i < seeds.size(); ++i)
+        if (seeds[i].direction.dot(direction) > (i < first ? kEqualNormal : kSameNormal)) return;
+      addSeed(direction);
     };
-    addSeed(directionOfVolume());
     for (const bool ofA : {true, false})
       for (const std::uint32_t v : insideOf(ofA)) add(ofA, m_pair.vertices(ofA).triangleOf[v]);
     for (const BodyPair::IntersectingTriangles& both : m_scratch.intersecting) {

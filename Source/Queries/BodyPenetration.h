@@ -4,6 +4,7 @@
 
 #include "Queries/BodyOverlap.h"
 #include "Queries/BodyPair.h"
+#include "Queries/InsideRegions.h"
 #include "Queries/ShortestTranslation.h"
 #include "Queries/TranslationSweep.h"
 #include "Shapes/Polytope.h"
@@ -27,6 +28,7 @@ struct PenetrationScratch {
   BodyPairScratch pair;
   OverlapScratch overlap;
   SweepScratch sweep;
+  InsideRegionsScratch regions;
   Polytope difference;
   ShortestTranslation shortest;
   CountedVector<BodyPair::IntersectingTriangles> intersecting;  ///< where a is not moved

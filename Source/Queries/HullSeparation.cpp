@@ -16,6 +16,9 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr std::size_t kMaxPoints = 512;
+/// Of points of about 1: above the roundings of heights. The direction to an origin that is as near
+/// to a face is no more than rounding.
+constexpr double kSameHeight = 0x1p-50;
 
 class SupportDifference {
  public:
@@ -67,7 +70,7 @@ HullSeparation separateHulls(const Support& a, const Support& b, double wanted,
   if (!difference.start(first)) return {Vector3d::Zero(), 0.0, 0.0};
   polytope.start(first);
   for (;;) {
-    const PointShapeDistance origin = polytope.signedDistance(Vector3d::Zero(), 0.0);
+    const PointShapeDistance origin = polytope.signedDistance(Vector3d::Zero(), kSameHeight);
     const Vector3d point = difference.furthest(origin.normal);
     const double height = origin.normal.dot(point), gap = height + origin.distance;
     if (!(gap > wanted) || polytope.points().size() >= kMaxPoints || !polytope.add(point))

@@ -16,9 +16,6 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Mean extent of triangles along an axis, as a share of the body's. If it is larger, the places of
-/// triangles along the axis do not tell which ones are near. Any value near a half will do.
-constexpr double kWideTriangles = 0.5;
 constexpr double kRaySlack = kExitSlack;  ///< in units: more than the rounding of a ray
 
 void enclose(SweepTree::Box& box, const SweepTree::Box& other) {
@@ -72,59 +69,67 @@ class RayToBox {
 
 /// The order depends on positions and numbers only, unlike that of an octree that was refitted: it
 /// decides which of equally late contacts is the last.
-void SweepTree::load(const MeshTopology& topology, const BodyVertices& vertices, double unit) {
-  constexpr double kCells = 1023;
-  const Vector3d lower = vertices.box.min();
-  const double size = vertices.box.sizes().maxCoeff(), scale = size > 0 ? kCells / size : 0.0;
-  const auto spread = [](std::uint32_t x) {  // ten bits, two apart
-    x = (x | x << 16) & 0x030000ffu;
-    x = (x | x << 8) & 0x0300f00fu;
-    x = (x | x << 4) & 0x030c30c3u;
-    return (x | x << 2) & 0x09249249u;
-  };
+void SweepTree::load(const MeshTopology& topology, const BodyVertices& vertices,
+                     const SweepFrame& frame) {
   TimeCheck check(256);
   order.clear();
-  Vector3d extents = Vector3d::Zero();
-  std::size_t count = 0;
-  topology.forEachElement([&](std::uint32_t element) {
-    check();
-    const auto [p, q, r] = cornersOf(topology.elements[element], vertices.positions);
-    extents += p.cwiseMax(q).cwiseMax(r) - p.cwiseMin(q).cwiseMin(r);
-    ++count;
-  });
-  // Of plates, for instance, only the order across them tells which triangles are near each other.
-  const auto isDivided = [&](int k) {
-    return extents[k] < kWideTriangles * static_cast<double>(count) * vertices.box.sizes()[k];
-  };
-  const std::array<bool, 3> divides{isDivided(0), isDivided(1), isDivided(2)};
   topology.forEachElement([&](std::uint32_t element) {
     check();
     const auto [p, q, r] = cornersOf(topology.elements[element], vertices.positions);
     if (!hasArea(p, q, r)) return;  // its edges are those of other triangles
-    const Vector3d cell = scale * ((p / 3.0 + q / 3.0 + r / 3.0) - lower);
-    const auto at = [&](int k) {
-      return divides[static_cast<std::size_t>(k)]
-                 ? spread(static_cast<std::uint32_t>(std::clamp(cell[k], 0.0, kCells)))
-                 : 0u;
-    };
-    order.push_back({at(0) | at(1) << 1 | at(2) << 2, element});
+    const Corners at{frame(p), frame(q), frame(r)};
+    const Vector3d lower = at[0].cwiseMin(at[1]).cwiseMin(at[2]),
+                   upper = at[0].cwiseMax(at[1]).cwiseMax(at[2]);
+    order.push_back({lower + upper, upper - lower, element});
   });
-  sortInTime(order.begin(), order.end(), std::less());
+  leaves = std::bit_ceil(std::max<std::size_t>(1, (order.size() + kLeaf - 1) / kLeaf));
+  divide(0, leaves);
   corners.clear();
-  for (const auto& [place, element] : order) {
-    const Corners p = cornersOf(topology.elements[element], vertices.positions);
-    corners.push_back({unit * p[0], unit * p[1], unit * p[2]});
+  for (const Place& place : order) {
+    const Corners p = cornersOf(topology.elements[place.element], vertices.positions);
+    corners.push_back({frame(p[0]), frame(p[1]), frame(p[2])});
   }
+}
+
+/// Divides the triangles of some leaves at the middle along the axis along which they are spread
+/// furthest, in proportion to their extents: of plates, for instance, only the order across them
+/// tells which triangles are near each other.
+void SweepTree::divide(std::size_t leaf, std::size_t count) {
+  const auto begin = order.begin() + static_cast<std::ptrdiff_t>(placeOf(leaf)),
+             end = order.begin() + static_cast<std::ptrdiff_t>(placeOf(leaf + count));
+  const auto byElement = [](const Place& l, const Place& r) { return l.element < r.element; };
+  checkTime();
+  if (count == 1 || begin == end) return std::sort(begin, end, byElement);
+  Vector3d lower = Vector3d::Constant(kInfinity), upper = -lower, extents = Vector3d::Zero();
+  for (auto place = begin; place != end; ++place) {
+    lower = lower.cwiseMin(place->middle);
+    upper = upper.cwiseMax(place->middle);
+    extents += place->extents;
+  }
+  const Vector3d spread = 0.5 * static_cast<double>(end - begin) * (upper - lower);
+  int axis = 0;
+  for (const int k : {1, 2}) {
+    const double here = spread[k] * (spread[axis] + extents[axis]),
+                 best = spread[axis] * (spread[k] + extents[k]);
+    if (here > best || (here == best && spread[k] > spread[axis])) axis = k;
+  }
+  std::nth_element(begin, order.begin() + static_cast<std::ptrdiff_t>(placeOf(leaf + count / 2)),
+                   end, [&](const Place& l, const Place& r) {
+                     return l.middle[axis] < r.middle[axis] ||
+                            (l.middle[axis] == r.middle[axis] && byElement(l, r));
+                   });
+  divide(leaf, count / 2);
+  divide(leaf + count / 2, count / 2);
 }
 
 /// Moves each vertex so that its faces move inward by the depth, at most by kMost of it.
 void SweepInset::make(const SweepTree& tree, const MeshTopology& topology, const BodyVertices& own,
-                      double unit, double depth) {
+                      const SweepFrame& frame, double depth) {
   constexpr double kWide = 0.25;
   constexpr int kTurns = 8;
   normals.assign(topology.elements.size(), Vector3d::Zero());
   TimeCheck check(256);
-  const Vector3d centre = unit * own.box.center();
+  const Vector3d centre = frame(own.box.center());
   double volume = 0;
   for (std::size_t i = 0; i < tree.corners.size(); ++i) {
     check();
@@ -132,13 +137,13 @@ void SweepInset::make(const SweepTree& tree, const MeshTopology& topology, const
     const Vector3d across = (q - p).cross(r - p);
     volume += across.dot(p - centre);
     const double length = across.norm();
-    if (length > 0) normals[tree.order[i].second] = across / length;
+    if (length > 0) normals[tree.order[i].element] = across / length;
   }
   const double outward = volume < 0 ? -1.0 : 1.0;
   vertices.resize(own.positions.size());
   for (std::uint32_t v = 0; v < vertices.size(); ++v) {
     check();
-    vertices[v] = unit * own.positions[v];
+    vertices[v] = frame(own.positions[v]);
     const auto around = topology.vertexTriangles[v];
     Vector3d way = Vector3d::Zero();
     for (const std::uint32_t t : around) way += normals[t];
@@ -161,11 +166,10 @@ void SweepInset::make(const SweepTree& tree, const MeshTopology& topology, const
   }
   triangles.resize(tree.corners.size());
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    triangles[i] = cornersOf(topology.elements[tree.order[i].second], vertices);
+    triangles[i] = cornersOf(topology.elements[tree.order[i].element], vertices);
 }
 
-void SweepTree::makeBoxes(const Vector3d& axis, const SweepInset* inset) {
-  leaves = std::bit_ceil(std::max<std::size_t>(1, (corners.size() + kLeaf - 1) / kLeaf));
+void SweepTree::makeBoxes(const Vector3d& axis, const SweepInset* inset, bool closed) {
   const Box empty{{kInfinity, kInfinity, kInfinity, kInfinity},
                   {-kInfinity, -kInfinity, -kInfinity, -kInfinity}};
   boxes.assign(2 * leaves, empty);
@@ -178,15 +182,18 @@ void SweepTree::makeBoxes(const Vector3d& axis, const SweepInset* inset) {
       if (!inset) continue;
       const Vector3d& q = inset->triangles[i][k];
       enclose(box, q, axis);
-      enclose(box, p + p - q, axis);
+      if (closed) enclose(box, p + p - q, axis);
     }
-    enclose(boxes[leaves + i / kLeaf], box);
   }
+  for (std::size_t leaf = 0; leaf < leaves; ++leaf)
+    for (std::size_t i = placeOf(leaf); i < placeOf(leaf + 1); ++i)
+      enclose(boxes[leaves + leaf], own[i]);
   for (std::size_t node = leaves - 1; node > 0; --node)
     for (const std::size_t child : {2 * node, 2 * node + 1}) enclose(boxes[node], boxes[child]);
 }
 
-/// Edges are widened by kExitWeight, so that nothing passes between triangles.
+/// Edges are widened by kExitWeight, so that nothing passes between triangles. A triangle at the
+/// start counts, even if it is behind it within rounding.
 std::optional<SweepTree::Hit> SweepTree::firstHit(const Vector3d& start, const Vector3d& along,
                                                   double end) const {
   const RayToBox entryAt(start, along);
@@ -199,12 +206,12 @@ std::optional<SweepTree::Hit> SweepTree::firstHit(const Vector3d& start, const V
     const double slope = normal.dot(along);
     if (slope == 0) return;
     const double at = -normal.dot(from) / slope;
-    if (!(at >= 0 && at < t)) return;
+    if (!(at >= -kRaySlack && at < t)) return;
     const Vector3d across = along.cross(from);
     const double x = v.dot(across) / slope, y = -u.dot(across) / slope;
     if (!(x >= -kExitWeight && y >= -kExitWeight && x + y <= 1 + kExitWeight)) return;
-    t = at;
-    element = order[i].second;
+    t = std::max(at, 0.0);
+    element = order[i].element;
   };
   struct Entry {
     std::uint32_t node;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "Queries/BodyPair.h"
+#include "Queries/SweepFrame.h"
 #include "Mesh/Corners.h"
 #include "Core/CountedVector.h"
 
@@ -17,11 +18,9 @@ namespace palpate {
 
 struct SweepInset;
 
-/// The triangles of a body with area, along a space-filling curve, and boxes over parts of them:
-/// a complete binary tree, in which node i has the children 2 i and 2 i + 1. The leaves hold kLeaf
-/// triangles each. Coordinates are in units of the caller.
-///
-/// Source   Lauterbach et al., Fast BVH construction on GPUs (2009): a tree over a sorted order.
+/// The triangles of a body with area, and boxes over parts of them: a complete binary tree, in
+/// which node i has the children 2 i and 2 i + 1. The leaves hold up to kLeaf triangles each.
+/// Coordinates are those of the frame.
 struct SweepTree {
   /// Along the coordinate axes, and along one more direction.
   struct Box {
@@ -36,25 +35,33 @@ struct SweepTree {
   };
   static constexpr std::size_t kLeaf = 4;
 
-  /// unit: 1/L.
-  void load(const MeshTopology&, const BodyVertices&, double unit);
+  void load(const MeshTopology&, const BodyVertices&, const SweepFrame&);
   /// axis: the further direction of the boxes. inset: if not null, the boxes also enclose these
-  /// triangles, and their reflections in the tree's own.
-  void makeBoxes(const Eigen::Vector3d& axis, const SweepInset*);
+  /// triangles; if closed, also their reflections in the tree's own.
+  void makeBoxes(const Eigen::Vector3d& axis, const SweepInset*, bool closed);
   /// The triangles of a leaf: from the first place to before the second.
   std::pair<std::size_t, std::size_t> trianglesOf(std::uint32_t leaf) const {
-    const std::size_t begin = (leaf - leaves) * kLeaf;
-    return {std::min(begin, corners.size()), std::min(begin + kLeaf, corners.size())};
+    return {placeOf(leaf - leaves), placeOf(leaf - leaves + 1)};
   }
   /// Where a ray meets a triangle first, within rounding. None if it does not, or not before `end`.
   std::optional<Hit> firstHit(const Eigen::Vector3d& start, const Eigen::Vector3d& along,
                               double end) const;
 
-  CountedVector<std::pair<std::uint32_t, std::uint32_t>> order;  ///< place on the curve, element
+  struct Place {
+    Eigen::Vector3d middle;   ///< of the triangle's box, doubled
+    Eigen::Vector3d extents;  ///< of the triangle's box
+    std::uint32_t element;
+  };
+  CountedVector<Place> order;
   CountedVector<Corners> corners;
   CountedVector<Box> own;    ///< of the triangles
   CountedVector<Box> boxes;  ///< by node, from 1 on
   std::size_t leaves = 0;
+
+ private:
+  /// The place of a leaf's first triangle.
+  std::size_t placeOf(std::size_t leaf) const { return std::min(leaf * kLeaf, order.size()); }
+  void divide(std::size_t leaf, std::size_t count);
 };
 
 /// The triangles of a SweepTree, moved inward by a depth.
@@ -62,7 +69,8 @@ struct SweepInset {
   static constexpr double kMost = 16.0;  ///< a vertex moves at most so many depths
 
   /// depth: in units.
-  void make(const SweepTree&, const MeshTopology&, const BodyVertices&, double unit, double depth);
+  void make(const SweepTree&, const MeshTopology&, const BodyVertices&, const SweepFrame&,
+            double depth);
 
   CountedVector<Corners> triangles;  ///< in the tree's order
   CountedVector<Eigen::Vector3d> normals, vertices;

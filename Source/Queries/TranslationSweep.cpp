@@ -96,15 +96,16 @@ TranslationSweep::TranslationSweep(const BodyPair& pair, const Vector3d& axis,
                                    SweepScratch& scratch)
     : m_pair(pair),
       m_scratch(scratch),
-      m_axis(axis),
-      m_unit(unitOf(pair.magnitude())),
+      m_frame(frameOf(pair)),
+      m_axis(m_frame.axes * axis),
+      m_unit(m_frame.unit),
       m_inset(kInset * pair.magnitude() * m_unit) {
   const MeshTopology& topology = pair.geometry(true).mesh.topology;
-  scratch.a.load(topology, pair.vertices(true), m_unit);
-  scratch.b.load(pair.geometry(false).mesh.topology, pair.vertices(false), m_unit);
-  scratch.inset.make(scratch.a, topology, pair.vertices(true), m_unit, m_inset);
-  scratch.a.makeBoxes(axis, &scratch.inset);
-  scratch.b.makeBoxes(axis, nullptr);
+  scratch.a.load(topology, pair.vertices(true), m_frame);
+  scratch.b.load(pair.geometry(false).mesh.topology, pair.vertices(false), m_frame);
+  scratch.inset.make(scratch.a, topology, pair.vertices(true), m_frame, m_inset);
+  scratch.a.makeBoxes(m_axis, &scratch.inset, false);
+  scratch.b.makeBoxes(m_axis, nullptr, false);
 }
 
 /// Rounding is monotone: a box in another one gives an interval in that of the other one.
@@ -125,10 +126,11 @@ TranslationSweep::Task TranslationSweep::taskOf(const SweepTree::Box& a,
 }
 
 void TranslationSweep::start(const Vector3d& direction, double from, bool closed) {
-  m_direction = direction;
+  m_direction = m_frame.axes * direction;
+  if (closed && !m_isClosed) m_scratch.a.makeBoxes(m_axis, &m_scratch.inset, true);
   m_isClosed = closed;
-  const std::array<double, 4> slopes{direction[0], direction[1], direction[2],
-                                     m_axis.dot(direction)};
+  const std::array<double, 4> slopes{m_direction[0], m_direction[1], m_direction[2],
+                                     m_axis.dot(m_direction)};
   for (std::size_t k = 0; k < 4; ++k) {
     const double along = slopes[k];
     m_inverse[k] = std::abs(along) > kAlongPlane ? 1.0 / along : 0.0;
@@ -146,9 +148,9 @@ void TranslationSweep::start(const Vector3d& direction, double from, bool closed
 
 /// Keeps what meets at the present translation for this round, and the rest for later.
 void TranslationSweep::enter(const Task& task) {
-  if (!(task.enter <= task.leave) || !(task.leave > m_t)) return;
+  if (!(task.enter <= task.leave) || !(task.leave > m_t + kSameTouch)) return;
   if (task.enter <= m_t) {
-    if (task.leave > m_end) m_scratch.now.push_back(task);
+    if (task.leave > m_end + kSameTouch) m_scratch.now.push_back(task);
     return;
   }
   m_scratch.later.push_back(task);
@@ -183,7 +185,7 @@ bool TranslationSweep::advance(const Limits& limits, bool isInside) {
     if (!(m_t < limit)) return false;
     while (!later.empty() && later.front().enter <= m_t) {
       std::pop_heap(later.begin(), later.end(), entersLater);
-      if (later.back().leave > m_t) m_scratch.now.push_back(later.back());
+      if (later.back().leave > m_t + kSameTouch) m_scratch.now.push_back(later.back());
       later.pop_back();
     }
     std::sort(m_scratch.now.begin(), m_scratch.now.end(), [](const Task& l, const Task& r) {
@@ -222,7 +224,7 @@ void TranslationSweep::run() {
   auto& now = m_scratch.now;
   const Task task = now.back();
   now.pop_back();
-  if (!(task.leave > m_end)) return;
+  if (!(task.leave > m_end + kSameTouch)) return;
   if (task.areTriangles) return testTriangles(task);
   const SweepTree &a = m_scratch.a, &b = m_scratch.b;
   const bool isLeafA = task.a >= a.leaves, isLeafB = task.b >= b.leaves;
@@ -270,8 +272,8 @@ void TranslationSweep::testTriangles(const Task& task) {
   const double end = std::min(crossing.lastTouch(), task.leave);
   if (crossing.enter() > m_t) return enter({crossing.enter(), end, task.a, task.b, true});
   const auto contact = [&] {
-    return Contact{m_scratch.a.order[task.a].second, m_scratch.b.order[task.b].second,
-                   crossing.normal().normalized()};
+    return Contact{m_scratch.a.order[task.a].element, m_scratch.b.order[task.b].element,
+                   (m_frame.axes.transpose() * crossing.normal()).normalized()};
   };
   if (m_findsTouch) {
     if (!(end > m_touch && end <= m_t + SweepInset::kMost * m_inset)) return;
@@ -290,18 +292,19 @@ void TranslationSweep::testTriangles(const Task& task) {
 std::optional<TranslationSweep::Hit> TranslationSweep::firstHit(bool ofA, std::uint32_t vertex,
                                                                 const Vector3d& direction,
                                                                 double end) const {
-  const Vector3d p = m_unit * m_pair.vertices(ofA).positions[vertex],
-                 along = ofA ? direction : Vector3d(-direction);
+  const Vector3d p = m_frame(m_pair.vertices(ofA).positions[vertex]),
+                 along = m_frame.axes * (ofA ? direction : Vector3d(-direction));
   auto hit = (ofA ? m_scratch.b : m_scratch.a).firstHit(p, along, end * m_unit);
   if (hit) hit->t /= m_unit;
   return hit;
 }
 
 bool TranslationSweep::isInsetInside() const {
-  const Vector3d shift = t() * m_direction;
+  const auto back = m_frame.axes.transpose();
+  const Vector3d shift = t() * (back * m_direction);
   const auto& parts = m_pair.vertices(true).parts;
   return std::any_of(parts.begin(), parts.end(), [&](std::uint32_t v) {
-    return m_pair.isInB(m_scratch.inset.vertices[v] / m_unit + shift);
+    return m_pair.isInB(back * m_scratch.inset.vertices[v] / m_unit + shift);
   });
 }
 

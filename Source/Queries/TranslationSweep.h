@@ -85,10 +85,11 @@ class TranslationSweep {
 
   const BodyPair& m_pair;
   SweepScratch& m_scratch;
-  const Eigen::Vector3d m_axis;
-  const double m_unit;  ///< 1/L
+  const SweepFrame m_frame;
+  const Eigen::Vector3d m_axis;  ///< in the frame
+  const double m_unit;           ///< 1/L
   double m_inset = 0;
-  Eigen::Vector3d m_direction = Eigen::Vector3d::Zero();
+  Eigen::Vector3d m_direction = Eigen::Vector3d::Zero();  ///< in the frame
   std::array<double, 4> m_inverse{};
   bool m_isClosed = false;
   double m_limit = 0;         ///< in units; infinite if last() is wanted

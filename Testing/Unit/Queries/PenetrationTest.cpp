@@ -6,6 +6,7 @@
 #include "Common/FieldMeshes.h"
 #include "Common/Sanitized.h"
 #include "Common/ShapeTruth.h"
+#include "Unit/Queries/MovedMeshes.h"
 #include "Unit/Queries/QueryTruth.h"
 
 #include <palpate/FeaturePairs.h>
@@ -28,21 +29,6 @@
 // triangles against all.
 namespace palpate::testing {
 namespace {
-
-Mesh moved(Mesh mesh, const Vector3d& shift) {
-  for (Vector3d& p : mesh.positions) p += shift;
-  return mesh;
-}
-
-Mesh turned(Mesh mesh, const Matrix3d& rotation) {
-  for (Vector3d& p : mesh.positions) p = rotation * p;
-  return mesh;
-}
-
-Mesh scaledBy(Mesh mesh, double factor) {
-  for (Vector3d& p : mesh.positions) p *= factor;
-  return mesh;
-}
 
 /// A beam bent to a U: concave, with a slot that is open upward.
 Solid bracket(Random& random) {
