@@ -184,7 +184,11 @@ class PenetrationSearch {
       const bool isFree = m_sweep.advance({limits.end, limits.operations, wantsLast}, isInside);
       if (m_sweep.last().elementA != kNoElement) at.last = m_sweep.last();
       at.depth = std::max(at.depth, m_sweep.t());
-      if (!isFree) return at;
+      if (!isFree) {
+        // Something blocks it up to the end, unless the operations ended.
+        if (!wantsLast && m_sweep.operations() <= limits.operations) at.depth = limits.end;
+        return at;
+      }
       at.depth = m_sweep.t() + slack;
       // Not tested, as it is no better. Of equal depths, descents have the better direction.
       at.separates = wantsLast ? at.depth > m_best.depth : at.depth >= m_best.depth;
@@ -231,6 +235,10 @@ class PenetrationSearch {
                normal.dot(at.direction) < 0 ? Vector3d(-normal) : normal};
   }
   std::size_t operations() const { return kOperations + kOperationsPerTriangle * m_triangles; }
+  /// Of all sweeps, after one that separates.
+  std::size_t operationsToImprove() const {
+    return std::max(operations(), m_sweep.operations() + operations() / 4);
+  }
 
   // ---- Vertices inside the other body ----
 
@@ -301,8 +309,13 @@ class PenetrationSearch {
     for (double limit = std::max(kWorthDescent * least, most / 64);
          limit < most && !m_best.separates && m_sweep.operations() < operations() / 2; limit *= 2)
       trySeeds(limit, operations() / 2, 4 * operations());
-    if (!m_best.separates) improve(m_hulls.direction, {kInfinity, 0.0, 4 * operations()});
-    const std::size_t end = std::max(operations(), m_sweep.operations() + operations() / 4);
+    if (!m_best.separates) {
+      const Limits limits{kInfinity, 0.0, 4 * operations()};
+      const Translation last = translate(m_hulls.direction, limits, false);
+      take(last);
+      if (last.separates) descend(last, operationsToImprove());
+    }
+    const std::size_t end = operationsToImprove();
     trySeeds(kInfinity, end, end);
   }
   static bool isEarlier(const PenetrationScratch::Seed& l, const PenetrationScratch::Seed& r) {

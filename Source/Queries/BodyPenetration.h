@@ -60,7 +60,8 @@ Penetration apart(GeometryId a, GeometryId b);
 ///          directions the search goes on to the shortest translation that satisfies all contacts
 ///          at which translations ended. If nothing separates the bodies, a leaves the hull of b.
 /// Cost     linear in the triangles: all sweeps together have kOperationsPerTriangle for each, or
-///          four times as many until something separates the bodies. Each test costs what it finds.
+///          four times as many until something separates the bodies, and then a quarter more for
+///          shorter translations. Each test costs what it finds.
 Penetration penetrationOf(const Body& a, const Body& b, Engine, PenetrationScratch&,
                           const PenetrationEffort& = kThorough);
 /// The same of bodies with triangles. The pair must use scratch.pair and effort.moved.

@@ -206,8 +206,8 @@ class PALPATE_EXPORT SpatialQueries {
   /// Errors   NotClosed, with the first edge, for what has no inside; UnsupportedMethod for two
   ///          planes.
   /// Cost     linear in the triangles and the pairs that touch: up to some 100 operations for each
-  ///          triangle. Mostly 2 to 16 ms for 3,000 triangles, up to 50 ms where
-  ///          many faces coincide or lie in layers.
+  ///          triangle. Mostly 2 to 16 ms for 3,000 triangles, up to 65 ms in layers, and up to
+  ///          300 ms where many triangles of both bodies lie in a common slanted plane.
   Penetration penetration(GeometryId a, GeometryId b) const;
   /// Whether two surfaces pierce each other in two of their elements; else they only touch there,
   /// or are apart. It is the decision by which Auto and Validity tell resting contact from

@@ -141,6 +141,19 @@ TEST(LayeredPenetration, PiecesOfAZigzagCutLeaveAsTheyCame) {
   }
 }
 
+/// Directions that are blocked up to a limit leave the next limit to others.
+TEST(LayeredPenetration, PointedTeethThatLieAsideLeaveByAShortWay) {
+  for (const int teeth : {4, 16}) {
+    std::vector<Eigen::Vector2d> profile{{0, 0}};
+    for (int i = 0; i < teeth; ++i) {
+      profile.push_back({i + 0.5, 1.5});
+      profile.push_back({i + 1, 0});
+    }
+    const Mesh lower = underProfile(profile, -2), upper = underProfile(profile, 3.5);
+    expectShort(moved(lower, {0.0375, 0.05, 0}), upper, 0.0625, std::to_string(teeth) + " teeth");
+  }
+}
+
 /// The layer between a body and the body scaled by less.
 Mesh shell(const Mesh& unit, double outer, double inner) {
   return joined(scaledBy(unit, outer), insideOut(scaledBy(unit, inner)));
