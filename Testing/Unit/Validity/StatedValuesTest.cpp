@@ -1,5 +1,6 @@
 #include "Common/DegenerateCases.h"
 #include "Common/PairRun.h"
+#include "Common/TestGeometry.h"
 
 #include <algorithm>
 #include <array>
