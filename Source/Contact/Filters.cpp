@@ -58,10 +58,8 @@ class Surface {
   }
   bool isBeyondBorder(const MeshFeature& closest, const Vector3d& way) const {
     const auto around = holdersOf(m_mesh.topology, closest);
-    const bool isOnBorder = closest.kind == MeshFeature::Kind::Vertex
-                                ? m_mesh.topology.hasClosedStar[closest.id] == 0
-                                : around.size() == 1;
-    return isOnBorder && std::none_of(around.begin(), around.end(), [&](std::uint32_t t) {
+    return isOnBorder(m_mesh.topology, closest) &&
+           std::none_of(around.begin(), around.end(), [&](std::uint32_t t) {
              return way.cross(normalOf(t)).norm() <= kTouchAngle;
            });
   }

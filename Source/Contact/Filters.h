@@ -44,6 +44,13 @@ bool pointsInward(const MeshPair&, const std::array<MeshFeature, 2>& features,
 bool liesBelow(const TriangleMesh&, const MeshFeature&, const Eigen::Vector3d& direction,
                double time = 1.0);
 
+/// Whether a feature is on the border of a surface: an edge of one triangle, or a vertex around
+/// which the surface is not closed.
+inline bool isOnBorder(const MeshTopology& topology, const MeshFeature& feature) {
+  if (feature.kind == MeshFeature::Kind::Vertex) return topology.hasClosedStar[feature.id] == 0;
+  return holdersOf(topology, feature).size() == 1;
+}
+
 /// Whether a vertex is beyond the border of a surface: its closest point is on the border, and the
 /// way from there to the vertex is not along the normal of a triangle there, to either side.
 bool isBeyondBorder(const TriangleMesh&, const MeshFeature& closest, const Eigen::Vector3d& way,

@@ -18,9 +18,10 @@ namespace palpate {
 /// of other contacts.
 ///
 /// Sides    a vertex that is behind the other surface leaves it along the normal of its contact
-///          with a negative distance, or, beyond a border, along the triangle's normal. A contact
-///          is on the wrong side if it moves the vertices of its closest points against that, by
-///          the weighted sum.
+///          with a negative distance, or, beyond a border, along the mean normal of the triangles
+///          at the nearest feature. A contact is on the wrong side if it moves the vertices of its
+///          closest points against that, by the weighted sum. That of a vertex beyond a border with
+///          the border is on no wrong side: both are apart.
 /// Rule     (1) Of vertices that are behind at the step's end: Contacts::Distinct drops all other
 ///          contacts of these vertices, because Intersection's contact stands for them.
 ///          Contacts::All turns those that are on the wrong side: the normal is reversed and the

@@ -121,7 +121,7 @@ bool areParallel(const Corners& s, const Corners& t) {
 }
 
 bool isBorder(const MeshTopology& topology, std::uint32_t edge) {
-  return topology.edgeTriangles[edge].size() == 1;
+  return isOnBorder(topology, {MeshFeature::Kind::Edge, edge});
 }
 
 /// Whether two triangles hold an edge, and each is behind the other by more than rounding.

@@ -35,6 +35,7 @@ bool shareCorner(const Triangle& s, const Triangle& t) {
 
 void SideCourses::clear() noexcept {
   m_here.clear();
+  m_returned.clear();
   m_courses.clear();
   m_visited.clear();
 }
@@ -42,15 +43,14 @@ void SideCourses::clear() noexcept {
 void SideCourses::start(const MeshPair& pair, std::span<const PassedSide> sides,
                         std::size_t passages) {
   clear();
-  Buffer<Crossing> returned;
   for (PassedSide side : sides)
     if (locate(pair, side))
       m_here.push_back(side);
     else if (!isEdges(side.passage) && isThere(pair, side))
-      returned.push_back(side.passage);
+      m_returned.push_back(side.passage);
   sortUnique(m_here);
   // A vertex that is in front of one wall of a body again has left the body by another one.
-  for (const Crossing& passage : returned) {
+  for (const Crossing& passage : m_returned) {
     const auto other = std::find_if(m_here.begin(), m_here.end(), [&](const PassedSide& side) {
       return isOfVertex(side.passage, passage) && side.passage.forward != passage.forward;
     });
@@ -206,6 +206,7 @@ bool SideCourses::replaces(const MeshPair& pair, const PassedSide& features, dou
 
 void SideCourses::releaseMemory() {
   releaseSpare(m_here);
+  m_returned = {};
   m_courses = {};
   m_visited = {};
   m_heads = {};

@@ -73,7 +73,8 @@ class SideCourses {
   bool takeByVertex(const MeshPair&, const PassedSide&);
   void add(const MeshPair&, const PassedSide&, double time);
 
-  Buffer<PassedSide> m_here;  ///< those at the step's start that last
+  Buffer<PassedSide> m_here;    ///< those at the step's start that last
+  Buffer<Crossing> m_returned;  ///< scratch of start(): passages of vertices in front again
   Buffer<Course> m_courses;
   Buffer<PassedSide> m_visited;
   Buffer<std::uint32_t> m_heads;  ///< of lists of m_courses: by the vertex, the last one of edges
